@@ -1,1 +1,18 @@
-//! geometry
+//! Tetrahedral meshes and the nodal finite-element kernel of Fluxmorph.
+//!
+//! The mesh topology never changes during an optimisation; only coordinates move (section 2 of the seed paper). So
+//! [`Topology`] (connectivity, regions, surfaces) lives apart from [`Mesh`] (topology and coordinates), and
+//! everything that follows from topology alone is made once a run. Meshes come from `generate`; they leave through
+//! `io`; `quality` judges them (Eq. 4). `fem` is the kernel that the elastic and the electromagnetic problem
+//! share, as the paper's appendix suggests.
+
+pub mod error;
+pub mod ids;
+pub mod mesh;
+pub mod tet4;
+pub mod topology;
+
+pub use error::MeshError;
+pub use ids::{ElementId, NodeId, RegionId};
+pub use mesh::Mesh;
+pub use topology::{Facet, Topology};

@@ -1,0 +1,106 @@
+//! What can be wrong with a mesh, its generator or a file.
+
+use std::path::PathBuf;
+
+use crate::ids::{ElementId, NodeId};
+
+/// Errors of this crate; each names the culprit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// A node has a coordinate that is not a number or not finite.
+    #[error("node {node} lies at {point:?}: every coordinate must be finite")]
+    NotFinite {
+        /// The node.
+        node: NodeId,
+        /// Its coordinates [m].
+        point: [f64; 3],
+    },
+    /// A tetrahedron has no or negative volume.
+    #[error(
+        "element {element} at {centroid:?} m has the volume {volume:e} m³: it is flat or inverted, and must be \
+         positive"
+    )]
+    Inverted {
+        /// The element.
+        element: ElementId,
+        /// Its signed volume [m³].
+        volume: f64,
+        /// Its centroid [m].
+        centroid: [f64; 3],
+    },
+    /// The number of coordinates is not the number of nodes.
+    #[error("{points} points for {nodes} nodes: one point a node is needed")]
+    PointCount {
+        /// Points given.
+        points: usize,
+        /// Nodes of the topology.
+        nodes: usize,
+    },
+    /// A tetrahedron or surface names a node that does not exist.
+    #[error("node {node} is used, but the mesh has {nodes} nodes (numbered from 0)")]
+    DanglingNode {
+        /// The node used.
+        node: NodeId,
+        /// Number of nodes.
+        nodes: usize,
+    },
+    /// Three or more tetrahedra share one face.
+    #[error("the face {face:?} is shared by more than two tetrahedra: the mesh overlaps itself")]
+    OverfullFace {
+        /// The three nodes, sorted.
+        face: [NodeId; 3],
+    },
+    /// A region name that the mesh does not have.
+    #[error("there is no region `{name}`; the mesh has: {known}")]
+    UnknownRegion {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A surface name that the mesh does not have.
+    #[error("there is no surface `{name}`; the mesh has: {known}")]
+    UnknownSurface {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A parameter of a generator is out of range.
+    #[error("{parameter} = {value}: {expected}")]
+    Parameter {
+        /// The parameter's name, as in the configuration.
+        parameter: &'static str,
+        /// The value given.
+        value: String,
+        /// What is expected, and what to do.
+        expected: String,
+    },
+    /// A sparse factorisation failed.
+    #[error("the sparse factorisation of {unknowns} unknowns failed: {cause}")]
+    Factorisation {
+        /// Size of the matrix.
+        unknowns: usize,
+        /// What the library said.
+        cause: String,
+    },
+    /// A value to be written is not finite.
+    #[error("the array `{array}` holds {value} at position {position}: only finite values are written")]
+    NotFiniteArray {
+        /// Name of the array.
+        array: String,
+        /// The value.
+        value: f64,
+        /// Its position.
+        position: usize,
+    },
+    /// Reading or writing a file failed.
+    #[error("{}: {cause}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What went wrong.
+        cause: std::io::Error,
+    },
+}

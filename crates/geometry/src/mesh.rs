@@ -1,0 +1,139 @@
+//! A topology with coordinates: the only thing that moves.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::error::MeshError;
+use crate::ids::{ElementId, NodeId};
+use crate::tet4::{self, Point};
+use crate::topology::Topology;
+
+/// A valid tetrahedral mesh: finite coordinates, every volume positive.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    topology: Arc<Topology>,
+    points: Vec<Point>,
+}
+
+impl Mesh {
+    /// A mesh of `points` [m], one per node.
+    ///
+    /// # Errors
+    /// [`MeshError::PointCount`], [`MeshError::NotFinite`] (first node), [`MeshError::Inverted`] (worst element).
+    pub fn new(topology: Arc<Topology>, points: Vec<Point>) -> Result<Self, MeshError> {
+        if points.len() != topology.node_count() {
+            return Err(MeshError::PointCount { points: points.len(), nodes: topology.node_count() });
+        }
+        if let Some(i) = points.iter().position(|p| p.iter().any(|c| !c.is_finite())) {
+            return Err(MeshError::NotFinite { node: NodeId::new(i), point: points[i] });
+        }
+        let mesh = Self { topology, points };
+        let smallest = mesh
+            .topology
+            .tets()
+            .par_iter()
+            .enumerate()
+            .map(|(e, tet)| (tet4::volume(tet.map(|n| mesh.points[n.index()])), e))
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        match smallest {
+            Some((volume, e)) if volume <= 0.0 => {
+                let element = ElementId::new(e);
+                let centroid = tet4::centroid(mesh.vertices(element));
+                Err(MeshError::Inverted { element, volume, centroid })
+            }
+            _ => Ok(mesh),
+        }
+    }
+
+    /// The same topology with every node moved by `displacement` [m], shape `(n_nodes, 3)`.
+    ///
+    /// # Errors
+    /// As [`Mesh::new`]: a motion that inverts an element yields no mesh.
+    pub fn moved(&self, displacement: &[Point]) -> Result<Self, MeshError> {
+        if displacement.len() != self.points.len() {
+            return Err(MeshError::PointCount { points: displacement.len(), nodes: self.points.len() });
+        }
+        let points = self
+            .points
+            .iter()
+            .zip(displacement)
+            .map(|(x, u)| [x[0] + u[0], x[1] + u[1], x[2] + u[2]])
+            .collect();
+        Self::new(Arc::clone(&self.topology), points)
+    }
+
+    /// Connectivity, regions and surfaces.
+    pub fn topology(&self) -> &Arc<Topology> {
+        &self.topology
+    }
+
+    /// Coordinates [m], shape `(n_nodes, 3)`.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Coordinates of one node [m].
+    #[inline]
+    pub fn point(&self, node: NodeId) -> Point {
+        self.points[node.index()]
+    }
+
+    /// The four vertices of an element [m].
+    #[inline]
+    pub fn vertices(&self, element: ElementId) -> [Point; 4] {
+        self.topology.tet(element).map(|n| self.points[n.index()])
+    }
+
+    /// Smallest and largest coordinate in each direction [m].
+    pub fn bounding_box(&self) -> [Point; 2] {
+        let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for p in &self.points {
+            for d in 0..3 {
+                limits[0][d] = limits[0][d].min(p[d]);
+                limits[1][d] = limits[1][d].max(p[d]);
+            }
+        }
+        limits
+    }
+
+    /// The mesh without one region, and the faces that its removal exposed (see [`Topology::without_region`]).
+    ///
+    /// # Errors
+    /// As [`Mesh::new`].
+    pub fn without_region(&self, region: crate::RegionId) -> Result<(Self, Vec<[NodeId; 3]>), MeshError> {
+        let (topology, old_of, exposed) = self.topology.without_region(region)?;
+        let points = old_of.iter().map(|n| self.point(*n)).collect();
+        Ok((Self::new(Arc::new(topology), points)?, exposed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::RegionId;
+
+    fn unit_tet() -> Mesh {
+        let topology =
+            Topology::new(4, vec![[0, 1, 2, 3].map(NodeId)], vec!["all".into()], vec![RegionId(0)])
+                .expect("one tet");
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Mesh::new(Arc::new(topology), points).expect("right-handed")
+    }
+
+    #[test]
+    fn a_motion_that_inverts_is_refused_and_names_the_element() {
+        let mut displacement = vec![[0.0; 3]; 4];
+        displacement[3][2] = -2.0;
+        let err = unit_tet().moved(&displacement).unwrap_err();
+        assert!(matches!(err, MeshError::Inverted { element: ElementId(0), .. }), "{err}");
+    }
+
+    #[test]
+    fn a_point_that_is_not_finite_is_refused() {
+        let mut displacement = vec![[0.0; 3]; 4];
+        displacement[2][1] = f64::NAN;
+        let err = unit_tet().moved(&displacement).unwrap_err();
+        assert!(matches!(err, MeshError::NotFinite { node: NodeId(2), .. }), "{err}");
+    }
+}

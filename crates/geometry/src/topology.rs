@@ -1,0 +1,377 @@
+//! What never changes while a mesh moves: connectivity, regions, named surfaces, and what follows from them.
+//!
+//! Lives here: which nodes make which tetrahedron, which elements make which region, the faces between regions and at
+//! the outside, and the incidence node → elements. Does not live here: any coordinate (see [`crate::Mesh`]).
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use crate::error::MeshError;
+use crate::ids::{ElementId, NodeId, RegionId};
+use crate::tet4::FACES;
+
+/// A triangle between two regions or at the outside of the mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Facet {
+    /// Nodes, ordered so that the area vector points out of `inside`.
+    pub nodes: [NodeId; 3],
+    /// The element the normal points out of.
+    pub inside: ElementId,
+    /// The element on the other side; `None` at the outside of the mesh.
+    pub outside: Option<ElementId>,
+}
+
+/// Connectivity, regions and named surfaces of a tetrahedral mesh; immutable and shared.
+#[derive(Clone, Debug)]
+pub struct Topology {
+    node_count: usize,
+    tets: Vec<[NodeId; 4]>,
+    region_names: Vec<String>,
+    region_of: Vec<RegionId>,
+    surfaces: BTreeMap<String, Vec<[NodeId; 3]>>,
+    cells: BTreeMap<String, Vec<Vec<ElementId>>>,
+    incidence: Incidence,
+    facets: Vec<Facet>,
+}
+
+/// Elements that touch each node, in compressed rows.
+#[derive(Clone, Debug)]
+struct Incidence {
+    offsets: Vec<u32>,
+    elements: Vec<ElementId>,
+}
+
+impl Topology {
+    /// A topology of `node_count` nodes.
+    ///
+    /// `region_of` has one entry per tet and indexes `region_names`. The node order of a tet decides the sign of its
+    /// volume; it is checked where there are coordinates, in [`crate::Mesh::new`].
+    ///
+    /// # Errors
+    /// [`MeshError::DanglingNode`] and [`MeshError::OverfullFace`].
+    ///
+    /// # Panics
+    /// If `region_of` and `tets` differ in length or a region id has no name: both are the caller's to keep.
+    pub fn new(
+        node_count: usize,
+        tets: Vec<[NodeId; 4]>,
+        region_names: Vec<String>,
+        region_of: Vec<RegionId>,
+    ) -> Result<Self, MeshError> {
+        assert_eq!(tets.len(), region_of.len(), "one region an element");
+        assert!(region_of.iter().all(|r| r.index() < region_names.len()), "every region has a name");
+        if let Some(&node) = tets.iter().flatten().find(|n| n.index() >= node_count) {
+            return Err(MeshError::DanglingNode { node, nodes: node_count });
+        }
+        let incidence = Incidence::new(node_count, &tets);
+        let facets = find_facets(&tets, &region_of)?;
+        Ok(Self {
+            node_count,
+            tets,
+            region_names,
+            region_of,
+            surfaces: BTreeMap::new(),
+            cells: BTreeMap::new(),
+            incidence,
+            facets,
+        })
+    }
+
+    /// Adds (or replaces) a named surface, given by its triangles.
+    ///
+    /// # Errors
+    /// [`MeshError::DanglingNode`].
+    pub fn with_surface(mut self, name: &str, triangles: Vec<[NodeId; 3]>) -> Result<Self, MeshError> {
+        if let Some(&node) = triangles.iter().flatten().find(|n| n.index() >= self.node_count) {
+            return Err(MeshError::DanglingNode { node, nodes: self.node_count });
+        }
+        self.surfaces.insert(name.to_owned(), triangles);
+        Ok(self)
+    }
+
+    /// Partitions a region into cells, each a list of elements: the observation cells of `Σ B·B*`.
+    pub fn with_cells(mut self, region: &str, cells: Vec<Vec<ElementId>>) -> Self {
+        self.cells.insert(region.to_owned(), cells);
+        self
+    }
+
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        self.node_count
+    }
+
+    /// Nodes of every tetrahedron.
+    pub fn tets(&self) -> &[[NodeId; 4]] {
+        &self.tets
+    }
+
+    /// Nodes of one tetrahedron.
+    #[inline]
+    pub fn tet(&self, element: ElementId) -> [NodeId; 4] {
+        self.tets[element.index()]
+    }
+
+    /// All elements, in order.
+    pub fn elements(&self) -> impl ExactSizeIterator<Item = ElementId> + Clone + use<> {
+        (0..self.tets.len()).map(ElementId::new)
+    }
+
+    /// All nodes, in order.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = NodeId> + Clone + use<> {
+        (0..self.node_count).map(NodeId::new)
+    }
+
+    /// Region of every element.
+    pub fn region_of(&self) -> &[RegionId] {
+        &self.region_of
+    }
+
+    /// Names of the regions, by [`RegionId`].
+    pub fn region_names(&self) -> &[String] {
+        &self.region_names
+    }
+
+    /// The region of a name.
+    ///
+    /// # Errors
+    /// [`MeshError::UnknownRegion`] lists the names there are.
+    pub fn region(&self, name: &str) -> Result<RegionId, MeshError> {
+        self.region_names.iter().position(|n| n == name).map(RegionId::new).ok_or_else(|| {
+            MeshError::UnknownRegion { name: name.to_owned(), known: self.region_names.join(", ") }
+        })
+    }
+
+    /// The elements of a region, ascending.
+    pub fn elements_of(&self, region: RegionId) -> Vec<ElementId> {
+        self.elements().filter(|e| self.region_of[e.index()] == region).collect()
+    }
+
+    /// The cells of a region: those given by [`Topology::with_cells`], else one per element.
+    pub fn cells_of(&self, region: RegionId) -> Vec<Vec<ElementId>> {
+        match self.cells.get(&self.region_names[region.index()]) {
+            Some(cells) => cells.clone(),
+            None => self.elements_of(region).into_iter().map(|e| vec![e]).collect(),
+        }
+    }
+
+    /// Names of the surfaces, sorted.
+    pub fn surface_names(&self) -> impl Iterator<Item = &str> {
+        self.surfaces.keys().map(String::as_str)
+    }
+
+    /// Triangles of a named surface.
+    ///
+    /// # Errors
+    /// [`MeshError::UnknownSurface`] lists the names there are.
+    pub fn surface(&self, name: &str) -> Result<&[[NodeId; 3]], MeshError> {
+        self.surfaces.get(name).map(Vec::as_slice).ok_or_else(|| MeshError::UnknownSurface {
+            name: name.to_owned(),
+            known: self.surface_names().collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// Elements that touch a node, ascending.
+    #[inline]
+    pub fn elements_around(&self, node: NodeId) -> &[ElementId] {
+        self.incidence.around(node)
+    }
+
+    /// Faces between two regions and at the outside, ordered by (inside element, local face).
+    pub fn facets(&self) -> &[Facet] {
+        &self.facets
+    }
+
+    /// The same mesh without one region: its elements and the nodes that only it used are gone.
+    ///
+    /// Faces towards the removed region become outside faces and are returned in the new numbering, oriented out of
+    /// the remaining elements. Surfaces keep the triangles whose nodes all survive.
+    ///
+    /// Returns the topology, the old node of every new one, and those faces.
+    ///
+    /// # Errors
+    /// [`MeshError::OverfullFace`] cannot occur on a valid topology; it is passed through.
+    pub fn without_region(
+        &self,
+        region: RegionId,
+    ) -> Result<(Self, Vec<NodeId>, Vec<[NodeId; 3]>), MeshError> {
+        let keep: Vec<ElementId> = self.elements().filter(|e| self.region_of[e.index()] != region).collect();
+        let mut new_of: Vec<Option<NodeId>> = vec![None; self.node_count];
+        for &e in &keep {
+            for n in self.tet(e) {
+                new_of[n.index()] = Some(NodeId(0));
+            }
+        }
+        let mut old_of = Vec::new();
+        for node in self.nodes() {
+            if new_of[node.index()].is_some() {
+                new_of[node.index()] = Some(NodeId::new(old_of.len()));
+                old_of.push(node);
+            }
+        }
+        let mut new_element: Vec<Option<ElementId>> = vec![None; self.tets.len()];
+        for (i, e) in keep.iter().enumerate() {
+            new_element[e.index()] = Some(ElementId::new(i));
+        }
+        let renumber = |nodes: &[NodeId; 3]| -> Option<[NodeId; 3]> {
+            Some([new_of[nodes[0].index()]?, new_of[nodes[1].index()]?, new_of[nodes[2].index()]?])
+        };
+        let tets = keep
+            .iter()
+            .map(|&e| self.tet(e).map(|n| new_of[n.index()].expect("nodes of kept elements are kept")))
+            .collect();
+        let regions = keep.iter().map(|e| self.region_of[e.index()]).collect();
+        let mut topology = Self::new(old_of.len(), tets, self.region_names.clone(), regions)?;
+        topology.surfaces = self
+            .surfaces
+            .iter()
+            .map(|(name, triangles)| (name.clone(), triangles.iter().filter_map(renumber).collect()))
+            .collect();
+        topology.cells = self
+            .cells
+            .iter()
+            .map(|(name, cells)| {
+                let cells = cells
+                    .iter()
+                    .map(|cell| cell.iter().filter_map(|e| new_element[e.index()]).collect::<Vec<_>>())
+                    .filter(|cell| !cell.is_empty())
+                    .collect();
+                (name.clone(), cells)
+            })
+            .collect();
+        let region_at = |e: ElementId| self.region_of[e.index()];
+        let exposed = self
+            .facets
+            .iter()
+            .filter_map(|f| {
+                let outside = f.outside?;
+                let [a, b, c] = f.nodes;
+                match (region_at(f.inside) == region, region_at(outside) == region) {
+                    (false, true) => renumber(&[a, b, c]),
+                    (true, false) => renumber(&[a, c, b]),
+                    _ => None,
+                }
+            })
+            .collect();
+        Ok((topology, old_of, exposed))
+    }
+}
+
+impl Incidence {
+    fn new(node_count: usize, tets: &[[NodeId; 4]]) -> Self {
+        let mut offsets = vec![0u32; node_count + 1];
+        for n in tets.iter().flatten() {
+            offsets[n.index() + 1] += 1;
+        }
+        for i in 0..node_count {
+            offsets[i + 1] += offsets[i];
+        }
+        let mut cursor = offsets.clone();
+        let mut elements = vec![ElementId(0); tets.len() * 4];
+        for (e, tet) in tets.iter().enumerate() {
+            for n in tet {
+                let slot = &mut cursor[n.index()];
+                elements[*slot as usize] = ElementId::new(e);
+                *slot += 1;
+            }
+        }
+        Self { offsets, elements }
+    }
+
+    #[inline]
+    fn around(&self, node: NodeId) -> &[ElementId] {
+        let i = node.index();
+        &self.elements[self.offsets[i] as usize..self.offsets[i + 1] as usize]
+    }
+}
+
+/// Faces between different regions and at the outside.
+fn find_facets(tets: &[[NodeId; 4]], region_of: &[RegionId]) -> Result<Vec<Facet>, MeshError> {
+    let mut faces: Vec<([NodeId; 3], u32)> = tets
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(e, tet)| {
+            FACES.iter().enumerate().map(move |(f, face)| {
+                let mut key = face.map(|v| tet[v]);
+                key.sort_unstable();
+                (key, (4 * e + f) as u32)
+            })
+        })
+        .collect();
+    faces.par_sort_unstable();
+    let oriented = |code: u32| {
+        let tet = tets[(code / 4) as usize];
+        (FACES[(code % 4) as usize].map(|v| tet[v]), ElementId(code / 4))
+    };
+    let mut found: Vec<(u32, Facet)> = Vec::new();
+    for group in faces.chunk_by(|a, b| a.0 == b.0) {
+        let (nodes, inside) = oriented(group[0].1);
+        match group {
+            [(_, code)] => found.push((*code, Facet { nodes, inside, outside: None })),
+            [(_, code), (_, other)] => {
+                let outside = ElementId(other / 4);
+                if region_of[inside.index()] != region_of[outside.index()] {
+                    found.push((*code, Facet { nodes, inside, outside: Some(outside) }));
+                }
+            }
+            _ => return Err(MeshError::OverfullFace { face: group[0].0 }),
+        }
+    }
+    found.sort_unstable_by_key(|&(code, _)| code);
+    Ok(found.into_iter().map(|(_, facet)| facet).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn n(i: u32) -> NodeId {
+        NodeId(i)
+    }
+
+    /// Two tets that share the face (1, 2, 3), in two regions.
+    fn pair() -> Topology {
+        Topology::new(
+            5,
+            vec![[n(0), n(1), n(2), n(3)], [n(4), n(1), n(3), n(2)]],
+            vec!["left".into(), "right".into()],
+            vec![RegionId(0), RegionId(1)],
+        )
+        .expect("two tets make a mesh")
+    }
+
+    #[test]
+    fn facets_are_the_interface_and_the_outside() {
+        let topology = pair();
+        let interface: Vec<_> = topology.facets().iter().filter(|f| f.outside.is_some()).collect();
+        assert_eq!(interface.len(), 1);
+        assert_eq!(interface[0].nodes, [n(1), n(2), n(3)]);
+        assert_eq!(topology.facets().len(), 7);
+    }
+
+    #[test]
+    fn removing_a_region_exposes_its_faces_and_drops_its_nodes() {
+        let (left, old_of, exposed) = pair().without_region(RegionId(1)).expect("a region may go");
+        assert_eq!((left.node_count(), left.tets().len()), (4, 1));
+        assert_eq!(old_of, [n(0), n(1), n(2), n(3)]);
+        assert_eq!(exposed, [[n(1), n(2), n(3)]]);
+        let (_, _, exposed) = pair().without_region(RegionId(0)).expect("a region may go");
+        assert_eq!(exposed, [[n(0), n(2), n(1)]], "oriented out of the element that stays");
+    }
+
+    #[test]
+    fn a_face_of_three_tets_and_a_dangling_node_are_refused() {
+        let tets = vec![[n(0), n(1), n(2), n(3)], [n(4), n(1), n(3), n(2)], [n(5), n(1), n(2), n(3)]];
+        let regions = vec![RegionId(0); 3];
+        let err = Topology::new(6, tets.clone(), vec!["a".into()], regions.clone()).unwrap_err();
+        assert!(matches!(err, MeshError::OverfullFace { .. }));
+        let err = Topology::new(5, tets, vec!["a".into()], regions).unwrap_err();
+        assert!(matches!(err, MeshError::DanglingNode { node: NodeId(5), .. }));
+    }
+
+    #[test]
+    fn names_that_do_not_exist_list_those_that_do() {
+        let err = pair().region("lefd").unwrap_err();
+        assert_eq!(err.to_string(), "there is no region `lefd`; the mesh has: left, right");
+    }
+}
