@@ -7,7 +7,9 @@
 //! share, as the paper's appendix suggests.
 
 pub mod error;
+pub mod fem;
 pub mod ids;
+pub mod incidence;
 pub mod mesh;
 pub mod tet4;
 pub mod topology;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId, RegionId};
+use crate::incidence::Incidence;
 use crate::tet4::FACES;
 
 /// A triangle between two regions or at the outside of the mesh.
@@ -33,13 +34,6 @@ pub struct Topology {
     cells: BTreeMap<String, Vec<Vec<ElementId>>>,
     incidence: Incidence,
     facets: Vec<Facet>,
-}
-
-/// Elements that touch each node, in compressed rows.
-#[derive(Clone, Debug)]
-struct Incidence {
-    offsets: Vec<u32>,
-    elements: Vec<ElementId>,
 }
 
 impl Topology {
@@ -254,34 +248,6 @@ impl Topology {
             })
             .collect();
         Ok((topology, old_of, exposed))
-    }
-}
-
-impl Incidence {
-    fn new(node_count: usize, tets: &[[NodeId; 4]]) -> Self {
-        let mut offsets = vec![0u32; node_count + 1];
-        for n in tets.iter().flatten() {
-            offsets[n.index() + 1] += 1;
-        }
-        for i in 0..node_count {
-            offsets[i + 1] += offsets[i];
-        }
-        let mut cursor = offsets.clone();
-        let mut elements = vec![ElementId(0); tets.len() * 4];
-        for (e, tet) in tets.iter().enumerate() {
-            for n in tet {
-                let slot = &mut cursor[n.index()];
-                elements[*slot as usize] = ElementId::new(e);
-                *slot += 1;
-            }
-        }
-        Self { offsets, elements }
-    }
-
-    #[inline]
-    fn around(&self, node: NodeId) -> &[ElementId] {
-        let i = node.index();
-        &self.elements[self.offsets[i] as usize..self.offsets[i + 1] as usize]
     }
 }
 

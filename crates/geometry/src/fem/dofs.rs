@@ -1,0 +1,101 @@
+//! Equation numbers of the unknown components at the nodes.
+
+use crate::ids::NodeId;
+
+/// Marks a component that is not an unknown of this system.
+const NOT_AN_UNKNOWN: u32 = u32::MAX;
+
+/// Equation numbers of `C` components per node; numbered node by node, so that the rows of a node are contiguous.
+#[derive(Clone, Debug)]
+pub struct DofMap<const C: usize> {
+    equations: Vec<[u32; C]>,
+    count: usize,
+}
+
+impl<const C: usize> DofMap<C> {
+    /// Numbers the components for which `is_unknown(node, component)` holds.
+    pub fn new(node_count: usize, mut is_unknown: impl FnMut(NodeId, usize) -> bool) -> Self {
+        let mut count = 0;
+        let equations = (0..node_count)
+            .map(|i| {
+                std::array::from_fn(|c| {
+                    if is_unknown(NodeId::new(i), c) {
+                        count += 1;
+                        count - 1
+                    } else {
+                        NOT_AN_UNKNOWN
+                    }
+                })
+            })
+            .collect();
+        Self { equations, count: count as usize }
+    }
+
+    /// Number of equations.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        self.equations.len()
+    }
+
+    /// Equation of a component at a node, if it is an unknown.
+    #[inline]
+    pub fn equation(&self, node: NodeId, component: usize) -> Option<usize> {
+        let equation = self.equations[node.index()][component];
+        (equation != NOT_AN_UNKNOWN).then_some(equation as usize)
+    }
+
+    /// Bit `c` is set where component `c` at `node` is an unknown.
+    #[inline]
+    pub fn unknown_bits(&self, node: NodeId) -> u16 {
+        let mut bits = 0;
+        for (c, &equation) in self.equations[node.index()].iter().enumerate() {
+            bits |= u16::from(equation != NOT_AN_UNKNOWN) << c;
+        }
+        bits
+    }
+
+    /// The components at a node out of a vector of unknowns; zero where a component is not an unknown.
+    #[inline]
+    pub fn gather<T: Copy + Default>(&self, values: &[T], node: NodeId) -> [T; C] {
+        self.equations[node.index()]
+            .map(|equation| if equation == NOT_AN_UNKNOWN { T::default() } else { values[equation as usize] })
+    }
+
+    /// Adds components at a node into a vector of unknowns; what is not an unknown is dropped.
+    #[inline]
+    pub fn scatter_add<T: Copy + std::ops::AddAssign>(
+        &self,
+        values: &mut [T],
+        node: NodeId,
+        components: [T; C],
+    ) {
+        for (equation, component) in self.equations[node.index()].iter().zip(components) {
+            if *equation != NOT_AN_UNKNOWN {
+                values[*equation as usize] += component;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equations_are_numbered_node_by_node_and_skip_what_is_known() {
+        let dofs = DofMap::<2>::new(3, |node, c| !(node == NodeId(1) && c == 0));
+        assert_eq!(dofs.count(), 5);
+        assert_eq!(dofs.equation(NodeId(1), 0), None);
+        assert_eq!(dofs.equation(NodeId(1), 1), Some(2));
+        assert_eq!(dofs.unknown_bits(NodeId(1)), 0b10);
+        let values = [1.0, 2.0, 3.0, 4.0, 5.0];
+        assert_eq!(dofs.gather(&values, NodeId(1)), [0.0, 3.0]);
+        let mut sum = [0.0; 5];
+        dofs.scatter_add(&mut sum, NodeId(1), [7.0, 8.0]);
+        assert_eq!(sum, [0.0, 0.0, 8.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,22 @@
+//! The nodal finite-element kernel shared by the elastic and the electromagnetic problem.
+//!
+//! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
+//! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`])
+//! and the sparse Cholesky factor ([`cholesky`]). Does not live here: any weak form, any material, any boundary
+//! condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
+//! further nodes on their edges and use the same code with longer connectivity rows.
+
+pub mod assemble;
+pub mod cholesky;
+pub mod csr;
+pub mod dofs;
+pub mod ordering;
+pub mod pattern;
+pub mod scalar;
+
+pub use assemble::LocalMatrix;
+pub use cholesky::{Cholesky, CholeskyAnalysis};
+pub use csr::CsrMatrix;
+pub use dofs::DofMap;
+pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
+pub use scalar::{Scalar, c64, dot, norm};

@@ -1,0 +1,345 @@
+//! The sparsity pattern: which components at which nodes are coupled, from topology and couplings alone.
+//!
+//! Elements come in groups of one shape (tetrahedra, triangles …), each element with the [`Coupling`] of components
+//! that it can produce. An entry is stored where at least one element couples it: never by looking at values, so that
+//! the pattern does not change while the mesh moves. The stored components of node `a` against node `b` are a *block*.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use crate::fem::csr::CsrStructure;
+use crate::fem::dofs::DofMap;
+use crate::ids::{ElementId, NodeId};
+use crate::incidence::Incidence;
+
+/// Nodes of one assembly task: few enough tasks that elements on their borders, computed twice, stay rare.
+const NODES_PER_TASK: usize = 2048;
+const MAX_TASKS: usize = 64;
+
+/// A set of component pairs `(row i, column j)` of a block with up to four components a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coupling(u16);
+
+impl Coupling {
+    /// No pair.
+    pub const NONE: Self = Self(0);
+
+    /// This set and the pair `(i, j)`, `i, j < 4`.
+    pub const fn with(self, i: usize, j: usize) -> Self {
+        assert!(i < 4 && j < 4, "a block has at most four components");
+        Self(self.0 | 1 << (4 * i + j))
+    }
+
+    /// All pairs of the first `n` components.
+    pub const fn full(n: usize) -> Self {
+        let mut set = Self::NONE;
+        let mut i = 0;
+        while i < n {
+            let mut j = 0;
+            while j < n {
+                set = set.with(i, j);
+                j += 1;
+            }
+            i += 1;
+        }
+        set
+    }
+
+    /// Each of the first `n` components with itself.
+    pub const fn diagonal(n: usize) -> Self {
+        let mut set = Self::NONE;
+        let mut i = 0;
+        while i < n {
+            set = set.with(i, i);
+            i += 1;
+        }
+        set
+    }
+
+    /// Pairs in either set.
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The pairs whose row bit and column bit are set.
+    fn restricted(self, rows: u16, columns: u16) -> Self {
+        let mut bits = 0;
+        for i in 0..4 {
+            if rows >> i & 1 == 1 {
+                bits |= self.0 & (columns & 0xf) << (4 * i);
+            }
+        }
+        Self(bits)
+    }
+
+    /// Columns coupled with row `i`, as bits.
+    #[inline]
+    fn row(self, i: usize) -> u16 {
+        self.0 >> (4 * i) & 0xf
+    }
+}
+
+/// Elements of one shape with `N` nodes, and what each couples.
+#[derive(Clone, Debug)]
+pub struct ElementGroup<const N: usize> {
+    connectivity: Vec<[NodeId; N]>,
+    couplings: Vec<Coupling>,
+    incidence: Incidence,
+}
+
+impl<const N: usize> ElementGroup<N> {
+    /// A group on `node_count` nodes; one coupling per element.
+    ///
+    /// # Panics
+    /// If the lengths differ or a node is out of range.
+    pub fn new(node_count: usize, connectivity: Vec<[NodeId; N]>, couplings: Vec<Coupling>) -> Self {
+        assert_eq!(connectivity.len(), couplings.len(), "one coupling an element");
+        let incidence = Incidence::new(node_count, &connectivity);
+        Self { connectivity, couplings, incidence }
+    }
+}
+
+/// What the pattern asks of a group of elements of any shape.
+trait Couples: Sync {
+    /// Appends every node that elements of the group couple with `node`, and how; nodes may repeat.
+    fn couple(&self, node: NodeId, row: &mut Vec<(NodeId, Coupling)>);
+}
+
+impl<const N: usize> Couples for ElementGroup<N> {
+    fn couple(&self, node: NodeId, row: &mut Vec<(NodeId, Coupling)>) {
+        for e in self.incidence.around(node) {
+            let coupling = self.couplings[e.index()];
+            row.extend(self.connectivity[e.index()].iter().map(|&other| (other, coupling)));
+        }
+    }
+}
+
+/// The stored components of one node against another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Block {
+    node: NodeId,
+    coupling: Coupling,
+    /// Entries of each row that come before this block.
+    before: [u16; 4],
+}
+
+/// Sparsity pattern of a system with `C ≤ 4` components a node.
+#[derive(Debug)]
+pub struct BlockPattern<const C: usize> {
+    rows: DofMap<C>,
+    structure: Arc<CsrStructure>,
+    block_starts: Vec<u32>,
+    blocks: Vec<Block>,
+    /// Nodes of each assembly task.
+    pub(super) tasks: Vec<std::ops::Range<usize>>,
+}
+
+impl<const C: usize> BlockPattern<C> {
+    /// The pattern of the square system in the unknowns `dofs`, from tetrahedra and boundary triangles.
+    pub fn symmetric<const N: usize, const M: usize>(
+        dofs: &DofMap<C>,
+        volumes: &ElementGroup<N>,
+        surfaces: &ElementGroup<M>,
+    ) -> Self {
+        Self::new(dofs, dofs, &[volumes, surfaces])
+    }
+
+    /// The pattern of a rectangular part: rows in the unknowns `rows`, columns in those of `columns`.
+    pub fn rectangular<const N: usize>(
+        rows: &DofMap<C>,
+        columns: &DofMap<C>,
+        volumes: &ElementGroup<N>,
+    ) -> Self {
+        Self::new(rows, columns, &[volumes])
+    }
+
+    fn new(rows: &DofMap<C>, columns: &DofMap<C>, groups: &[&dyn Couples]) -> Self {
+        let node_count = rows.node_count();
+        let row_blocks: Vec<Vec<Block>> = (0..node_count)
+            .into_par_iter()
+            .map_init(Vec::new, |found, a| blocks_of(NodeId::new(a), rows, columns, groups, found))
+            .collect();
+
+        let mut row_starts = vec![0u32];
+        let mut column_indices = Vec::new();
+        let mut block_starts = vec![0u32];
+        let mut blocks = Vec::with_capacity(row_blocks.iter().map(Vec::len).sum());
+        for (a, row) in row_blocks.into_iter().enumerate() {
+            for i in 0..C {
+                if rows.equation(NodeId::new(a), i).is_none() {
+                    continue;
+                }
+                for block in &row {
+                    let coupled = block.coupling.row(i);
+                    column_indices.extend(
+                        (0..C)
+                            .filter(|j| coupled >> j & 1 == 1)
+                            .filter_map(|j| columns.equation(block.node, j))
+                            .map(|equation| equation as u32),
+                    );
+                }
+                let end = u32::try_from(column_indices.len()).expect("fewer than 2³² stored entries");
+                row_starts.push(end);
+            }
+            blocks.extend(row);
+            block_starts.push(u32::try_from(blocks.len()).expect("fewer than 2³² blocks"));
+        }
+        let structure =
+            Arc::new(CsrStructure { column_count: columns.count(), row_starts, columns: column_indices });
+        let task_count = (node_count / NODES_PER_TASK).clamp(1, MAX_TASKS);
+        let tasks =
+            (0..task_count).map(|t| t * node_count / task_count..(t + 1) * node_count / task_count).collect();
+        Self { rows: rows.clone(), structure, block_starts, blocks, tasks }
+    }
+
+    /// The structure of the scalar matrix.
+    pub fn structure(&self) -> &Arc<CsrStructure> {
+        &self.structure
+    }
+
+    /// The equation numbers of the rows.
+    pub fn rows(&self) -> &DofMap<C> {
+        &self.rows
+    }
+
+    /// Finds the block of every pair of nodes of every element, once for all assemblies.
+    ///
+    /// # Panics
+    /// If the group was not among those the pattern was made of.
+    pub fn bind<const N: usize>(&self, group: &ElementGroup<N>) -> BoundGroup<N> {
+        let block_of = |a: NodeId, b: NodeId| {
+            let row = self.blocks_at(a);
+            row.binary_search_by_key(&b, |block| block.node).map_or(NO_BLOCK, |p| p as u16)
+        };
+        let blocks = group
+            .connectivity
+            .par_iter()
+            .map(|nodes| std::array::from_fn(|a| std::array::from_fn(|b| block_of(nodes[a], nodes[b]))))
+            .collect();
+        let elements = self
+            .tasks
+            .par_iter()
+            .map(|nodes| {
+                let mut touched: Vec<ElementId> =
+                    nodes.clone().flat_map(|a| group.incidence.around(NodeId::new(a))).copied().collect();
+                touched.sort_unstable();
+                touched.dedup();
+                touched
+            })
+            .collect();
+        BoundGroup { connectivity: group.connectivity.clone(), blocks, elements }
+    }
+
+    pub(super) fn blocks_at(&self, node: NodeId) -> &[Block] {
+        let i = node.index();
+        &self.blocks[self.block_starts[i] as usize..self.block_starts[i + 1] as usize]
+    }
+
+    /// Adds a local block into the entries of node `a`; `values` starts at entry `first`.
+    #[inline]
+    pub(super) fn add_block<T: Copy + std::ops::AddAssign>(
+        &self,
+        a: NodeId,
+        position: u16,
+        local: &[[T; C]; C],
+        values: &mut [T],
+        first: usize,
+    ) {
+        if position == NO_BLOCK {
+            return;
+        }
+        let block = self.blocks_at(a)[position as usize];
+        for i in 0..C {
+            let mut coupled = block.coupling.row(i);
+            if coupled == 0 {
+                continue;
+            }
+            let equation = self.rows.equation(a, i).expect("only unknown rows are coupled");
+            let mut slot = self.structure.row_starts[equation] as usize + block.before[i] as usize - first;
+            while coupled != 0 {
+                let j = coupled.trailing_zeros() as usize;
+                values[slot] += local[i][j];
+                slot += 1;
+                coupled &= coupled - 1;
+            }
+        }
+    }
+
+    /// Range of the stored entries of the rows of a range of nodes.
+    pub(super) fn entries_of(&self, nodes: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let first_equation_from = |start: usize| {
+            (start..self.rows.node_count())
+                .flat_map(|a| (0..C).map(move |c| (a, c)))
+                .find_map(|(a, c)| self.rows.equation(NodeId::new(a), c))
+                .unwrap_or(self.rows.count())
+        };
+        let start = self.structure.row_starts[first_equation_from(nodes.start)] as usize;
+        let end = self.structure.row_starts[first_equation_from(nodes.end)] as usize;
+        start..end
+    }
+}
+
+/// A pair of nodes of which nothing is stored.
+const NO_BLOCK: u16 = u16::MAX;
+
+/// A group of elements with the places of its blocks in one pattern.
+#[derive(Debug)]
+pub struct BoundGroup<const N: usize> {
+    pub(super) connectivity: Vec<[NodeId; N]>,
+    pub(super) blocks: Vec<[[u16; N]; N]>,
+    /// Elements that touch the nodes of each task.
+    pub(super) elements: Vec<Vec<ElementId>>,
+}
+
+/// The blocks of one node, ascending by node.
+fn blocks_of<const C: usize>(
+    a: NodeId,
+    rows: &DofMap<C>,
+    columns: &DofMap<C>,
+    groups: &[&dyn Couples],
+    found: &mut Vec<(NodeId, Coupling)>,
+) -> Vec<Block> {
+    let row_bits = rows.unknown_bits(a);
+    if row_bits == 0 {
+        return Vec::new();
+    }
+    found.clear();
+    for group in groups {
+        group.couple(a, found);
+    }
+    found.sort_unstable_by_key(|&(node, _)| node);
+    let mut blocks = Vec::new();
+    let mut before = [0u16; 4];
+    for same in found.chunk_by(|x, y| x.0 == y.0) {
+        let node = same[0].0;
+        let coupling = same
+            .iter()
+            .fold(Coupling::NONE, |set, &(_, c)| set.union(c))
+            .restricted(row_bits, columns.unknown_bits(node));
+        if coupling == Coupling::NONE {
+            continue;
+        }
+        blocks.push(Block { node, coupling, before });
+        for (i, before) in before.iter_mut().enumerate() {
+            *before += coupling.row(i).count_ones() as u16;
+        }
+    }
+    assert!(blocks.len() < NO_BLOCK as usize, "fewer than 65535 neighbours a node");
+    blocks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn couplings_are_sets_of_component_pairs() {
+        let set = Coupling::diagonal(3).with(0, 3);
+        assert_eq!(set.row(0), 0b1001);
+        assert_eq!(set.row(3), 0);
+        assert_eq!(Coupling::full(4), Coupling(u16::MAX));
+        assert_eq!(set.restricted(0b0001, 0b1111), Coupling::NONE.with(0, 0).with(0, 3));
+        assert_eq!(set.restricted(0b1111, 0b0100), Coupling::NONE.with(2, 2));
+    }
+}
