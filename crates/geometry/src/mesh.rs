@@ -102,9 +102,9 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::new`].
     pub fn without_region(&self, region: crate::RegionId) -> Result<(Self, Vec<[NodeId; 3]>), MeshError> {
-        let (topology, old_of, exposed) = self.topology.without_region(region)?;
-        let points = old_of.iter().map(|n| self.point(*n)).collect();
-        Ok((Self::new(Arc::new(topology), points)?, exposed))
+        let left = self.topology.without_region(region)?;
+        let points = left.old_of.iter().map(|n| self.point(*n)).collect();
+        Ok((Self::new(Arc::new(left.topology), points)?, left.exposed))
     }
 }
 

@@ -23,6 +23,17 @@ pub struct Facet {
     pub outside: Option<ElementId>,
 }
 
+/// What is left of a topology without one region.
+#[derive(Clone, Debug)]
+pub struct Remainder {
+    /// The remaining elements, in their order, on renumbered nodes.
+    pub topology: Topology,
+    /// The old node of every new one.
+    pub old_of: Vec<NodeId>,
+    /// Faces towards the removed region, now outside faces, oriented out of the remaining elements.
+    pub exposed: Vec<[NodeId; 3]>,
+}
+
 /// Connectivity, regions and named surfaces of a tetrahedral mesh; immutable and shared.
 #[derive(Clone, Debug)]
 pub struct Topology {
@@ -178,17 +189,11 @@ impl Topology {
 
     /// The same mesh without one region: its elements and the nodes that only it used are gone.
     ///
-    /// Faces towards the removed region become outside faces and are returned in the new numbering, oriented out of
-    /// the remaining elements. Surfaces keep the triangles whose nodes all survive.
-    ///
-    /// Returns the topology, the old node of every new one, and those faces.
+    /// Surfaces keep the triangles whose nodes all survive.
     ///
     /// # Errors
     /// [`MeshError::OverfullFace`] cannot occur on a valid topology; it is passed through.
-    pub fn without_region(
-        &self,
-        region: RegionId,
-    ) -> Result<(Self, Vec<NodeId>, Vec<[NodeId; 3]>), MeshError> {
+    pub fn without_region(&self, region: RegionId) -> Result<Remainder, MeshError> {
         let keep: Vec<ElementId> = self.elements().filter(|e| self.region_of[e.index()] != region).collect();
         let mut new_of: Vec<Option<NodeId>> = vec![None; self.node_count];
         for &e in &keep {
@@ -247,7 +252,7 @@ impl Topology {
                 }
             })
             .collect();
-        Ok((topology, old_of, exposed))
+        Ok(Remainder { topology, old_of, exposed })
     }
 }
 
@@ -317,12 +322,12 @@ mod tests {
 
     #[test]
     fn removing_a_region_exposes_its_faces_and_drops_its_nodes() {
-        let (left, old_of, exposed) = pair().without_region(RegionId(1)).expect("a region may go");
-        assert_eq!((left.node_count(), left.tets().len()), (4, 1));
-        assert_eq!(old_of, [n(0), n(1), n(2), n(3)]);
-        assert_eq!(exposed, [[n(1), n(2), n(3)]]);
-        let (_, _, exposed) = pair().without_region(RegionId(0)).expect("a region may go");
-        assert_eq!(exposed, [[n(0), n(2), n(1)]], "oriented out of the element that stays");
+        let left = pair().without_region(RegionId(1)).expect("a region may go");
+        assert_eq!((left.topology.node_count(), left.topology.tets().len()), (4, 1));
+        assert_eq!(left.old_of, [n(0), n(1), n(2), n(3)]);
+        assert_eq!(left.exposed, [[n(1), n(2), n(3)]]);
+        let right = pair().without_region(RegionId(0)).expect("a region may go");
+        assert_eq!(right.exposed, [[n(0), n(2), n(1)]], "oriented out of the element that stays");
     }
 
     #[test]

@@ -1,1 +1,28 @@
-//! solver
+//! Magnetostatic and eddy-current fields by nodal A–ψ finite elements, objectives of the field, and their adjoint.
+//!
+//! SI units; phasors are peak values with the time factor `exp(+jωt)`; `B = curl A`, `E = −jω(A + ∇ψ)`. A
+//! [`FieldModel`] is what does not change while the mesh moves (materials, coils, boundary conditions, equation
+//! numbers, sparsity pattern); [`FieldModel::solve`] gives a [`FieldSolution`] on a mesh; [`objective`] values it and
+//! [`adjoint`] differentiates that value with respect to every node position. Element kernels are pure functions in
+//! [`element`]; the linear solver is chosen in [`linear`] and nowhere else. Optimisation and mesh motion are other
+//! crates' business.
+
+pub mod adjoint;
+pub mod audit;
+pub mod coil;
+pub mod element;
+pub mod error;
+pub mod linear;
+pub mod material;
+pub mod model;
+pub mod objective;
+pub mod recovery;
+pub mod solution;
+pub mod unknowns;
+
+pub use error::SolverError;
+pub use linear::{LinearSolver, LinearSolverReport};
+pub use material::Material;
+pub use model::{Boundary, Conductor, FieldModel, FieldModelSetup};
+pub use objective::Objective;
+pub use solution::FieldSolution;

@@ -1,0 +1,160 @@
+//! The impedance (Leontovich) surface: a conductor many skin depths thick, seen from outside.
+//!
+//! `(jω/Zs) ∫_S A_t·w_t` with `Zs = (1+j)/(σδ)`, hence `jω/Zs = ωσδ (1+j)/2`. On a flat triangle with area vector
+//! `N`, `A_t = P A` with `P = I − N Nᵀ/|N|²`, and the entry of node `a` against node `b` is
+//! `(jω/Zs) |N| (1+δ_ab)/12 P`.
+
+use fluxmorph_geometry::fem::{LocalMatrix, c64};
+use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub};
+
+use super::{Complex3, dot3};
+
+/// `jω/Zs = ωσδ(1+j)/2` [1/H] from `ω` [rad/s], `σ` [S/m] and `δ` [m].
+pub fn surface_coefficient(angular_frequency: f64, conductivity: f64, skin_depth: f64) -> c64 {
+    let half = 0.5 * angular_frequency * conductivity * skin_depth;
+    c64::new(half, half)
+}
+
+/// The matrix of one triangle, shape `(3 × 4, 3 × 4)`; its ψ rows and columns are zero.
+#[derive(Clone, Copy, Debug)]
+pub struct ImpedanceTriangle {
+    coefficient: c64,
+    /// `|N| P`.
+    projection: [Point; 3],
+}
+
+impl ImpedanceTriangle {
+    /// The matrix for three vertices [m] and the coefficient `jω/Zs` [1/H].
+    #[inline]
+    pub fn new(vertices: [Point; 3], coefficient: c64) -> Self {
+        let n = area_vector(vertices);
+        let area = norm(n);
+        let projection = std::array::from_fn(|i| {
+            std::array::from_fn(|j| if i == j { area } else { 0.0 } - n[i] * n[j] / area)
+        });
+        Self { coefficient, projection }
+    }
+}
+
+impl LocalMatrix<c64, 3, 4> for ImpedanceTriangle {
+    #[inline]
+    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
+        let factor = self.coefficient * if a == b { 1.0 / 6.0 } else { 1.0 / 12.0 };
+        let mut block = [[c64::default(); 4]; 4];
+        for i in 0..3 {
+            for j in 0..3 {
+                block[i][j] = factor * self.projection[i][j];
+            }
+        }
+        block
+    }
+}
+
+/// `Σ_ab (1+δ_ab)/12 u_b ⊗ λ_a`, shape `(3, 3)`.
+fn moment(adjoint: &[Complex3; 3], state: &[Complex3; 3]) -> [Complex3; 3] {
+    let sum = |f: &[Complex3; 3]| -> Complex3 { std::array::from_fn(|d| f[0][d] + f[1][d] + f[2][d]) };
+    let (sl, su) = (sum(adjoint), sum(state));
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| {
+            let same: c64 = (0..3).map(|a| state[a][i] * adjoint[a][j]).sum();
+            (su[i] * sl[j] + same) / 12.0
+        })
+    })
+}
+
+/// `∂/∂x_k (λᵀ M u)` for the three nodes, shape `(3, 3)`.
+///
+/// With `R = Σ_ab (1+δ_ab)/12 u_b λ_aᵀ`: `s = c (|N| tr R − NᵀRN/|N|)`,
+/// `∂s/∂N = c (N̂ tr R − (R + Rᵀ)N̂ + (N̂ᵀRN̂) N̂)` and `∂s/∂x_k = ½ ∂s/∂N × e_k`, `e_k` the edge opposite node `k`.
+pub fn shape_derivative(
+    vertices: [Point; 3],
+    coefficient: c64,
+    adjoint: &[Complex3; 3],
+    state: &[Complex3; 3],
+) -> [Complex3; 3] {
+    let n = area_vector(vertices);
+    let unit = n.map(|c| c / norm(n));
+    let r = moment(adjoint, state);
+    let trace = r[0][0] + r[1][1] + r[2][2];
+    let complex_unit = unit.map(|c| c64::new(c, 0.0));
+    let rn: Complex3 = std::array::from_fn(|i| dot3(r[i], complex_unit));
+    let normal_part = dot3(rn, complex_unit);
+    let slope: Complex3 = std::array::from_fn(|i| {
+        let rtn: c64 = (0..3).map(|j| r[j][i] * unit[j]).sum();
+        coefficient * (unit[i] * (trace + normal_part) - rn[i] - rtn)
+    });
+    std::array::from_fn(|k| {
+        let edge = sub(vertices[(k + 2) % 3], vertices[(k + 1) % 3]).map(|c| c64::new(0.5 * c, 0.0));
+        super::cross3(slope, edge)
+    })
+}
+
+/// Time-averaged loss of the triangle, `½ Re(1/Zs) ω² ∫|A_t|²` [W]; `jω/Zs` has the real part `ω · Re(1/Zs)`.
+pub fn loss(vertices: [Point; 3], coefficient: c64, angular_frequency: f64, state: &[Complex3; 3]) -> f64 {
+    let conjugate = state.map(|a| a.map(|c| c.conj()));
+    let r = moment(&conjugate, state);
+    let n = area_vector(vertices);
+    let area = norm(n);
+    let mut tangential = area * (r[0][0] + r[1][1] + r[2][2]).re;
+    for i in 0..3 {
+        for j in 0..3 {
+            tangential -= n[i] * n[j] / area * r[i][j].re;
+        }
+    }
+    0.5 * angular_frequency * coefficient.re * tangential
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::volume::tests::noise;
+    use super::*;
+
+    const TRIANGLE: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
+
+    fn values(seed: u32) -> [Complex3; 3] {
+        std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (3 * a + c) as u32)))
+    }
+
+    #[test]
+    fn the_shape_derivative_matches_central_differences() {
+        let (l, u, coefficient) = (values(5), values(60), c64::new(0.7, 0.7));
+        let bilinear = |vertices: [Point; 3]| {
+            let triangle = ImpedanceTriangle::new(vertices, coefficient);
+            let mut s = c64::default();
+            for a in 0..3 {
+                for b in 0..3 {
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            s += l[a][i] * triangle.block(a, b)[i][j] * u[b][j];
+                        }
+                    }
+                }
+            }
+            s
+        };
+        let exact = shape_derivative(TRIANGLE, coefficient, &l, &u);
+        let h = 1e-5;
+        for k in 0..3 {
+            for d in 0..3 {
+                let at = |s: f64| {
+                    let mut vertices = TRIANGLE;
+                    vertices[k][d] += s;
+                    bilinear(vertices)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!((difference - exact[k][d]).norm() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn only_the_tangential_potential_counts() {
+        // On the triangle in z = 0, a constant A_z gives nothing, a constant A_x the area.
+        let flat = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let constant = |d: usize| [std::array::from_fn(|c| c64::new(f64::from(u8::from(c == d)), 0.0)); 3];
+        let coefficient = surface_coefficient(2.0, 3.0, 0.5);
+        assert_eq!(loss(flat, coefficient, 2.0, &constant(2)), 0.0);
+        // ½ σδ/2 ω² · area = ½ · 0.75 · 4 · 1
+        assert!((loss(flat, coefficient, 2.0, &constant(0)) - 1.5).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,83 @@
+//! What can go wrong in a field analysis.
+
+use fluxmorph_geometry::MeshError;
+
+/// Errors of this crate; each names the culprit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolverError {
+    /// The mesh or the sparse kernel refused.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A parameter of the model is out of range.
+    #[error("{what} = {value}: {expected}")]
+    Parameter {
+        /// What was given.
+        what: String,
+        /// Its value.
+        value: String,
+        /// The range, and what to do.
+        expected: String,
+    },
+    /// A boundary condition is asked on a surface that it cannot be applied to.
+    #[error("the surface `{surface}` has a triangle with the normal {normal:?}: {expected}")]
+    BoundaryNormal {
+        /// Name of the surface.
+        surface: String,
+        /// Unit normal of the offending triangle.
+        normal: [f64; 3],
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// A model without any excitation.
+    #[error("no current flows: {cause}")]
+    NoSource {
+        /// Why, and what to do.
+        cause: String,
+    },
+    /// A region that must have elements has none.
+    #[error("the region `{region}` has no elements: {expected}")]
+    EmptyRegion {
+        /// Name of the region.
+        region: String,
+        /// What needs it.
+        expected: &'static str,
+    },
+    /// The iteration did not reach its residual.
+    #[error(
+        "the linear solver stopped at the relative residual {residual:e} after {iterations} iterations, not at the \
+         {required:e} required: {cause}"
+    )]
+    NotConverged {
+        /// True relative residual `|b − Ku|/|b|`.
+        residual: f64,
+        /// The residual required.
+        required: f64,
+        /// Iterations done.
+        iterations: usize,
+        /// What it looks like.
+        cause: &'static str,
+    },
+    /// A field or objective that is not a finite number.
+    #[error("the {what} is {value}: the field problem has no usable solution")]
+    NotFinite {
+        /// Which quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A probe lies outside the mesh.
+    #[error(
+        "point {point:?} m of the probe `{probe}` lies outside the mesh, whose box is {lower:?} to {upper:?} m"
+    )]
+    ProbeOutside {
+        /// Name of the probe.
+        probe: String,
+        /// The point [m].
+        point: [f64; 3],
+        /// Lower corner of the mesh [m].
+        lower: [f64; 3],
+        /// Upper corner [m].
+        upper: [f64; 3],
+    },
+}
