@@ -95,6 +95,22 @@ pub enum MeshError {
         /// Its position.
         position: usize,
     },
+    /// An array has not one value a node or an element.
+    #[error("the array `{array}` has {length} values where {expected} are needed")]
+    ArrayLength {
+        /// Name of the array.
+        array: String,
+        /// Its length.
+        length: usize,
+        /// Number of nodes or elements.
+        expected: usize,
+    },
+    /// A VTU file could not be made or understood.
+    #[error("VTU file: {cause}")]
+    Vtu {
+        /// What is wrong.
+        cause: String,
+    },
     /// Reading or writing a file failed.
     #[error("{}: {cause}", path.display())]
     File {

@@ -1,0 +1,100 @@
+//! VTU files read back as they were written, and what may not be written is refused.
+
+use std::panic;
+
+use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shield};
+use fluxmorph_geometry::io::{ArrayData, Field, VtuArray, read_vtu, vtu_bytes, vtu_contents, write_vtu};
+use fluxmorph_geometry::{Mesh, MeshError, quality};
+
+fn scalar<'a>(name: &'a str, values: &'a [f64]) -> Field<'a> {
+    Field { name, data: ArrayData::Scalar(values) }
+}
+
+/// One array of each kind over the nodes and over the elements, with values of many magnitudes.
+fn round_trip(mesh: &Mesh) {
+    let topology = mesh.topology();
+    let sines: Vec<f64> = topology.nodes().map(|n| f64::from(n.0).sin() * 1e-200).collect();
+    let shifts: Vec<[f64; 3]> = mesh.points().iter().map(|p| [p[1] / 3.0, -p[2], 1e300 * p[0]]).collect();
+    let regions: Vec<i32> = topology.region_of().iter().map(|r| r.0 as i32 - 1).collect();
+    let qualities = quality::qualities(mesh);
+    let point_data = [scalar("sine", &sines), Field { name: "shift", data: ArrayData::Vector(&shifts) }];
+    let cell_data =
+        [Field { name: "region", data: ArrayData::Integer(&regions) }, scalar("quality", &qualities)];
+
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("mesh.vtu");
+    let file = std::fs::File::create(&path).expect("the folder is writable");
+    write_vtu(file, mesh, &point_data, &cell_data).expect("all arrays are finite");
+    let read = read_vtu(&path).expect("it was just written");
+
+    assert_eq!(read.points, mesh.points());
+    assert_eq!(read.tets, topology.tets());
+    assert_eq!(read.point_data.keys().collect::<Vec<_>>(), ["shift", "sine"]);
+    assert_eq!(read.cell_data.keys().collect::<Vec<_>>(), ["quality", "region"]);
+    assert_eq!(read.point_data["sine"], VtuArray::Scalar(sines.clone()));
+    assert_eq!(read.point_data["shift"], VtuArray::Vector(shifts.clone()));
+    assert_eq!(read.cell_data["region"], VtuArray::Integer(regions.clone()));
+    assert_eq!(read.cell_data["quality"], VtuArray::Scalar(qualities.clone()));
+
+    let again = vtu_bytes(mesh, &point_data, &cell_data).expect("all arrays are finite");
+    assert_eq!(std::fs::read(&path).expect("it was just written"), again, "equal input makes equal bytes");
+}
+
+#[test]
+fn a_shield_reads_back_bit_for_bit() {
+    round_trip(&shield(&ShieldParameters { refinement: 0.5, ..ShieldParameters::default() }).expect("valid"));
+}
+
+#[test]
+fn arrays_that_fill_their_blocks_read_back_and_are_not_compressed() {
+    // 3072 tets: 96 KiB of connectivity, three full blocks of the compressor.
+    let mesh = block(&BlockParameters::default()).expect("valid");
+    round_trip(&mesh);
+    let text = String::from_utf8(vtu_bytes(&mesh, &[], &[]).expect("no arrays")).expect("XML in UTF-8");
+    assert!(!text.contains("compressor"));
+    let mesh = block(&BlockParameters { cells: [8, 8, 7], ..BlockParameters::default() }).expect("valid");
+    let text = String::from_utf8(vtu_bytes(&mesh, &[], &[]).expect("no arrays")).expect("XML in UTF-8");
+    assert!(text.contains("compressor=\"vtkZLibDataCompressor\"") && text.contains("header_type=\"UInt64\""));
+}
+
+#[test]
+fn what_is_not_finite_or_of_wrong_length_is_refused() {
+    let mesh = block(&BlockParameters { cells: [1; 3], ..BlockParameters::default() }).expect("valid");
+    let mut vectors = [[0.0; 3]; 8];
+    vectors[5][2] = f64::INFINITY;
+    let field = Field { name: "displacement", data: ArrayData::Vector(&vectors) };
+    let text = vtu_bytes(&mesh, &[field], &[]).expect_err("it is infinite").to_string();
+    assert!(text.contains("`displacement` holds inf at position 5"), "{text}");
+    let result = vtu_bytes(&mesh, &[], &[scalar("quality", &[0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0])]);
+    assert!(matches!(result, Err(MeshError::NotFiniteArray { position: 1, .. })), "{result:?}");
+    let result = vtu_bytes(&mesh, &[], &[scalar("quality", &[0.5; 8])]);
+    assert!(matches!(result, Err(MeshError::ArrayLength { length: 8, expected: 6, .. })), "{result:?}");
+}
+
+#[test]
+fn names_are_escaped() {
+    let mesh = block(&BlockParameters { cells: [1; 3], ..BlockParameters::default() }).expect("valid");
+    let name = "<B> & \"H\"";
+    let bytes = vtu_bytes(&mesh, &[], &[scalar(name, &[0.5; 6])]).expect("finite");
+    assert!(vtu_contents(&bytes).expect("well formed").cell_data.contains_key(name));
+}
+
+#[test]
+fn damaged_files_are_errors() {
+    let mesh = block(&BlockParameters { cells: [2, 2, 3], ..BlockParameters::default() }).expect("valid");
+    let bytes = vtu_bytes(&mesh, &[], &[scalar("quality", &[0.5; 72])]).expect("finite");
+    let text = String::from_utf8(bytes.clone()).expect("XML in UTF-8");
+    let hook = panic::take_hook();
+    panic::set_hook(Box::new(|_| {})); // the library's own panics are expected here
+    let mut results = vec![vtu_contents(b""), vtu_contents(b"<VTKFile/>")];
+    results.extend((0..bytes.len() - 20).step_by(97).map(|n| vtu_contents(&bytes[..n])));
+    results.push(vtu_contents(text.replacen("AAAA", "////", 3).as_bytes()));
+    results.push(vtu_contents(text.replacen("NumberOfPoints=\"36\"", "NumberOfPoints=\"35\"", 1).as_bytes()));
+    results.push(vtu_contents(text.replacen("NumberOfCells=\"72\"", "NumberOfCells=\"71\"", 1).as_bytes()));
+    panic::set_hook(hook);
+    for (n, result) in results.iter().enumerate() {
+        assert!(matches!(result, Err(MeshError::Vtu { .. })), "case {n}");
+    }
+    let missing = read_vtu(std::path::Path::new("no/such/file.vtu"));
+    assert!(matches!(missing, Err(MeshError::File { .. })));
+}
