@@ -1,1 +1,19 @@
-//! optimizer
+//! Everything above field and mesh: the configuration, the files, the optimisation and the command line.
+
+pub mod algorithm;
+pub mod cli;
+pub mod config;
+pub mod design;
+pub mod diagnostics;
+pub mod driver;
+mod error;
+pub mod fields;
+pub mod observer;
+pub mod output;
+pub mod problem;
+pub mod session;
+pub mod setup;
+pub mod thickness;
+pub mod verify;
+
+pub use error::Error;

@@ -1,1 +1,5 @@
-fn main() {}
+//! The program `fluxmorph`.
+
+fn main() -> std::process::ExitCode {
+    fluxmorph_optimizer::cli::main()
+}

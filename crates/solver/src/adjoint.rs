@@ -28,7 +28,7 @@ pub fn solve(system: &PreparedSystem, objective: &ObjectiveValue) -> Result<Fiel
     Ok(FieldSolution::new(values, report))
 }
 
-/// `dF/dx` at every node [unit of F per m], shape `(n_nodes, 3)`; only `moving` elements contribute.
+/// `dF/dx` at every node [unit of F per m], shape `(n_nodes, 3)`; of tetrahedra, only the `moving` ones contribute.
 ///
 /// `moving` lists the elements of which a node may move, ascending; the derivative at nodes that other elements share
 /// is incomplete, and those nodes must be held.

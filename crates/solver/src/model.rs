@@ -214,8 +214,21 @@ impl FieldModel {
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         let system = self.prepare(self.assemble(mesh))?;
-        let (values, report) = system.solve(&self.load(mesh))?;
-        Ok((FieldSolution::new(values, report), system))
+        let state = self.solve_prepared(&system, &self.load(mesh))?;
+        Ok((state, system))
+    }
+
+    /// Solves the state problem with a prepared system and a load.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub fn solve_prepared(
+        &self,
+        system: &PreparedSystem,
+        load: &[c64],
+    ) -> Result<FieldSolution, SolverError> {
+        let (values, report) = system.solve(load)?;
+        Ok(FieldSolution::new(values, report))
     }
 
     /// Number of unknowns.

@@ -58,9 +58,9 @@ fn check_numbers(p: &ShieldParameters) -> Result<(), MeshError> {
     check_ascending("mesh.shield.coil_z", p.coil_z, gap)?;
     check_ascending("mesh.shield.remesh_z", p.remesh_z, gap)?;
     check_ascending("mesh.shield.outer_z", p.outer_z, gap)?;
-    check_ascending("mesh.shield.observation.x", p.observation.x, gap)?;
-    check_ascending("mesh.shield.observation.y", p.observation.y, gap)?;
-    check_ascending("mesh.shield.observation.z", p.observation.z, gap)?;
+    check_ascending("mesh.shield.observation_x", p.observation.x, gap)?;
+    check_ascending("mesh.shield.observation_y", p.observation.y, gap)?;
+    check_ascending("mesh.shield.observation_z", p.observation.z, gap)?;
     if !(1.0..=100.0).contains(&p.growth) {
         return Err(refuse(
             "mesh.shield.growth",
@@ -170,25 +170,25 @@ fn check_observation(p: &ShieldParameters) -> Result<(), MeshError> {
     let (box_, gap) = (&p.observation, tolerance(p));
     if box_.cells.iter().any(|&n| n == 0 || n as f64 > NODES_LIMIT) {
         let expected = format!("1 to {NODES_LIMIT} cells are needed along x and along y");
-        return Err(refuse("mesh.shield.observation.cells", box_.cells, &expected));
+        return Err(refuse("mesh.shield.observation_cells", box_.cells, &expected));
     }
     let inside =
         "the observation area must lie inside the whole box and on the meshed side of the symmetry planes";
     if box_.x[0] < 0.0 || box_.x[1] >= p.outer[0] - gap {
-        return Err(refuse("mesh.shield.observation.x", box_.x, inside));
+        return Err(refuse("mesh.shield.observation_x", box_.x, inside));
     }
     if box_.y[0] < 0.0 || box_.y[1] >= p.outer[1] - gap {
-        return Err(refuse("mesh.shield.observation.y", box_.y, inside));
+        return Err(refuse("mesh.shield.observation_y", box_.y, inside));
     }
     if box_.z[0] <= p.outer_z[0] + gap || box_.z[1] >= p.outer_z[1] - gap {
-        return Err(refuse("mesh.shield.observation.z", box_.z, inside));
+        return Err(refuse("mesh.shield.observation_z", box_.z, inside));
     }
     let beside = box_.x[0] >= p.remesh_upper[0] - gap || box_.y[0] >= p.remesh_upper[1] - gap;
     let apart = box_.z[1] <= p.remesh_z[0] + gap || box_.z[0] >= p.remesh_z[1] - gap;
     if !beside && !apart {
         return Err(refuse(
-            "mesh.shield.observation",
-            box_,
+            "mesh.shield.observation_z",
+            box_.z,
             &format!(
                 "it overlaps the remesh region, mesh.shield.remesh_z = {:?} m: observation cells must not move; separate \
                  the two along z",

@@ -3,9 +3,9 @@
 //! Arrays are written inline in base64, compressed by zlib, headers of 64 bits, little endian: what every reader since
 //! ParaView 5 understands (appended raw data is not). Equal input makes equal bytes.
 //!
-//! One trap of the library is stepped around: it cuts arrays into blocks of 32768 bytes and closes an array that fills
-//! its last block with one empty block more, which VTK reads as a full one. A file with such an array is written
-//! without compression.
+//! One flaw of the library is stepped around: it cuts arrays into blocks of 32768 bytes, and closes an array that fills
+//! its last block with one empty block more, whose header says that it is full. VTK 9.7 and meshio happen to read that,
+//! but the format does not allow it; a file with such an array is written without compression.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -26,7 +26,8 @@ use crate::tet4::Point;
 /// Bytes of one compressed block in the library.
 const BLOCK_BYTES: usize = 32_768;
 
-/// zlib level: fields are noise to it, so a higher one costs time and saves next to nothing.
+/// zlib level: mantissas of fields are noise to it. On 61k tetrahedra with all arrays of a run, level 1 makes 9.7 MB
+/// of the 15.5 MB of no compression, level 5 makes 9.4 MB in twice the time.
 const COMPRESSION_LEVEL: u32 = 1;
 
 /// The values of one array to be written, one entry a node or an element.

@@ -89,7 +89,8 @@ pub fn shape_derivative(
     })
 }
 
-/// Time-averaged loss of the triangle, `½ Re(1/Zs) ω² ∫|A_t|²` [W]; `jω/Zs` has the real part `ω · Re(1/Zs)`.
+/// Time-averaged loss of the triangle, `½ Re(1/Zs) ω² ∫|A_t|²` [W]. For `Zs = (1+j)/(σδ)` the real part of `jω/Zs` is
+/// `ω Re(1/Zs)`.
 pub fn loss(vertices: [Point; 3], coefficient: c64, angular_frequency: f64, state: &[Complex3; 3]) -> f64 {
     let conjugate = state.map(|a| a.map(|c| c.conj()));
     let r = moment(&conjugate, state);

@@ -19,7 +19,7 @@ pub enum LinearSolver {
     /// Conjugate orthogonal conjugate gradients, preconditioned with the real Cholesky factor of `Re K + Im K`.
     ///
     /// `Re K` and `Im K` are positive semidefinite and their sum positive definite, so the preconditioned spectrum lies
-    /// on an arc with condition √2, whatever the mesh, frequency or material: about 20 iterations. In statics
+    /// on the segment from j to 1, whatever the mesh, frequency or material: 20 to 30 iterations. In statics
     /// (`Im K = 0`) the factor is the matrix's own and one iteration suffices.
     #[default]
     CocgCholesky,

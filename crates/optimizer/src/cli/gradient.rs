@@ -1,0 +1,98 @@
+//! `fluxmorph gradient`.
+
+use super::args::GradientArgs;
+use super::exit::ExitCode;
+use super::{observer, stdout, with_threads};
+use crate::error::Error;
+use crate::output::read_design;
+use crate::setup::{Purpose, set_up};
+use crate::verify::{Certificate, Settings, certify};
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration or the numbers fail, and when the certificate does not hold.
+pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
+    let (config, source) = args.common.load()?;
+    with_threads(args.common.threads, |_| {
+        let mut observer = observer(args.common.quiet);
+        observer.phase("setting up mesh and matrices");
+        let setup = set_up(&config, &source, Purpose::Optimisation)?;
+        for warning in &setup.warnings {
+            observer.warning(warning);
+        }
+        let shape = setup.problem.shape.as_ref().expect("an optimisation has a shape");
+        let p = match &args.design {
+            Some(path) => read_design(path, shape.surface.variable_count())?,
+            None => shape.initial.clone(),
+        };
+        let settings = Settings::default();
+        let certificate = certify(&setup.problem, &p, &settings, |index, direction| {
+            observer.phase(&format!(
+                "direction {} of {}: slope {:.4}, difference {:.1e}",
+                index + 1,
+                settings.directions,
+                direction.slope,
+                direction.error
+            ));
+        })?;
+        if args.common.json {
+            stdout::print_json(&certificate)?;
+        } else {
+            stdout::print(&table(&certificate, &settings))?;
+        }
+        if certificate.holds {
+            return Ok(ExitCode::Success);
+        }
+        Err(Error::Certificate {
+            cause: format!(
+                "least slope {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} allowed)",
+                certificate.least_slope,
+                settings.least_slope,
+                certificate.largest_error,
+                settings.largest_error
+            ),
+        })
+    })
+}
+
+/// The certificate as a table.
+fn table(certificate: &Certificate, settings: &Settings) -> String {
+    let mut text = format!(
+        "F = {:.10e}\n\nTaylor remainders |F(p + h d) - F(p) - h g.d| / F(p)\n",
+        certificate.objective
+    );
+    text += &format!("{:>10}", "h / span");
+    for index in 1..=certificate.directions.len() {
+        text += &format!(" {:>12}", format!("direction {index}"));
+    }
+    text.push('\n');
+    let steps = certificate.directions.first().map_or(&[][..], |d| &d.steps);
+    for (k, step) in steps.iter().enumerate() {
+        text += &format!("{step:>10.3e}");
+        for direction in &certificate.directions {
+            text += &format!(" {:>12.4e}", direction.remainders[k]);
+        }
+        text.push('\n');
+    }
+    let mut row = |name: &str, cell: &dyn Fn(&crate::verify::Direction) -> String| {
+        text += &format!("{name:>10}");
+        for direction in &certificate.directions {
+            text += &format!(" {:>12}", cell(direction));
+        }
+        text.push('\n');
+    };
+    row("slope", &|d| format!("{:.4}", d.slope));
+    row("adjoint", &|d| format!("{:.5e}", d.adjoint));
+    row("central", &|d| format!("{:.5e}", d.difference));
+    row("error", &|d| format!("{:.2e}", d.error));
+    text += &format!(
+        "\nleast slope {:.4} (needed {}), largest error {:.2e} (allowed {:e}): the certificate {}\n",
+        certificate.least_slope,
+        settings.least_slope,
+        certificate.largest_error,
+        settings.largest_error,
+        if certificate.holds { "holds" } else { "DOES NOT HOLD" }
+    );
+    text
+}

@@ -1,0 +1,71 @@
+//! The command line: what was typed becomes a call, its outcome an exit code.
+
+pub mod args;
+mod check;
+mod exit;
+mod gradient;
+mod interrupt;
+mod run;
+mod solve;
+pub mod stdout;
+
+use std::io::Write;
+
+use clap::Parser;
+
+pub use exit::ExitCode;
+
+use crate::config::ConfigError;
+use crate::diagnostics::{self, Style};
+use crate::error::Error;
+use crate::observer::{Console, Observer, Silent};
+use args::{Cli, Command};
+
+/// Do what the arguments of this process say.
+pub fn main() -> std::process::ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are asked for, and go to standard output; a closed pipe is no reason to panic.
+            let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Success };
+            let _ = error.print();
+            return code.into();
+        }
+    };
+    let outcome = match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Solve(args) => solve::solve(args),
+        Command::Check(args) => check::check(args),
+        Command::Gradient(args) => gradient::gradient(args),
+    };
+    let code = outcome.unwrap_or_else(|error| {
+        let _ = writeln!(std::io::stderr(), "{}", message(&error));
+        error.exit_code()
+    });
+    code.into()
+}
+
+/// What is shown for an error on standard error.
+fn message(error: &Error) -> String {
+    match error {
+        Error::Config(ConfigError::Faults(report)) => diagnostics::render(report, Style::for_stderr()),
+        other => format!("error: {other}"),
+    }
+}
+
+/// Who shows the progress.
+fn observer(quiet: bool) -> Box<dyn Observer> {
+    if quiet { Box::new(Silent) } else { Box::new(Console::stderr()) }
+}
+
+/// Works on as many threads as asked for, or as the machine has; `work` is told how many.
+fn with_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce(usize) -> Result<T, Error> + Send,
+) -> Result<T, Error> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build()
+        .map_err(|cause| Error::Threads { threads: threads.unwrap_or(0), cause: cause.to_string() })?;
+    pool.install(|| work(rayon::current_num_threads()))
+}

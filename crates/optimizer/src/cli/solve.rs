@@ -1,0 +1,29 @@
+//! `fluxmorph solve`.
+
+use super::args::SolveArgs;
+use super::exit::ExitCode;
+use super::{observer, stdout, with_threads};
+use crate::error::Error;
+use crate::output::read_design;
+use crate::session::{self, Options};
+use crate::setup::variable_count;
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration, the files or the numbers fail; the error knows its exit code.
+pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
+    let (config, source) = args.common.load()?;
+    with_threads(args.common.threads, |threads| {
+        let design = match &args.design {
+            Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
+            None => None,
+        };
+        let options = Options { older_run: args.common.older_run(), threads, interrupted: &|| false };
+        let result = session::solve(&config, &source, design, options, &mut *observer(args.common.quiet))?;
+        if args.common.json {
+            stdout::print_json(&result)?;
+        }
+        Ok(result.stop_reason.exit_code())
+    })
+}

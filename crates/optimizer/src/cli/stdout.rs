@@ -1,0 +1,33 @@
+//! Standard output, for data only.
+
+use std::io::{ErrorKind, Write};
+
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::output::OutputError;
+
+/// Print a text as it is.
+///
+/// A reader that has closed its end, such as `head`, has what it wanted: that is no error.
+///
+/// # Errors
+/// When standard output cannot be written to.
+pub fn print(text: &str) -> Result<(), Error> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(OutputError::io("write to", "standard output")(error).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Print a value as indented JSON.
+///
+/// # Errors
+/// When standard output cannot be written to.
+pub fn print_json(value: &impl Serialize) -> Result<(), Error> {
+    let text = serde_json::to_string_pretty(value).expect("structs of numbers and text have a JSON form");
+    print(&format!("{text}\n"))
+}

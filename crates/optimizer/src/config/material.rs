@@ -1,0 +1,106 @@
+//! `[materials.NAME]` and `[regions.NAME]`: what fills the regions of the mesh.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::Dimension;
+use super::choice::choice;
+use super::fault::Fault;
+use super::range::Range;
+use super::section::Section;
+use super::source::suggest;
+
+/// A linear, isotropic material.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Material {
+    /// Permeability over that of vacuum. Default 1: most conductors are not magnetic.
+    pub relative_permeability: f64,
+    /// Conductivity [S/m]. Default 0: a material conducts only when it is told to.
+    pub conductivity: f64,
+}
+
+choice! {
+    /// How a conducting region is modelled.
+    pub enum RegionModel {
+        /// Meshed: A–ψ inside the conductor.
+        Volume = "volume",
+        /// Replaced by its surface impedance; nothing inside is solved for.
+        Impedance = "impedance",
+    }
+}
+
+/// What a region of the mesh is made of.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Region {
+    /// Name of a material of the configuration.
+    pub material: String,
+    /// Default `volume`: right for every conductor whose mesh resolves the skin depth.
+    pub model: RegionModel,
+}
+
+/// Read `[materials]`.
+pub(super) fn read_materials(root: &Section<'_>) -> BTreeMap<String, Material> {
+    let read = |(name, section): (String, Section<'_>)| {
+        let relative_permeability = section.number("relative_permeability", Range::POSITIVE).unwrap_or(1.0);
+        let conductivity =
+            section.quantity("conductivity", Dimension::Conductivity, Range::NOT_NEGATIVE).unwrap_or(0.0);
+        section.finish();
+        (name, Material { relative_permeability, conductivity })
+    };
+    root.named_tables("materials").into_iter().map(read).collect()
+}
+
+/// Read `[regions]`, and check it against the materials and the frequency [Hz].
+pub(super) fn read_regions(
+    root: &Section<'_>,
+    materials: &BTreeMap<String, Material>,
+    frequency: f64,
+) -> BTreeMap<String, Region> {
+    let known: Vec<_> = materials.keys().map(String::as_str).collect();
+    let read = |(name, section): (String, Section<'_>)| {
+        let material = section.text("material");
+        let model = section.choice("model").unwrap_or(RegionModel::Volume);
+        if let Some(material) = &material {
+            check_region(&section, material, model, materials.get(material), &known, frequency);
+        }
+        let material = section.need("material", material, "\"steel\"");
+        section.finish();
+        (name, Region { material, model })
+    };
+    root.named_tables("regions").into_iter().map(read).collect()
+}
+
+fn check_region(
+    section: &Section<'_>,
+    name: &str,
+    model: RegionModel,
+    material: Option<&Material>,
+    known: &[&str],
+    frequency: f64,
+) {
+    let Some(material) = material else {
+        section.fault("material", |fault| {
+            let message = format!("there is no material `{}`", name.escape_debug());
+            suggest(Fault { message, ..fault }, name, known)
+        });
+        return;
+    };
+    if model != RegionModel::Impedance {
+        return;
+    }
+    if frequency == 0.0 {
+        section.wrong(
+            "model",
+            format!("`{}` has an impedance surface, but the frequency is 0 Hz", section.path()),
+            "model = \"volume\", or analysis.frequency above 0 Hz",
+        );
+    }
+    if material.conductivity == 0.0 {
+        section.wrong(
+            "model",
+            format!("`{}` has an impedance surface, but `{name}` does not conduct", section.path()),
+            format!("a conductivity above 0 S/m in materials.{name}, or model = \"volume\""),
+        );
+    }
+}

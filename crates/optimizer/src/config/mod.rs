@@ -1,0 +1,256 @@
+//! The configuration: a TOML text becomes a typed [`Config`] in SI, or a report of all that is wrong with it.
+//!
+//! The text is parsed into a tree that knows the place of every value (`tree`); overrides are laid over it; the
+//! readers of the single tables (`mesh`, `design`, …) walk it through `section`, which gathers faults.
+//! Names of regions and surfaces are known once the mesh is: [`Source`] keeps the places for those checks.
+
+mod analysis;
+mod boundary;
+mod choice;
+mod coil;
+mod design;
+mod fault;
+mod material;
+mod mesh;
+mod objective;
+mod optimizer;
+mod output;
+mod quantity;
+mod range;
+mod remesh;
+mod section;
+mod source;
+#[cfg(test)]
+mod tests;
+mod tree;
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+pub use analysis::{Analysis, LinearSolver};
+pub use boundary::Boundaries;
+pub use coil::{Axis, Coil, CoilShape, Corner, CornerWord};
+pub use design::Design;
+pub use fault::{Fault, Place, nearest};
+pub use material::{Material, Region, RegionModel};
+pub use mesh::{BlockMesh, Generator, LengthUnit, MeshConfig, ShieldMesh};
+pub use objective::{Objective, ObjectiveKind, Probe, Weighting};
+pub use optimizer::{Algorithm, Optimizer};
+pub use output::{FieldsKept, Output};
+pub use quantity::{Dimension, QuantityError, parse_quantity};
+pub use remesh::{Motion, Remesh, RemeshExtent, StiffnessLaw, Subregion};
+pub use source::{ConfigError, Document, FaultReport, Source};
+
+use fault::Faults;
+use section::Section;
+
+/// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
+const LARGEST_FILE: u64 = 1024 * 1024;
+
+/// A complete configuration in SI, every default filled in.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Config {
+    /// What the run is called. Default: the name of the file.
+    pub title: String,
+    /// The mesh.
+    pub mesh: MeshConfig,
+    /// The field problem.
+    pub analysis: Analysis,
+    /// Materials by name.
+    pub materials: BTreeMap<String, Material>,
+    /// Regions of the mesh by name; a region that is not here is air.
+    pub regions: BTreeMap<String, Region>,
+    /// The sources.
+    pub coils: Vec<Coil>,
+    /// The boundary conditions.
+    pub boundaries: Boundaries,
+    /// What is minimised; needed by `run` and `gradient`.
+    pub objective: Option<Objective>,
+    /// What moves; needed by `run`, `gradient` and `morph`.
+    pub design: Option<Design>,
+    /// How the mesh follows; given when `design` is.
+    pub remesh: Option<Remesh>,
+    /// The algorithm.
+    pub optimizer: Optimizer,
+    /// Points at which the flux density is reported.
+    pub probes: Vec<Probe>,
+    /// Where results go.
+    pub output: Output,
+}
+
+/// The tables an optimisation needs.
+#[derive(Debug, Clone, Copy)]
+pub struct Optimisation<'a> {
+    /// What is minimised.
+    pub objective: &'a Objective,
+    /// What moves.
+    pub design: &'a Design,
+    /// How the mesh follows.
+    pub remesh: &'a Remesh,
+}
+
+impl Config {
+    /// Read a file, and lay overrides `key=value` over it.
+    ///
+    /// Paths in the file are relative to its folder, and absolute in the result.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or with all faults of its content at once.
+    pub fn from_file(path: &Path, overrides: &[String]) -> Result<(Self, Source), ConfigError> {
+        let text = read_text(path)?;
+        let absolute = std::path::absolute(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        let directory = absolute.parent().map(Path::to_owned).unwrap_or_default();
+        let stem = path.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+        read(path.display().to_string(), text, directory, &stem, overrides)
+    }
+
+    /// Read a text; `name` stands for the file in messages, and paths stay relative.
+    ///
+    /// # Errors
+    /// All faults of the text at once.
+    pub fn from_str(text: &str, name: &str) -> Result<(Self, Source), ConfigError> {
+        let stem = Path::new(name).file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+        read(name.to_owned(), text.to_owned(), PathBuf::new(), &stem, &[])
+    }
+
+    /// The tables an optimisation needs.
+    ///
+    /// # Errors
+    /// A fault for each table that is missing.
+    pub fn optimisation(&self, source: &Source) -> Result<Optimisation<'_>, ConfigError> {
+        if let (Some(objective), Some(design), Some(remesh)) = (&self.objective, &self.design, &self.remesh) {
+            return Ok(Optimisation { objective, design, remesh });
+        }
+        let tables = [
+            ("objective", self.objective.is_none()),
+            ("design", self.design.is_none()),
+            ("remesh", self.remesh.is_none()),
+        ];
+        let fault = |(name, _): &(&str, bool)| {
+            source
+                .fault(name, format!("missing table `{name}`: there is nothing to optimise without it"))
+                .help(format!("add a table [{name}]"))
+        };
+        Err(source.error(tables.iter().filter(|(_, missing)| *missing).map(fault).collect()))
+    }
+}
+
+/// The configuration as TOML with every default written out, in SI; it reads back as the same [`Config`].
+pub fn resolved_toml(config: &Config) -> String {
+    toml::to_string(config).expect("every value of a configuration has a TOML form")
+}
+
+fn read_text(path: &Path) -> Result<String, ConfigError> {
+    let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells a file that is too large, without trusting the size it reports.
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(ConfigError::TooLarge { path: path.to_owned(), limit: LARGEST_FILE });
+    }
+    String::from_utf8(bytes).map_err(|error| ConfigError::NotText {
+        path: path.to_owned(),
+        offset: error.utf8_error().valid_up_to(),
+    })
+}
+
+fn read(
+    name: String,
+    text: String,
+    directory: PathBuf,
+    stem: &str,
+    overrides: &[String],
+) -> Result<(Config, Source), ConfigError> {
+    let mut documents = vec![Document { name, text }];
+    documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
+    let mut source = Source { documents, places: BTreeMap::new(), directory, stem: stem.to_owned() };
+
+    let root = parse_documents(&source).map_err(|faults| source.error(faults))?;
+    source.places = tree::places(&root);
+
+    let faults = Faults::default();
+    let place = Place { document: 0, span: 0..0 };
+    let section = Section::new(String::new(), &root, place, &faults);
+    let config = read_root(section, &source);
+    let faults = faults.into_sorted();
+    match config {
+        Some(config) if faults.is_empty() => Ok((config, source)),
+        _ => Err(source.error(faults)),
+    }
+}
+
+/// Parse the file and lay the overrides over it.
+fn parse_documents(source: &Source) -> Result<tree::Table, Vec<Fault>> {
+    let mut root = tree::Table::new();
+    let mut faults = Vec::new();
+    for (index, document) in source.documents.iter().enumerate() {
+        match tree::parse(index, &document.text) {
+            Ok(table) if index == 0 => root = table,
+            Ok(table) => faults.extend(tree::overlay(&mut root, table, "").err().map(|fault| *fault)),
+            Err(errors) => faults.extend(errors),
+        }
+    }
+    if faults.is_empty() { Ok(root) } else { Err(faults) }
+}
+
+/// Read all tables; `None` when one that is required is missing, which then is among the faults.
+fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
+    let title = root.text("title").unwrap_or_else(|| source.stem.clone());
+    let mesh = required(&root, "mesh", |section| MeshConfig::read(section, &source.directory));
+    let analysis = required(&root, "analysis", Analysis::read);
+    let frequency = analysis.as_ref().map_or(f64::NAN, |analysis| analysis.frequency);
+    let materials = material::read_materials(&root);
+    let regions = material::read_regions(&root, &materials, frequency);
+    let coils = coil::read_coils(&root);
+    let boundaries = match root.table("boundaries") {
+        Some(section) => {
+            let boundaries = Boundaries::read(&section);
+            section.finish();
+            boundaries
+        }
+        None => Boundaries::default(),
+    };
+    let objective = root.table("objective").map(Objective::read);
+    let design = root.table("design").map(Design::read);
+    let remesh = root.table("remesh").map(Remesh::read);
+    if root.has("design") && !root.has("remesh") {
+        root.missing("remesh", "[remesh] with region = \"remesh\": the mesh must follow the design");
+    }
+    let optimizer = root.table("optimizer").map(Optimizer::read).unwrap_or_default();
+    let probes = objective::read_probes(&root);
+    let output = match root.table("output") {
+        Some(section) => Output::read(section, &source.directory, &source.stem),
+        None => Output::new(&source.directory, &source.stem),
+    };
+    root.finish();
+    Some(Config {
+        title,
+        mesh: mesh?,
+        analysis: analysis?,
+        materials,
+        regions,
+        coils,
+        boundaries,
+        objective,
+        design,
+        remesh,
+        optimizer,
+        probes,
+        output,
+    })
+}
+
+fn required<T>(root: &Section<'_>, key: &'static str, read: impl FnOnce(&Section<'_>) -> T) -> Option<T> {
+    if !root.has(key) {
+        root.missing(key, &format!("[{key}]"));
+    }
+    let section = root.table(key)?;
+    let value = read(&section);
+    section.finish();
+    Some(value)
+}

@@ -1,0 +1,78 @@
+//! `[optimizer]`: the algorithm and when it stops.
+
+use serde::Serialize;
+
+use super::Dimension;
+use super::choice::choice;
+use super::range::Range;
+use super::section::Section;
+
+/// Options of the optimisation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Optimizer {
+    /// Default `mma`: it keeps to the bounds, needs no line search and suits many variables.
+    pub algorithm: Algorithm,
+    /// Most evaluations of the objective with its gradient. Default 30: the shield needs 13.
+    pub max_evaluations: usize,
+    /// Longest time [s]; no evaluation is started after it. Default none.
+    pub max_time: Option<f64>,
+    /// Stop when the objective changes by less than this fraction between iterations. Default 1e-3: well
+    /// below the error of the mesh; 0 switches it off.
+    pub ftol_rel: f64,
+    /// Stop when all variables change by less than this fraction. Default 0, off: the variables of a
+    /// bang-bang design reach their bounds long before the rest has settled.
+    pub xtol_rel: f64,
+    /// Least quality (Eq. 4) of an element that a design may have, 0 to 1. Default 0: only flat and inverted
+    /// elements are refused, since layered meshes start with a low quality.
+    pub minimum_quality: f64,
+}
+
+choice! {
+    /// Algorithms of NLopt.
+    pub enum Algorithm {
+        /// Method of moving asymptotes.
+        Mma = "mma",
+        /// Conservative convex separable approximation with quadratic terms.
+        Ccsaq = "ccsaq",
+        /// Sequential least-squares quadratic programming.
+        Slsqp = "slsqp",
+        /// Limited-memory BFGS.
+        Lbfgs = "lbfgs",
+        /// Truncated Newton with restarts and preconditioning.
+        Tnewton = "tnewton",
+        /// Limited-memory variable metric of rank 2.
+        Var2 = "var2",
+    }
+}
+
+impl Default for Optimizer {
+    fn default() -> Self {
+        Self {
+            algorithm: Algorithm::Mma,
+            max_evaluations: 30,
+            max_time: None,
+            ftol_rel: 1e-3,
+            xtol_rel: 0.0,
+            minimum_quality: 0.0,
+        }
+    }
+}
+
+impl Optimizer {
+    pub(super) fn read(section: Section<'_>) -> Self {
+        let default = Self::default();
+        let tolerance = |key| section.number(key, Range::half_open(0.0, 1.0));
+        let optimizer = Self {
+            algorithm: section.choice("algorithm").unwrap_or(default.algorithm),
+            max_evaluations: section
+                .integer("max_evaluations", 1, 1_000_000)
+                .unwrap_or(default.max_evaluations),
+            max_time: section.quantity("max_time", Dimension::Duration, Range::POSITIVE),
+            ftol_rel: tolerance("ftol_rel").unwrap_or(default.ftol_rel),
+            xtol_rel: tolerance("xtol_rel").unwrap_or(default.xtol_rel),
+            minimum_quality: tolerance("minimum_quality").unwrap_or(default.minimum_quality),
+        };
+        section.finish();
+        optimizer
+    }
+}

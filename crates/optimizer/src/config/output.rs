@@ -1,0 +1,54 @@
+//! `[output]`: where results go, and which fields are kept.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Serialize, Serializer};
+
+use super::choice::choice;
+use super::section::Section;
+
+/// Where results go.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Output {
+    /// The run directory. Default `runs/` and the name of the configuration, beside it.
+    #[serde(serialize_with = "as_text")]
+    pub directory: PathBuf,
+    /// Which evaluations leave a VTU file. Default `every`: a run has some tens of evaluations.
+    pub fields: FieldsKept,
+}
+
+choice! {
+    /// Which evaluations leave a VTU file.
+    pub enum FieldsKept {
+        /// All.
+        Every = "every",
+        /// Those better than all before.
+        Improved = "improved",
+        /// The first and the best.
+        FirstLast = "first_last",
+        /// None.
+        Nothing = "none",
+    }
+}
+
+impl Output {
+    /// The defaults for a configuration called `stem` in a folder.
+    pub(super) fn new(directory: &Path, stem: &str) -> Self {
+        Self { directory: directory.join("runs").join(stem), fields: FieldsKept::Every }
+    }
+
+    pub(super) fn read(section: Section<'_>, folder: &Path, stem: &str) -> Self {
+        let default = Self::new(folder, stem);
+        let output = Self {
+            directory: section.text("directory").map_or(default.directory, |path| folder.join(path)),
+            fields: section.choice("fields").unwrap_or(default.fields),
+        };
+        section.finish();
+        output
+    }
+}
+
+/// A path that is not UTF-8 is written with replacement characters: the file is for reading.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
+}

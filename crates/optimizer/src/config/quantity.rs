@@ -1,0 +1,331 @@
+//! Numbers with a unit: `"10 mm"`, `"7e6 S/m"`, `"40 kA"`, `"60 Hz"`.
+//!
+//! The unit is converted once, here; everything behind this module is in SI. A decimal prefix is applied to
+//! the exponent of the written number before it is parsed, so `"22 mm"` has the very bits of `0.022`.
+
+use std::fmt;
+
+/// What a quantity measures, and so which units it may carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// A length [m].
+    Length,
+    /// A frequency [Hz].
+    Frequency,
+    /// An electric conductivity [S/m].
+    Conductivity,
+    /// A current, or ampere-turns [A].
+    Current,
+    /// A magnetic flux density [T].
+    FluxDensity,
+    /// An angle [rad].
+    Angle,
+    /// A duration [s].
+    Duration,
+}
+
+/// A unit: `value [SI] = number · factor · 10^exponent`.
+struct Unit {
+    name: &'static str,
+    dimension: Dimension,
+    factor: f64,
+    exponent: i32,
+}
+
+const fn decimal(name: &'static str, dimension: Dimension, exponent: i32) -> Unit {
+    Unit { name, dimension, factor: 1.0, exponent }
+}
+
+const fn scaled(name: &'static str, dimension: Dimension, factor: f64) -> Unit {
+    Unit { name, dimension, factor, exponent: 0 }
+}
+
+use Dimension::{Angle, Conductivity, Current, Duration, FluxDensity, Frequency, Length};
+
+/// Every unit that is understood. A unit that may be written in two ways stands twice.
+const UNITS: &[Unit] = &[
+    decimal("m", Length, 0),
+    decimal("cm", Length, -2),
+    decimal("mm", Length, -3),
+    decimal("um", Length, -6),
+    decimal("\u{b5}m", Length, -6),
+    decimal("\u{3bc}m", Length, -6),
+    scaled("in", Length, 0.0254),
+    decimal("Hz", Frequency, 0),
+    decimal("kHz", Frequency, 3),
+    decimal("MHz", Frequency, 6),
+    decimal("S/m", Conductivity, 0),
+    decimal("MS/m", Conductivity, 6),
+    decimal("A", Current, 0),
+    decimal("kA", Current, 3),
+    decimal("AT", Current, 0),
+    decimal("kAT", Current, 3),
+    decimal("T", FluxDensity, 0),
+    decimal("mT", FluxDensity, -3),
+    decimal("G", FluxDensity, -4),
+    scaled("deg", Angle, std::f64::consts::PI / 180.0),
+    decimal("rad", Angle, 0),
+    decimal("s", Duration, 0),
+    decimal("ms", Duration, -3),
+    scaled("min", Duration, 60.0),
+    scaled("h", Duration, 3600.0),
+];
+
+/// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
+const RESISTIVITY: &[&str] = &[
+    "Ohm m",
+    "ohm m",
+    "Ohm*m",
+    "ohm*m",
+    "Ohm.m",
+    "Ohm-m",
+    "\u{3a9} m",
+    "\u{3a9}m",
+    "\u{3a9}\u{b7}m",
+    "\u{2126}m",
+];
+
+impl Dimension {
+    /// The name of the dimension with its article, for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Length => "a length",
+            Frequency => "a frequency",
+            Conductivity => "a conductivity",
+            Current => "a current",
+            FluxDensity => "a flux density",
+            Angle => "an angle",
+            Duration => "a duration",
+        }
+    }
+
+    /// The SI unit in which the value is held.
+    pub fn si_unit(self) -> &'static str {
+        match self {
+            Length => "m",
+            Frequency => "Hz",
+            Conductivity => "S/m",
+            Current => "A",
+            FluxDensity => "T",
+            Angle => "rad",
+            Duration => "s",
+        }
+    }
+
+    /// A text that would be accepted, for messages.
+    pub fn example(self) -> &'static str {
+        match self {
+            Length => "10 mm",
+            Frequency => "60 Hz",
+            Conductivity => "7e6 S/m",
+            Current => "40 kA",
+            FluxDensity => "5 mT",
+            Angle => "30 deg",
+            Duration => "10 min",
+        }
+    }
+
+    /// The accepted units in one line, for messages.
+    pub fn accepted_units(self) -> String {
+        let names: Vec<_> =
+            UNITS.iter().filter(|unit| unit.dimension == self).map(|unit| unit.name).collect();
+        names.join(", ")
+    }
+}
+
+/// Why a text is not a quantity of the wanted dimension.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QuantityError {
+    /// What is wrong, naming the text.
+    pub message: String,
+    /// What to write instead.
+    pub help: String,
+}
+
+impl fmt::Display for QuantityError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}; {}", self.message, self.help)
+    }
+}
+
+/// Value in SI of a number with a unit.
+///
+/// # Errors
+/// When the text does not start with a finite decimal number, or the unit is missing, unknown or of another
+/// dimension; the message names the accepted units.
+pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
+    let trimmed = text.trim();
+    let (number, unit_text) = split_number(trimmed);
+    let accepted = || {
+        format!("write it like \"{}\"; accepted units: {}", dimension.example(), dimension.accepted_units())
+    };
+    let fail = |message: String| Err(QuantityError { message, help: accepted() });
+
+    let Some(number) = number else {
+        return fail(format!("`{text}` is not {}: it must start with a number", dimension.name()));
+    };
+    if unit_text.is_empty() {
+        return fail(format!("`{text}` has no unit"));
+    }
+    if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
+        let help = match number.scaled(0).filter(|rho| *rho > 0.0) {
+            Some(rho) => format!("conductivity is its reciprocal: write \"{:.6e} S/m\"", 1.0 / rho),
+            None => accepted(),
+        };
+        return Err(QuantityError {
+            message: format!("`{text}` is a resistivity, not a conductivity"),
+            help,
+        });
+    }
+    let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
+        let known: Vec<_> =
+            UNITS.iter().filter(|unit| unit.dimension == dimension).map(|unit| unit.name).collect();
+        let hint = match super::nearest(unit_text, known.iter().copied()) {
+            Some(name) => format!("did you mean `{name}`? "),
+            None => String::new(),
+        };
+        return Err(QuantityError {
+            message: format!("`{unit_text}` in `{text}` is not a unit of {}", dimension.noun()),
+            help: format!("{hint}{}", accepted()),
+        });
+    };
+    if unit.dimension != dimension {
+        return fail(format!("`{text}` is {}, not {}", unit.dimension.name(), dimension.name()));
+    }
+    match number.scaled(unit.exponent).map(|value| value * unit.factor).filter(|value| value.is_finite()) {
+        Some(value) => Ok(value),
+        None => fail(format!("`{text}` is too large for a number")),
+    }
+}
+
+impl Dimension {
+    fn noun(self) -> &'static str {
+        self.name().split_once(' ').map_or(self.name(), |(_, noun)| noun)
+    }
+}
+
+/// A decimal number as written: mantissa digits and the power of ten behind them.
+struct Number<'a> {
+    mantissa: &'a str,
+    exponent: i32,
+}
+
+impl Number<'_> {
+    /// The number times `10^shift`, rounded once.
+    fn scaled(&self, shift: i32) -> Option<f64> {
+        let exponent = self.exponent.saturating_add(shift);
+        format!("{}e{exponent}", self.mantissa).parse().ok().filter(|value: &f64| value.is_finite())
+    }
+}
+
+/// Split `7e6 S/m` into the number and the trimmed rest; no number gives `None`.
+fn split_number(text: &str) -> (Option<Number<'_>>, &str) {
+    let bytes = text.as_bytes();
+    let digits = |from: usize| from + bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+
+    let start = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let whole = digits(start);
+    let fraction = if bytes.get(whole) == Some(&b'.') { digits(whole + 1) } else { whole };
+    let has_digits = whole > start || fraction > whole + 1;
+    if !has_digits {
+        return (None, text);
+    }
+    let mut end = fraction;
+    let mut exponent = 0;
+    if matches!(bytes.get(fraction), Some(b'e' | b'E')) {
+        let sign = fraction + 1 + usize::from(matches!(bytes.get(fraction + 1), Some(b'+' | b'-')));
+        if sign <= bytes.len() && digits(sign) > sign {
+            end = digits(sign);
+            // More digits than an i32 holds saturate: the value is zero or infinite all the same.
+            let sign_is_minus = bytes[fraction + 1] == b'-';
+            exponent =
+                text[fraction + 1..end].parse().unwrap_or(if sign_is_minus { -100_000 } else { 100_000 });
+        }
+    }
+    (Some(Number { mantissa: &text[..fraction], exponent }), text[end..].trim_start())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn decimal_units_have_the_bits_of_the_si_literal() {
+        let cases = [
+            ("22 mm", Length, 0.022),
+            ("0.4mm", Length, 0.0004),
+            ("-5 mm", Length, -0.005),
+            ("1.5e1 cm", Length, 0.15),
+            ("3 um", Length, 3e-6),
+            ("3 \u{b5}m", Length, 3e-6),
+            (".5 m", Length, 0.5),
+            ("5. m", Length, 5.0),
+            ("7e6 S/m", Conductivity, 7e6),
+            ("5.8 MS/m", Conductivity, 5.8e6),
+            ("40 kA", Current, 40e3),
+            ("40 kAT", Current, 40e3),
+            (" +60 Hz ", Frequency, 60.0),
+            ("10 G", FluxDensity, 1e-3),
+            ("2 min", Duration, 120.0),
+            ("180 deg", Angle, std::f64::consts::PI),
+            ("1 in", Length, 0.0254),
+        ];
+        for (text, dimension, expected) in cases {
+            assert_eq!(parse_quantity(text, dimension), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn wrong_quantities_say_what_is_accepted() {
+        let cases = [
+            ("10", Length, "has no unit"),
+            ("mm", Length, "must start with a number"),
+            ("nan mm", Length, "must start with a number"),
+            ("inf mm", Length, "must start with a number"),
+            ("- 5 mm", Length, "must start with a number"),
+            (".", Length, "must start with a number"),
+            ("60 Hz", Length, "is a frequency, not a length"),
+            ("60 hz", Frequency, "did you mean `Hz`?"),
+            ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
+            ("0 Ohm m", Conductivity, "is a resistivity"),
+            ("1e400 m", Length, "too large"),
+            ("1e99999999999 m", Length, "too large"),
+            ("10 parsec", Length, "accepted units: m, cm, mm"),
+            ("1e m", Length, "not a unit of length"),
+        ];
+        for (text, dimension, fragment) in cases {
+            let message = parse_quantity(text, dimension).expect_err(text).to_string();
+            assert!(message.contains(fragment), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_resistivity_is_answered_with_its_reciprocal() {
+        let error = parse_quantity("1.25e-7 Ohm m", Conductivity).expect_err("a resistivity");
+        assert!(error.help.contains("8.000000e6 S/m"), "{}", error.help);
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused_without_a_panic(text in "\\PC*") {
+            for dimension in [Length, Frequency, Conductivity, Current, FluxDensity, Angle, Duration] {
+                if let Ok(value) = parse_quantity(&text, dimension) {
+                    prop_assert!(value.is_finite());
+                }
+            }
+        }
+
+        #[test]
+        fn a_printed_number_is_read_back_exactly(value in -1e12_f64..1e12) {
+            prop_assert_eq!(parse_quantity(&format!("{value} m"), Length), Ok(value));
+            prop_assert_eq!(parse_quantity(&format!("{value:e}m"), Length), Ok(value));
+        }
+
+        #[test]
+        fn number_like_texts_never_panic(text in "[-+]?[0-9.]{0,4}[eE]?[-+]?[0-9]{0,12} ?[a-zA-Z/]{0,4}") {
+            let _ = parse_quantity(&text, Length);
+        }
+    }
+}

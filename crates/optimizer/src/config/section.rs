@@ -1,0 +1,452 @@
+//! Reads one table: each method takes one key, checks it, and records what is wrong.
+//!
+//! Every reader returns `None` both for a key that is absent and for one that is faulty; a required key then
+//! takes a [`Placeholder`] and reading goes on. A configuration with a fault is never handed out, so a
+//! placeholder never reaches a caller; that of numbers is NaN, with which no later comparison holds.
+
+use std::cell::RefCell;
+
+use super::choice::Choice;
+use super::fault::{Fault, Faults, Place};
+use super::quantity::{Dimension, parse_quantity};
+use super::range::Range;
+use super::source::suggest;
+use super::tree::{Node, Table, Value, join};
+
+/// Longest list that is read: far beyond any use, and small enough to keep messages and memory bounded.
+const LONGEST_LIST: usize = 100_000;
+
+/// What stands in for a required value that is missing or faulty.
+pub(super) trait Placeholder {
+    /// The value.
+    fn placeholder() -> Self;
+}
+
+impl Placeholder for f64 {
+    fn placeholder() -> Self {
+        f64::NAN
+    }
+}
+
+impl<const N: usize> Placeholder for [f64; N] {
+    fn placeholder() -> Self {
+        [f64::NAN; N]
+    }
+}
+
+impl Placeholder for String {
+    fn placeholder() -> Self {
+        Self::new()
+    }
+}
+
+impl<T> Placeholder for Vec<T> {
+    fn placeholder() -> Self {
+        Self::new()
+    }
+}
+
+/// One table being read.
+pub(super) struct Section<'a> {
+    path: String,
+    table: &'a Table,
+    place: Place,
+    faults: &'a Faults,
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Section<'a> {
+    /// A table at a key path.
+    pub(super) fn new(path: String, table: &'a Table, place: Place, faults: &'a Faults) -> Self {
+        Self { path, table, place, faults, asked: RefCell::default() }
+    }
+
+    /// Key path of the table.
+    pub(super) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// Whether the key is written, right or wrong.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    fn get(&self, key: &'static str) -> Option<&'a Node> {
+        self.asked.borrow_mut().push(key);
+        self.table.get(key)
+    }
+
+    /// Record a fault at a key of this table, or at the table when the key is not written.
+    pub(super) fn fault(&self, key: &str, fill: impl FnOnce(Fault) -> Fault) {
+        let place = self.table.get(key).map_or_else(|| self.place.clone(), |node| node.place.clone());
+        let path = if key.is_empty() { self.path.clone() } else { join(&self.path, key) };
+        self.faults.push(fill(Fault { path, place, message: String::new(), expected: None, help: None }));
+    }
+
+    /// Record a fault with a message and what is expected instead.
+    pub(super) fn wrong(&self, key: &str, message: impl Into<String>, expected: impl Into<String>) {
+        self.fault(key, |fault| Fault { message: message.into(), ..fault }.expected(expected));
+    }
+
+    fn wrong_at(&self, node: &Node, path: &str, message: String, expected: &str, help: Option<String>) {
+        let expected = (!expected.is_empty()).then(|| expected.to_owned());
+        self.faults.push(Fault { path: path.to_owned(), place: node.place.clone(), message, expected, help });
+    }
+
+    /// The value, or a placeholder with a fault when the key is missing; `example` is a value to write.
+    pub(super) fn need<T: Placeholder>(&self, key: &'static str, value: Option<T>, example: &str) -> T {
+        if value.is_none() && !self.has(key) {
+            self.missing(key, &format!("{key} = {example}"));
+        }
+        value.unwrap_or_else(T::placeholder)
+    }
+
+    /// Record that a key is missing; `example` is a line that would do.
+    pub(super) fn missing(&self, key: &str, example: &str) {
+        let table = if self.path.is_empty() { String::new() } else { format!(" in `{}`", self.path) };
+        self.fault(key, |fault| {
+            Fault { message: format!("missing key `{key}`{table}"), ..fault }
+                .help(format!("add a line like: {example}"))
+        });
+    }
+
+    /// A number without unit.
+    pub(super) fn number(&self, key: &'static str, range: Range) -> Option<f64> {
+        let node = self.get(key)?;
+        self.number_of(node, &join(&self.path, key), range)
+    }
+
+    fn number_of(&self, node: &Node, path: &str, range: Range) -> Option<f64> {
+        let value = match node.value {
+            Value::Integer(value) => value as f64,
+            Value::Float(value) => value,
+            ref other => {
+                let message = format!("`{path}` is {}, not a number", other.describe());
+                self.wrong_at(node, path, message, "a number without quotes and unit", None);
+                return None;
+            }
+        };
+        self.in_range(node, path, value, range, "")
+    }
+
+    /// A quantity: text with a unit, or a bare number in SI.
+    pub(super) fn quantity(&self, key: &'static str, dimension: Dimension, range: Range) -> Option<f64> {
+        let node = self.get(key)?;
+        self.quantity_of(node, &join(&self.path, key), dimension, range)
+    }
+
+    fn quantity_of(&self, node: &Node, path: &str, dimension: Dimension, range: Range) -> Option<f64> {
+        let value = match &node.value {
+            Value::Integer(value) => *value as f64,
+            Value::Float(value) => *value,
+            Value::Text(text) => match parse_quantity(text, dimension) {
+                Ok(value) => value,
+                Err(error) => {
+                    let message = format!("`{path}`: {}", error.message);
+                    let expected = format!("expected {}", dimension.name());
+                    self.wrong_at(node, path, message, &expected, Some(error.help));
+                    return None;
+                }
+            },
+            other => {
+                let message = format!("`{path}` is {}, not {}", other.describe(), dimension.name());
+                let expected = format!(
+                    "a text like \"{}\", or a number in {}",
+                    dimension.example(),
+                    dimension.si_unit()
+                );
+                self.wrong_at(node, path, message, &expected, None);
+                return None;
+            }
+        };
+        self.in_range(node, path, value, range, dimension.si_unit())
+    }
+
+    fn in_range(&self, node: &Node, path: &str, value: f64, range: Range, unit: &str) -> Option<f64> {
+        if range.contains(value) {
+            return Some(value);
+        }
+        let unit_text = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let message = if value.is_finite() {
+            format!("`{path}` is {value}{unit_text}, which is out of range")
+        } else {
+            format!("`{path}` is {value}, not a finite number")
+        };
+        self.wrong_at(node, path, message, &format!("must be {}", range.describe(unit)), None);
+        None
+    }
+
+    /// A whole number from `least` to `most`.
+    pub(super) fn integer(&self, key: &'static str, least: usize, most: usize) -> Option<usize> {
+        let node = self.get(key)?;
+        self.integer_of(node, &join(&self.path, key), least, most)
+    }
+
+    fn integer_of(&self, node: &Node, path: &str, least: usize, most: usize) -> Option<usize> {
+        let expected = format!("must be a whole number from {least} to {most}");
+        match node.value {
+            Value::Integer(value) => match usize::try_from(value) {
+                Ok(value) if (least..=most).contains(&value) => return Some(value),
+                _ => {
+                    let message = format!("`{path}` is {value}, which is out of range");
+                    self.wrong_at(node, path, message, &expected, None);
+                }
+            },
+            ref other => {
+                let message = format!("`{path}` is {}, not a whole number", other.describe());
+                self.wrong_at(node, path, message, &expected, None);
+            }
+        }
+        None
+    }
+
+    /// A text that is not empty.
+    pub(super) fn text(&self, key: &'static str) -> Option<String> {
+        let node = self.get(key)?;
+        self.text_of(node, &join(&self.path, key))
+    }
+
+    fn text_of(&self, node: &Node, path: &str) -> Option<String> {
+        match &node.value {
+            Value::Text(text) if !text.trim().is_empty() => return Some(text.clone()),
+            Value::Text(_) => {
+                self.wrong_at(node, path, format!("`{path}` is empty"), "a text in quotes", None)
+            }
+            other => {
+                let message = format!("`{path}` is {}, not a text", other.describe());
+                self.wrong_at(node, path, message, "a text in quotes", None);
+            }
+        }
+        None
+    }
+
+    /// One of a few words.
+    pub(super) fn choice<T: Choice>(&self, key: &'static str) -> Option<T> {
+        let text = self.text(key)?;
+        if let Some((_, choice)) = T::CHOICES.iter().find(|(name, _)| *name == text) {
+            return Some(*choice);
+        }
+        let names: Vec<_> = T::CHOICES.iter().map(|(name, _)| *name).collect();
+        let path = join(&self.path, key);
+        self.fault(key, |fault| {
+            let message = format!("`{path}` cannot be `{}`", text.escape_debug());
+            suggest(Fault { message, ..fault }, &text, &names)
+        });
+        None
+    }
+
+    /// A list of items, each read by `read(item, key path of the item)`; faulty items are left out.
+    fn list<T>(
+        &self,
+        key: &'static str,
+        what: &str,
+        read: impl Fn(&Node, &str) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let node = self.get(key)?;
+        self.list_of(node, &join(&self.path, key), what, read)
+    }
+
+    fn list_of<T>(
+        &self,
+        node: &Node,
+        path: &str,
+        what: &str,
+        read: impl Fn(&Node, &str) -> Option<T>,
+    ) -> Option<Vec<T>> {
+        let Value::Array(items) = &node.value else {
+            let message = format!("`{path}` is {}, not a list", node.value.describe());
+            self.wrong_at(node, path, message, &format!("a list of {what} in brackets"), None);
+            return None;
+        };
+        if items.len() > LONGEST_LIST {
+            let message = format!("`{path}` has {} items", items.len());
+            self.wrong_at(node, path, message, &format!("at most {LONGEST_LIST} items"), None);
+            return None;
+        }
+        let values: Vec<_> = items
+            .iter()
+            .enumerate()
+            .filter_map(|(index, item)| read(item, &format!("{path}[{index}]")))
+            .collect();
+        (values.len() == items.len()).then_some(values)
+    }
+
+    fn array_of<const N: usize, T: Copy>(
+        &self,
+        node: &Node,
+        path: &str,
+        what: &str,
+        read: impl Fn(&Node, &str) -> Option<T>,
+    ) -> Option<[T; N]> {
+        let values = self.list_of(node, path, what, read)?;
+        let count = values.len();
+        let array = values.try_into().ok();
+        if array.is_none() {
+            let message = format!("`{path}` has {count} items");
+            self.wrong_at(node, path, message, &format!("exactly {N} {what}"), None);
+        }
+        array
+    }
+
+    /// `N` numbers without unit.
+    pub(super) fn numbers<const N: usize>(&self, key: &'static str, range: Range) -> Option<[f64; N]> {
+        let node = self.get(key)?;
+        self.array_of(node, &join(&self.path, key), "numbers", |item, path| self.number_of(item, path, range))
+    }
+
+    /// `N` whole numbers from `least` to `most`.
+    pub(super) fn integers<const N: usize>(
+        &self,
+        key: &'static str,
+        least: usize,
+        most: usize,
+    ) -> Option<[usize; N]> {
+        let node = self.get(key)?;
+        self.array_of(node, &join(&self.path, key), "whole numbers", |item, path| {
+            self.integer_of(item, path, least, most)
+        })
+    }
+
+    /// `N` lengths [m].
+    pub(super) fn lengths<const N: usize>(&self, key: &'static str, range: Range) -> Option<[f64; N]> {
+        let node = self.get(key)?;
+        self.lengths_of(node, &join(&self.path, key), range)
+    }
+
+    fn lengths_of<const N: usize>(&self, node: &Node, path: &str, range: Range) -> Option<[f64; N]> {
+        self.array_of(node, path, "lengths", |item, path| {
+            self.quantity_of(item, path, Dimension::Length, range)
+        })
+    }
+
+    /// Any number of lengths [m].
+    pub(super) fn length_list(&self, key: &'static str, range: Range) -> Option<Vec<f64>> {
+        self.list(key, "lengths", |item, path| self.quantity_of(item, path, Dimension::Length, range))
+    }
+
+    /// Two lengths, the first below the second [m].
+    pub(super) fn interval(&self, key: &'static str) -> Option<[f64; 2]> {
+        let ends = self.lengths::<2>(key, Range::FINITE)?;
+        if ends[0] < ends[1] {
+            return Some(ends);
+        }
+        let message = format!("`{}` runs from {} m to {} m", join(&self.path, key), ends[0], ends[1]);
+        self.wrong(key, message, "the lower end first, below the upper end");
+        None
+    }
+
+    /// Points in space [m], at least one.
+    pub(super) fn points(&self, key: &'static str) -> Option<Vec<[f64; 3]>> {
+        let points =
+            self.list(key, "points", |item, path| self.lengths_of::<3>(item, path, Range::FINITE))?;
+        if points.is_empty() {
+            let message = format!("`{}` is an empty list", join(&self.path, key));
+            self.wrong(key, message, "at least one point of three lengths");
+            return None;
+        }
+        Some(points)
+    }
+
+    /// Two opposite corners of a box, lower first [m].
+    pub(super) fn corners(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
+        let node = self.get(key)?;
+        let corners: [[f64; 3]; 2] =
+            self.array_of(node, &join(&self.path, key), "points", |item, path| {
+                self.lengths_of(item, path, Range::FINITE)
+            })?;
+        if (0..3).all(|axis| corners[0][axis] < corners[1][axis]) {
+            return Some(corners);
+        }
+        let message = format!("`{}` has no volume", join(&self.path, key));
+        self.wrong(key, message, "the lower corner first, below the upper corner in x, y and z");
+        None
+    }
+
+    /// A list of different names.
+    pub(super) fn names(&self, key: &'static str) -> Option<Vec<String>> {
+        let names = self.list(key, "names", |item, path| self.text_of(item, path))?;
+        if let Some(twice) = first_duplicate(&names) {
+            self.wrong(key, format!("`{}` names `{twice}` twice", join(&self.path, key)), "each name once");
+            return None;
+        }
+        Some(names)
+    }
+
+    /// One name, or a list of different names that is not empty.
+    pub(super) fn name_or_names(&self, key: &'static str) -> Option<Vec<String>> {
+        match &self.table.get(key)?.value {
+            Value::Array(items) if items.is_empty() => {
+                self.asked.borrow_mut().push(key);
+                let message = format!("`{}` is an empty list", join(&self.path, key));
+                self.wrong(key, message, "at least one name");
+                None
+            }
+            Value::Array(_) => self.names(key),
+            _ => self.text(key).map(|name| vec![name]),
+        }
+    }
+
+    /// A table under a key.
+    pub(super) fn table(&self, key: &'static str) -> Option<Section<'a>> {
+        let node = self.get(key)?;
+        self.section_of(node, join(&self.path, key))
+    }
+
+    fn section_of(&self, node: &'a Node, path: String) -> Option<Section<'a>> {
+        match &node.value {
+            Value::Table(table) => Some(Section::new(path, table, node.place.clone(), self.faults)),
+            other => {
+                let message = format!("`{path}` is {}, not a table", other.describe());
+                self.wrong_at(node, &path, message, &format!("a table: [{path}]"), None);
+                None
+            }
+        }
+    }
+
+    /// The tables of `[[key]]`.
+    pub(super) fn tables(&self, key: &'static str) -> Vec<Section<'a>> {
+        let path = join(&self.path, key);
+        let Some(node) = self.get(key) else { return Vec::new() };
+        let Value::Array(items) = &node.value else {
+            let message = format!("`{path}` is {}, not a list of tables", node.value.describe());
+            self.wrong_at(node, &path, message, &format!("a list of tables: [[{path}]]"), None);
+            return Vec::new();
+        };
+        let section = |(index, item)| self.section_of(item, format!("{path}[{index}]"));
+        items.iter().enumerate().filter_map(section).collect()
+    }
+
+    /// The tables of `[key.NAME]` with their names.
+    pub(super) fn named_tables(&self, key: &'static str) -> Vec<(String, Section<'a>)> {
+        let Some(section) = self.table(key) else { return Vec::new() };
+        let named = |(name, node): (&'a String, &'a Node)| {
+            let inner = section.section_of(node, join(&section.path, name))?;
+            Some((name.clone(), inner))
+        };
+        section.table.iter().filter_map(named).collect()
+    }
+
+    /// Report every key that nobody asked for.
+    pub(super) fn finish(self) {
+        let asked = self.asked.into_inner();
+        let mut known = asked.clone();
+        known.sort_unstable();
+        known.dedup();
+        for (key, node) in self.table.iter().filter(|(key, _)| !asked.contains(&key.as_str())) {
+            let table = if self.path.is_empty() { String::new() } else { format!(" in `{}`", self.path) };
+            let fault = Fault {
+                path: join(&self.path, key),
+                place: node.key_place.clone(),
+                message: format!("unknown key `{}`{table}", key.escape_debug()),
+                expected: None,
+                help: None,
+            };
+            self.faults.push(suggest(fault, key, &known));
+        }
+    }
+}
+
+/// The first name that comes a second time.
+pub(super) fn first_duplicate(names: &[String]) -> Option<&String> {
+    names.iter().enumerate().find(|(index, name)| names[..*index].contains(name)).map(|(_, name)| name)
+}

@@ -1,0 +1,156 @@
+//! The texts of a configuration and the place of every key in them.
+//!
+//! Some faults show only later: whether a region exists is known once the mesh is. [`Source`] keeps the places,
+//! so that such a fault points at its key like every other.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use super::fault::{Fault, Place};
+
+/// A text that keys were read from: the file, or one override of the command line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Document {
+    /// What to call it in messages: the path as typed, or `--set`.
+    pub name: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// Where a configuration came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Source {
+    pub(super) documents: Vec<Document>,
+    pub(super) places: BTreeMap<String, Place>,
+    pub(super) directory: PathBuf,
+    pub(super) stem: String,
+}
+
+impl Source {
+    /// The file first, then the overrides in the order given.
+    pub fn documents(&self) -> &[Document] {
+        &self.documents
+    }
+
+    /// The text of the file as given, without overrides.
+    pub fn text(&self) -> &str {
+        self.documents.first().map_or("", |document| &document.text)
+    }
+
+    /// The overrides of the command line, as TOML lines.
+    pub fn overrides(&self) -> impl Iterator<Item = &str> {
+        self.documents.iter().skip(1).map(|document| document.text.as_str())
+    }
+
+    /// The folder that paths in the configuration are relative to.
+    pub fn directory(&self) -> &Path {
+        &self.directory
+    }
+
+    /// Where the value at a key path such as `design.surface` or `coils[0].center` stands.
+    ///
+    /// A key that was left to its default has no place: then that of the nearest table around it is taken.
+    pub fn place(&self, path: &str) -> Place {
+        let mut rest = path;
+        while !rest.is_empty() {
+            if let Some(place) = self.places.get(rest) {
+                return place.clone();
+            }
+            rest = rest.rfind(['.', '[']).map_or("", |end| &rest[..end]);
+        }
+        Place { document: 0, span: 0..0 }
+    }
+
+    /// A fault at a key path; add what was expected and what to do with the methods of [`Fault`].
+    pub fn fault(&self, path: &str, message: impl Into<String>) -> Fault {
+        Fault {
+            path: path.to_owned(),
+            place: self.place(path),
+            message: message.into(),
+            expected: None,
+            help: None,
+        }
+    }
+
+    /// A fault about a name that is not among the known ones: suggests the nearest and lists them.
+    pub fn unknown_name(&self, path: &str, what: &str, name: &str, known: &[&str]) -> Fault {
+        let fault = self.fault(path, format!("there is no {what} `{name}`"));
+        suggest(fault, name, known)
+    }
+
+    /// The error that reports these faults at their places.
+    pub fn error(&self, faults: Vec<Fault>) -> ConfigError {
+        ConfigError::Faults(Box::new(FaultReport { source: self.clone(), faults }))
+    }
+
+    /// `Ok` without faults, else the error that reports them.
+    ///
+    /// # Errors
+    /// When there is at least one fault.
+    pub fn check(&self, faults: Vec<Fault>) -> Result<(), ConfigError> {
+        if faults.is_empty() { Ok(()) } else { Err(self.error(faults)) }
+    }
+}
+
+/// The fault with the nearest known name as help and all known names as the expectation.
+pub(super) fn suggest(mut fault: Fault, name: &str, known: &[&str]) -> Fault {
+    if let Some(nearest) = super::nearest(name, known.iter().copied()) {
+        fault = fault.help(format!("did you mean `{nearest}`?"));
+    }
+    match known {
+        [] => fault.expected("none is known here"),
+        _ => fault.expected(format!("known: {}", known.join(", "))),
+    }
+}
+
+/// All faults of one configuration, with the texts they stand in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultReport {
+    /// The texts.
+    pub source: Source,
+    /// The faults, in the order to be shown.
+    pub faults: Vec<Fault>,
+}
+
+impl fmt::Display for FaultReport {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&crate::diagnostics::render(self, crate::diagnostics::Style::Plain))
+    }
+}
+
+/// Why a configuration could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration `{path}`: {source}; give the path of a TOML file that exists")]
+    Read {
+        /// The path as given.
+        path: PathBuf,
+        /// The cause.
+        source: std::io::Error,
+    },
+    /// The file is too large to be a configuration.
+    #[error(
+        "the configuration `{path}` is larger than {limit} bytes; a mesh belongs into its own file, named by \
+         mesh.file"
+    )]
+    TooLarge {
+        /// The path as given.
+        path: PathBuf,
+        /// Largest size accepted [bytes].
+        limit: u64,
+    },
+    /// The file is not UTF-8.
+    #[error("the configuration `{path}` is not UTF-8 text at byte {offset}; save it as UTF-8")]
+    NotText {
+        /// The path as given.
+        path: PathBuf,
+        /// First byte that is not UTF-8.
+        offset: usize,
+    },
+    /// The text is not a valid configuration.
+    #[error("{0}")]
+    Faults(Box<FaultReport>),
+}

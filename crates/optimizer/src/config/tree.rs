@@ -1,0 +1,206 @@
+//! The parsed text of a configuration: values with their places, and overrides laid over them.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::fault::{Fault, Place};
+use super::source::Document;
+
+/// Keys and values of one table, sorted by key.
+pub(super) type Table = BTreeMap<String, Node>;
+
+/// A value and where it stands.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    /// The value.
+    pub(super) value: Value,
+    /// Place of the value; of the header for a table under `[header]`.
+    pub(super) place: Place,
+    /// Place of the key, or of the value in an array.
+    pub(super) key_place: Place,
+}
+
+/// A TOML value.
+#[derive(Debug, Clone)]
+pub(super) enum Value {
+    Text(String),
+    Integer(i64),
+    Float(f64),
+    Boolean(bool),
+    Date,
+    Array(Vec<Node>),
+    Table(Table),
+}
+
+impl Value {
+    /// What the value is and, where it is short, the value itself.
+    pub(super) fn describe(&self) -> String {
+        match self {
+            Self::Text(text) => format!("the text \"{}\"", text.escape_debug()),
+            Self::Integer(value) => format!("the whole number {value}"),
+            Self::Float(value) => format!("the number {value}"),
+            Self::Boolean(value) => format!("`{value}`"),
+            Self::Date => "a date".to_owned(),
+            Self::Array(items) => format!("a list of {}", items.len()),
+            Self::Table(_) => "a table".to_owned(),
+        }
+    }
+}
+
+/// Parse one text.
+///
+/// # Errors
+/// All syntax errors, each with its place.
+pub(super) fn parse(document: usize, text: &str) -> Result<Table, Vec<Fault>> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    if errors.is_empty() {
+        return Ok(convert_table(document, table.get_ref()));
+    }
+    let fault = |error: &toml::de::Error| Fault {
+        path: String::new(),
+        place: Place { document, span: error.span().unwrap_or(0..0) },
+        message: format!("not valid TOML: {}", error.message().trim().replace('\n', ", ")),
+        expected: None,
+        help: None,
+    };
+    Err(errors.iter().map(fault).collect())
+}
+
+fn convert_table(document: usize, table: &DeTable<'_>) -> Table {
+    let entry = |(key, value): (&Spanned<_>, &Spanned<DeValue<'_>>)| {
+        let key_place = Place { document, span: key.span() };
+        let name: &std::borrow::Cow<'_, str> = key.get_ref();
+        (name.to_string(), convert(document, value, Some(key_place)))
+    };
+    table.iter().map(entry).collect()
+}
+
+fn convert(document: usize, node: &Spanned<DeValue<'_>>, key_place: Option<Place>) -> Node {
+    let value = match node.get_ref() {
+        DeValue::String(text) => Value::Text(text.to_string()),
+        DeValue::Integer(number) => match i64::from_str_radix(number.as_str(), number.radix()) {
+            Ok(value) => Value::Integer(value),
+            // Beyond 64 bits: as a real number it is still finite, and the range of the key decides.
+            Err(_) => Value::Float(number.as_str().parse().unwrap_or(f64::NAN)),
+        },
+        DeValue::Float(number) => Value::Float(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(value) => Value::Boolean(*value),
+        DeValue::Datetime(_) => Value::Date,
+        DeValue::Array(items) => {
+            Value::Array(items.iter().map(|item| convert(document, item, None)).collect())
+        }
+        DeValue::Table(table) => Value::Table(convert_table(document, table)),
+    };
+    let place = Place { document, span: node.span() };
+    let key_place = key_place.unwrap_or_else(|| place.clone());
+    // Tables made by dotted keys have no text of their own.
+    let place = if place.span.is_empty() { key_place.clone() } else { place };
+    Node { value, place, key_place }
+}
+
+/// The place of every value, by key path.
+pub(super) fn places(table: &Table) -> BTreeMap<String, Place> {
+    let mut places = BTreeMap::new();
+    collect_places("", table, &mut places);
+    places
+}
+
+fn collect_places(path: &str, table: &Table, places: &mut BTreeMap<String, Place>) {
+    for (key, node) in table {
+        collect_node(join(path, key), node, places);
+    }
+}
+
+fn collect_node(path: String, node: &Node, places: &mut BTreeMap<String, Place>) {
+    match &node.value {
+        Value::Table(inner) => collect_places(&path, inner, places),
+        Value::Array(items) => {
+            for (index, item) in items.iter().enumerate() {
+                collect_node(format!("{path}[{index}]"), item, places);
+            }
+        }
+        _ => {}
+    }
+    places.insert(path, node.place.clone());
+}
+
+/// `path.key`, or `key` at the top.
+pub(super) fn join(path: &str, key: &str) -> String {
+    if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
+}
+
+/// The TOML line for an override `key=value` as typed: `coils[0].width=30 mm` becomes
+/// `coils.0.width = "30 mm"`.
+///
+/// A value that is not TOML by itself is taken as text, so that a shell needs no second quotes.
+pub(super) fn override_document(typed: &str) -> Document {
+    let (key, value) = typed.split_once('=').unwrap_or((typed, ""));
+    let key = key.trim().replace('[', ".").replace(']', "");
+    let value = value.trim();
+    let plain = format!("{key} = {value}");
+    let is_one_line = !typed.contains(['\n', '\r']);
+    let text = if is_one_line && DeTable::parse(&plain).is_ok() {
+        plain
+    } else {
+        format!("{key} = {}", toml::Value::String(value.to_owned()))
+    };
+    Document { name: format!("--set '{}'", typed.escape_debug()), text }
+}
+
+/// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.
+///
+/// # Errors
+/// When the override goes through something that is not a table or list, or past the end of a list.
+pub(super) fn overlay(base: &mut Table, over: Table, path: &str) -> Result<(), Box<Fault>> {
+    for (key, node) in over {
+        let path = join(path, &key);
+        match base.get_mut(&key) {
+            Some(existing) => overlay_node(existing, node, &path)?,
+            None => {
+                base.insert(key, node);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn overlay_node(existing: &mut Node, node: Node, path: &str) -> Result<(), Box<Fault>> {
+    let fault = |place: &Place, message: String, help: String| {
+        let place = place.clone();
+        Err(Box::new(Fault { path: path.to_owned(), place, message, expected: None, help: Some(help) }))
+    };
+    let Value::Table(inner) = node.value else {
+        *existing = node;
+        return Ok(());
+    };
+    match &mut existing.value {
+        Value::Table(table) => overlay(table, inner, path),
+        Value::Array(items) => {
+            let count = items.len();
+            for (key, node) in inner {
+                let item = key.parse::<usize>().ok().and_then(|index| items.get_mut(index));
+                match item {
+                    Some(item) => overlay_node(item, node, &format!("{path}[{key}]"))?,
+                    None => {
+                        return fault(
+                            &node.key_place,
+                            format!("`{key}` is not the number of an item of `{path}`"),
+                            format!("`{path}` has {count} items, counted from 0: write {path}[0]"),
+                        );
+                    }
+                }
+            }
+            Ok(())
+        }
+        other => {
+            let what = other.describe();
+            fault(
+                &node.key_place,
+                format!("`{path}` is {what} and has no keys"),
+                format!("set `{path}` itself"),
+            )
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! The optimisation loop: NLopt asks, the problem answers, observer and recorder are told.
+//!
+//! * An *evaluation* is one computation of objective and gradient; an *iteration* is an evaluation that improves on the
+//!   best so far (the first counts as none).
+//! * **A mesh that would break is never shown to the method** as NaN, infinity or a penalty: the method is stopped and
+//!   started afresh at the best design, in a box shrunk by [`SHRINK`] towards it, so that the refused design lies
+//!   outside. After [`MAX_RESTARTS`] such restarts the run ends with [`StopReason::MeshLimit`] and the best design.
+//!   Such an attempt has no objective: it is no evaluation and leaves no row in the history, but a warning.
+//! * Limits of evaluations and time are checked before each evaluation, and a signal too: what was computed is kept.
+
+use std::time::Instant;
+
+use fluxmorph_remesh::RemeshError;
+
+use crate::algorithm::{self, Ending, Minimisation};
+use crate::config::Optimizer;
+use crate::error::Error;
+use crate::observer::{Evaluation, Observer};
+use crate::output::StopReason;
+use crate::problem::{Analysis, Problem, Shape, Timings, Want};
+
+/// Share of the distance to the best design that the bounds keep after a broken mesh.
+pub const SHRINK: f64 = 0.5;
+
+/// Restarts in a smaller box before the run ends at the mesh's limit.
+pub const MAX_RESTARTS: usize = 5;
+
+/// Factor on `ftol_rel` after a restart: a method begins with a cautious step, whose small gain is no convergence.
+const RESTART_TOLERANCE: f64 = 0.1;
+
+/// Keeps what is computed.
+pub trait Recorder {
+    /// An evaluation is complete; `improved` where it is the best so far.
+    ///
+    /// # Errors
+    /// When it cannot be kept: the run ends.
+    fn record(
+        &mut self,
+        row: &Evaluation,
+        analysis: &Analysis,
+        problem: &Problem,
+        improved: bool,
+    ) -> Result<(), Error>;
+}
+
+/// Keeps nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unrecorded;
+
+impl Recorder for Unrecorded {
+    fn record(&mut self, _: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
+        Ok(())
+    }
+}
+
+/// The best design of a run.
+#[derive(Debug)]
+pub struct Best {
+    /// Its evaluation.
+    pub evaluation: usize,
+    /// Its variables [m].
+    pub values: Vec<f64>,
+    /// Its objective.
+    pub objective: f64,
+    /// Its field.
+    pub analysis: Analysis,
+}
+
+/// How an optimisation went.
+#[derive(Debug)]
+pub struct Optimised {
+    /// Why it ended.
+    pub stop_reason: StopReason,
+    /// Evaluations done.
+    pub evaluations: usize,
+    /// Evaluations that improved on the best before them.
+    pub iterations: usize,
+    /// The objective at the start.
+    pub initial: f64,
+    /// The best design.
+    pub best: Best,
+    /// Worst quality of the initial mesh.
+    pub initial_quality: f64,
+    /// Largest relative residual of all linear solves.
+    pub worst_residual: f64,
+    /// Where the time went, all evaluations together.
+    pub timings: Timings,
+}
+
+/// What ends the method from inside an evaluation.
+#[derive(Debug)]
+enum Stop {
+    Limit(StopReason),
+    BrokenMesh(String),
+    Error(Box<Error>),
+}
+
+/// Runs the optimisation of a problem with a shape and an objective.
+///
+/// `interrupted` is asked before each evaluation.
+///
+/// # Errors
+/// [`Error`] of the first evaluation that fails for another reason than its mesh. What the recorder kept is whole.
+///
+/// # Panics
+/// If the problem has no shape or no objective.
+pub fn optimise(
+    problem: &Problem,
+    settings: &Optimizer,
+    observer: &mut dyn Observer,
+    recorder: &mut dyn Recorder,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<Optimised, Error> {
+    let shape = problem.shape.as_ref().expect("an optimisation has a shape");
+    let mut run = Run {
+        problem,
+        shape,
+        settings,
+        observer,
+        recorder,
+        interrupted,
+        clock: Instant::now(),
+        round: 0,
+        evaluations: 0,
+        iterations: 0,
+        initial: None,
+        last: shape.initial.clone(),
+        best: None,
+        worst_residual: 0.0,
+        timings: Timings::default(),
+    };
+    let mut minimisation = Minimisation {
+        algorithm: settings.algorithm,
+        lower: shape.lower.clone(),
+        upper: shape.upper.clone(),
+        ftol_rel: settings.ftol_rel,
+        xtol_rel: settings.xtol_rel,
+    };
+    let stop_reason = loop {
+        let start = run.best.as_ref().map_or_else(|| shape.initial.clone(), |best| best.values.clone());
+        let outcome = algorithm::minimise(&minimisation, &start, |p, gradient| run.evaluate(p, gradient));
+        match outcome {
+            algorithm::Outcome::Ended(Ending::Objective) => break StopReason::ObjectiveConverged,
+            algorithm::Outcome::Ended(Ending::Step) => break StopReason::StepConverged,
+            algorithm::Outcome::Failed(cause) => return Err(Error::Optimisation { cause }),
+            algorithm::Outcome::Interrupted(Stop::Limit(reason)) => break reason,
+            algorithm::Outcome::Interrupted(Stop::Error(error)) => return Err(*error),
+            algorithm::Outcome::Interrupted(Stop::BrokenMesh(cause)) => {
+                let Some(best) = &run.best else {
+                    // The initial design itself has no valid mesh: nothing to go back to.
+                    return Err(problem.mesh_of(&shape.initial).err().map_or(
+                        Error::Optimisation { cause: "the initial mesh is below optimizer.minimum_quality" },
+                        Error::from,
+                    ));
+                };
+                if run.round == MAX_RESTARTS {
+                    run.observer.warning(&format!("{cause}; stopped after {MAX_RESTARTS} restarts"));
+                    break StopReason::MeshLimit;
+                }
+                run.round += 1;
+                minimisation.ftol_rel = RESTART_TOLERANCE * settings.ftol_rel;
+                for (k, best) in best.values.iter().enumerate() {
+                    minimisation.lower[k] = best + SHRINK * (minimisation.lower[k] - best);
+                    minimisation.upper[k] = best + SHRINK * (minimisation.upper[k] - best);
+                }
+                run.observer.warning(&format!(
+                    "{cause}; restart {} of {MAX_RESTARTS} from evaluation {} with bounds half as far",
+                    run.round, best.evaluation
+                ));
+            }
+        }
+    };
+    run.finish(stop_reason)
+}
+
+/// The state of one optimisation.
+struct Run<'a> {
+    problem: &'a Problem,
+    shape: &'a Shape,
+    settings: &'a Optimizer,
+    observer: &'a mut dyn Observer,
+    recorder: &'a mut dyn Recorder,
+    interrupted: &'a dyn Fn() -> bool,
+    clock: Instant,
+    round: usize,
+    evaluations: usize,
+    iterations: usize,
+    initial: Option<(f64, f64)>,
+    last: Vec<f64>,
+    best: Option<Best>,
+    worst_residual: f64,
+    timings: Timings,
+}
+
+impl Run<'_> {
+    /// F/F0 of a design; fills its gradient.
+    fn evaluate(&mut self, p: &[f64], gradient: &mut [f64]) -> Result<f64, Stop> {
+        self.check_limits()?;
+        let clock = Instant::now();
+        let (mesh, displacement) = self.problem.mesh_of(p).map_err(|error| match error {
+            RemeshError::Inverted { .. } => Stop::BrokenMesh(error.to_string()),
+            other => Stop::Error(Box::new(other.into())),
+        })?;
+        let quality = self.problem.quality(&mesh);
+        if quality.worst < self.settings.minimum_quality {
+            return Err(Stop::BrokenMesh(format!(
+                "element {} would have the quality {:.4}, below optimizer.minimum_quality = {}",
+                quality.worst_element, quality.worst, self.settings.minimum_quality
+            )));
+        }
+        let remesh = clock.elapsed().as_secs_f64();
+        let mut analysis = self
+            .problem
+            .analyse(mesh, displacement, Want::Gradient)
+            .map_err(|error| Stop::Error(Box::new(error)))?;
+        analysis.timings.remesh += remesh;
+        let value = analysis.objective.expect("an optimisation has an objective");
+        let derivative = analysis.gradient.as_ref().expect("a gradient was asked for");
+        let initial = *self.initial.get_or_insert((value, analysis.quality.worst));
+        if initial.0 <= 0.0 {
+            return Err(Stop::Error(Box::new(Error::Optimisation {
+                cause: "the objective of the initial design is zero: there is no field to reduce; check coils and regions",
+            })));
+        }
+        for (g, d) in gradient.iter_mut().zip(derivative) {
+            *g = d / initial.0;
+        }
+        self.keep(p, value, initial.0, analysis, clock.elapsed().as_secs_f64())
+            .map_err(|error| Stop::Error(Box::new(error)))?;
+        Ok(value / initial.0)
+    }
+
+    fn check_limits(&self) -> Result<(), Stop> {
+        if (self.interrupted)() {
+            return Err(Stop::Limit(StopReason::Interrupted));
+        }
+        if self.evaluations == self.settings.max_evaluations {
+            return Err(Stop::Limit(StopReason::MaxEvaluations));
+        }
+        let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
+        if self.evaluations > 0 && self.settings.max_time.is_some_and(over) {
+            return Err(Stop::Limit(StopReason::MaxTime));
+        }
+        Ok(())
+    }
+
+    /// Counts an evaluation, tells observer and recorder, and remembers the best.
+    fn keep(
+        &mut self,
+        p: &[f64],
+        value: f64,
+        initial: f64,
+        analysis: Analysis,
+        seconds: f64,
+    ) -> Result<(), Error> {
+        let improved = self.best.as_ref().is_none_or(|best| value < best.objective);
+        if improved && self.best.is_some() {
+            self.iterations += 1;
+        }
+        let thickness =
+            self.shape.thickness.as_ref().map(|thickness| thickness.range(&self.shape.surface.heights(p)));
+        let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
+        let row = Evaluation {
+            evaluation: self.evaluations,
+            iteration: self.iterations,
+            objective: value,
+            ratio: value / initial,
+            gradient_norm: euclidean(analysis.gradient.as_deref().unwrap_or_default()),
+            step_norm: euclidean(&difference),
+            worst_quality: analysis.quality.worst,
+            min_thickness_m: thickness.map(|t| t.0),
+            max_thickness_m: thickness.map(|t| t.1),
+            linear_iterations: analysis.linear_iterations,
+            seconds,
+            round: self.round,
+        };
+        self.evaluations += 1;
+        self.last = p.to_vec();
+        self.worst_residual = self.worst_residual.max(analysis.worst_residual);
+        self.timings += analysis.timings;
+        self.recorder.record(&row, &analysis, self.problem, improved)?;
+        self.observer.evaluation(&row);
+        if improved {
+            self.best =
+                Some(Best { evaluation: row.evaluation, values: p.to_vec(), objective: value, analysis });
+        }
+        Ok(())
+    }
+
+    fn finish(self, stop_reason: StopReason) -> Result<Optimised, Error> {
+        let (Some(best), Some((initial, initial_quality))) = (self.best, self.initial) else {
+            return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
+        };
+        Ok(Optimised {
+            stop_reason,
+            evaluations: self.evaluations,
+            iterations: self.iterations,
+            initial,
+            best,
+            initial_quality,
+            worst_residual: self.worst_residual,
+            timings: self.timings,
+        })
+    }
+}
+
+fn euclidean(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}

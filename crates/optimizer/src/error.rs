@@ -1,0 +1,77 @@
+//! What can go wrong in a command, and its exit code.
+
+use fluxmorph_geometry::MeshError;
+use fluxmorph_remesh::RemeshError;
+use fluxmorph_solver::SolverError;
+
+use crate::cli::ExitCode;
+use crate::config::ConfigError;
+use crate::output::{DesignFileError, OutputError};
+
+/// Errors of this crate.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The configuration is wrong.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The mesh is wrong.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The field problem is wrong, or cannot be solved.
+    #[error(transparent)]
+    Solver(#[from] SolverError),
+    /// The mesh cannot follow the design.
+    #[error(transparent)]
+    Remesh(#[from] RemeshError),
+    /// A file with a design is wrong.
+    #[error(transparent)]
+    Design(#[from] DesignFileError),
+    /// A file cannot be written or read.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The optimisation method refuses or fails.
+    #[error("the optimisation failed: {cause}")]
+    Optimisation {
+        /// What it said.
+        cause: &'static str,
+    },
+    /// The gradient does not match the objective.
+    #[error("the gradient certificate does not hold: {cause}")]
+    Certificate {
+        /// Which of its tests fails.
+        cause: String,
+    },
+    /// A pool of threads cannot be made.
+    #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// What the system said.
+        cause: String,
+    },
+}
+
+impl Error {
+    /// The exit code of a command that fails with this error.
+    pub fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
+                ExitCode::Files
+            }
+            Self::Output(_) => ExitCode::Files,
+            Self::Mesh(mesh)
+            | Self::Solver(SolverError::Mesh(mesh))
+            | Self::Remesh(RemeshError::Mesh(mesh)) => match mesh {
+                MeshError::Factorisation { .. } => ExitCode::Numerical,
+                MeshError::File { .. } => ExitCode::Files,
+                _ => ExitCode::Configuration,
+            },
+            Self::Solver(SolverError::NotConverged { .. } | SolverError::NotFinite { .. })
+            | Self::Optimisation { .. }
+            | Self::Certificate { .. } => ExitCode::Numerical,
+            Self::Config(_) | Self::Solver(_) | Self::Remesh(_) | Self::Design(_) => ExitCode::Configuration,
+            Self::Threads { .. } => ExitCode::Usage,
+        }
+    }
+}

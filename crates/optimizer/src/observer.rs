@@ -1,0 +1,265 @@
+//! Who watches a run: the driver tells what happens, an observer shows it.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::output::RunResult;
+
+/// One evaluation of objective and gradient; a row of the history.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Number of the evaluation, from 0.
+    pub evaluation: usize,
+    /// Evaluations so far that improved on the best before them; the first counts as 0.
+    pub iteration: usize,
+    /// The objective, unscaled.
+    pub objective: f64,
+    /// The objective over that of evaluation 0.
+    pub ratio: f64,
+    /// Euclidean norm of the gradient with respect to the design variables [objective / m].
+    pub gradient_norm: f64,
+    /// Euclidean norm of the change of the design variables since the evaluation before [m].
+    pub step_norm: f64,
+    /// Worst quality of an element (Eq. 4).
+    pub worst_quality: f64,
+    /// Least thickness of the moved body along the direction of motion [m]; `None` where it has none.
+    pub min_thickness_m: Option<f64>,
+    /// Greatest thickness [m].
+    pub max_thickness_m: Option<f64>,
+    /// Iterations of the linear solver, state and adjoint.
+    pub linear_iterations: usize,
+    /// Wall time of the evaluation [s].
+    pub seconds: f64,
+    /// Restarts of the method so far, each in a smaller box (see [`crate::driver`]).
+    pub round: usize,
+}
+
+impl Evaluation {
+    /// The columns of `history.csv`.
+    pub const COLUMNS: [&'static str; 12] = [
+        "evaluation",
+        "iteration",
+        "objective",
+        "ratio",
+        "gradient_norm",
+        "step_norm",
+        "worst_quality",
+        "min_thickness_m",
+        "max_thickness_m",
+        "linear_iterations",
+        "seconds",
+        "round",
+    ];
+}
+
+/// What is known when a run starts.
+#[derive(Debug, Clone, Copy)]
+pub struct Started<'a> {
+    /// Title of the configuration.
+    pub title: &'a str,
+    /// Algorithm of the optimisation; `None` for a single analysis.
+    pub algorithm: Option<&'a str>,
+    /// Design variables.
+    pub variables: usize,
+    /// Nodes of the mesh.
+    pub nodes: usize,
+    /// Tetrahedra of the mesh.
+    pub tets: usize,
+    /// Unknowns of the field problem.
+    pub unknowns: usize,
+    /// The run directory; `None` when nothing is written.
+    pub directory: Option<&'a Path>,
+}
+
+/// Is told what happens during a run. Every method does nothing unless it is overridden.
+pub trait Observer {
+    /// The problem is set up.
+    fn started(&mut self, started: &Started<'_>) {
+        let _ = started;
+    }
+
+    /// A long part of the work begins, in a few words: `assembling`.
+    fn phase(&mut self, name: &str) {
+        let _ = name;
+    }
+
+    /// An evaluation is complete.
+    fn evaluation(&mut self, evaluation: &Evaluation) {
+        let _ = evaluation;
+    }
+
+    /// Something the user should know; the run goes on.
+    fn warning(&mut self, message: &str) {
+        let _ = message;
+    }
+
+    /// The run has ended.
+    fn finished(&mut self, result: &RunResult) {
+        let _ = result;
+    }
+}
+
+/// Shows nothing.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Silent;
+
+impl Observer for Silent {}
+
+/// Shows one plain line for each evaluation, and a summary.
+#[derive(Debug)]
+pub struct Console<W> {
+    writer: W,
+    header_is_shown: bool,
+}
+
+impl Console<std::io::Stderr> {
+    /// On standard error.
+    pub fn stderr() -> Self {
+        Self::new(std::io::stderr())
+    }
+}
+
+impl<W: Write> Console<W> {
+    /// On any writer.
+    pub fn new(writer: W) -> Self {
+        Self { writer, header_is_shown: false }
+    }
+
+    /// A message that cannot be shown, as on a closed terminal, is no reason to stop a run.
+    fn line(&mut self, text: &str) {
+        let _ = writeln!(self.writer, "{text}").and_then(|()| self.writer.flush());
+    }
+}
+
+impl<W: Write> Observer for Console<W> {
+    fn started(&mut self, started: &Started<'_>) {
+        self.line(started.title);
+        let Started { nodes, tets, unknowns, .. } = started;
+        self.line(&format!("mesh: {nodes} nodes, {tets} tetrahedra, {unknowns} unknowns"));
+        if let Some(algorithm) = started.algorithm {
+            self.line(&format!("optimisation: {} design variables, {algorithm}", started.variables));
+        }
+        if let Some(directory) = started.directory {
+            self.line(&format!("writing to {}", directory.display()));
+        }
+    }
+
+    fn evaluation(&mut self, row: &Evaluation) {
+        if !self.header_is_shown {
+            self.header_is_shown = true;
+            self.line(&format!(
+                "{:>4} {:>4} {:>13} {:>8} {:>9} {:>9} {:>8} {:>15} {:>6} {:>7}",
+                "eval", "iter", "F", "F/F0", "|dF/dp|", "step mm", "quality", "thickness mm", "linear", "s"
+            ));
+        }
+        let thickness = match (row.min_thickness_m, row.max_thickness_m) {
+            (Some(least), Some(most)) => format!("{:.2} .. {:.2}", least * 1e3, most * 1e3),
+            _ => "-".to_owned(),
+        };
+        self.line(&format!(
+            "{:>4} {:>4} {:>13.6e} {:>8.5} {:>9.2e} {:>9.3} {:>8.4} {:>15} {:>6} {:>7.2}",
+            row.evaluation,
+            row.iteration,
+            row.objective,
+            row.ratio,
+            row.gradient_norm,
+            row.step_norm * 1e3,
+            row.worst_quality,
+            thickness,
+            row.linear_iterations,
+            row.seconds,
+        ));
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.line(&format!("warning: {message}"));
+    }
+
+    fn finished(&mut self, result: &RunResult) {
+        self.line("");
+        let mut row = |name: &str, text: String| self.line(&format!("{name:<22} {text}"));
+        row("ended", result.stop_reason.describe().to_owned());
+        if let Some(objective) = &result.objective {
+            let evaluation = format!("at evaluation {}", objective.best_evaluation);
+            row("objective, initial", format!("{:.6e}", objective.initial));
+            row("objective, best", format!("{:.6e} {evaluation}", objective.best));
+            row("F/F0", format!("{:.5}", objective.ratio));
+        }
+        row("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations));
+        let mesh = &result.mesh;
+        row(
+            "worst quality",
+            format!("{:.4}, was {:.4}", mesh.worst_quality_final, mesh.worst_quality_initial),
+        );
+        for (region, loss) in &result.losses_w {
+            row("loss", format!("{loss:.6e} W in {region}"));
+        }
+        row("worst residual", format!("{:.1e}", result.linear_solver.worst_residual));
+        if let Some(total) = result.timings_s.get("total") {
+            row("time", format!("{total:.1} s"));
+        }
+        row("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn evaluation(number: usize) -> Evaluation {
+        Evaluation {
+            evaluation: number,
+            iteration: number,
+            objective: 1.2e-4,
+            ratio: 0.51,
+            gradient_norm: 3.0,
+            step_norm: 0.004,
+            worst_quality: 0.1,
+            min_thickness_m: Some(0.005),
+            max_thickness_m: Some(0.03),
+            linear_iterations: 40,
+            seconds: 1.0,
+            round: 0,
+        }
+    }
+
+    #[test]
+    fn the_console_shows_one_header_and_aligned_rows() {
+        let mut bytes = Vec::new();
+        let mut console = Console::new(&mut bytes);
+        for number in [0, 10, 999] {
+            console.evaluation(&evaluation(number));
+        }
+        let text = String::from_utf8(bytes).expect("text");
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!(lines.len(), 4, "{text}");
+        assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{text}");
+        assert!(lines[1].contains("5.00 .. 30.00") && lines[1].contains("0.51000"), "{text}");
+    }
+
+    #[test]
+    fn the_summary_names_the_outcome() {
+        let mut bytes = Vec::new();
+        Console::new(&mut bytes).finished(&crate::output::example_result());
+        let text = String::from_utf8(bytes).expect("text");
+        for fragment in ["the objective has converged", "F/F0", "0.50000", "8 (7 iterations)", "in plate"] {
+            assert!(text.contains(fragment), "{fragment}\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_closed_writer_is_no_reason_to_stop() {
+        struct Closed;
+        impl Write for Closed {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::BrokenPipe.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Err(std::io::ErrorKind::BrokenPipe.into())
+            }
+        }
+        Console::new(Closed).evaluation(&evaluation(0));
+    }
+}

@@ -1,0 +1,106 @@
+//! Reads a design: a `result.json`, or a JSON array of lengths in metres.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+/// Largest design file that is read [bytes]: a million variables with their points.
+const LARGEST: u64 = 256 * 1024 * 1024;
+
+/// Why a file is not a design.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DesignFileError {
+    /// The file cannot be read.
+    #[error(
+        "cannot read the design `{path}`: {source}; give a result.json or a JSON array of lengths in metres"
+    )]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: std::io::Error,
+    },
+    /// The file holds something else.
+    #[error("`{path}` is not a design: {message}; give a result.json or a JSON array of lengths in metres")]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The design does not fit the problem.
+    #[error("the design `{path}` has {found} values, but the problem has {expected} design variables")]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Values in the file.
+        found: usize,
+        /// Values needed.
+        expected: usize,
+    },
+}
+
+/// The design variables in a file [m]; there must be `expected` of them.
+///
+/// # Errors
+/// When the file cannot be read, is no design, or has another number of values.
+pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileError> {
+    let content = |message: String| DesignFileError::Content { path: path.to_owned(), message };
+    let unreadable = |source| DesignFileError::Read { path: path.to_owned(), source };
+    let size = std::fs::metadata(path).map_err(unreadable)?.len();
+    if size > LARGEST {
+        return Err(content(format!("{size} bytes are more than {LARGEST}")));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    let value: Value = serde_json::from_slice(&bytes).map_err(|error| content(error.to_string()))?;
+    let list = match &value {
+        Value::Object(_) => value.pointer("/design/values_m"),
+        other => Some(other),
+    };
+    let Some(Value::Array(list)) = list else {
+        return Err(content("it has no list `design.values_m`".to_owned()));
+    };
+    let number = |(index, item): (usize, &Value)| {
+        item.as_f64().ok_or_else(|| content(format!("item {index} is {item}, not a number")))
+    };
+    let values = list.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
+    if values.len() != expected {
+        return Err(DesignFileError::Count { path: path.to_owned(), found: values.len(), expected });
+    }
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_forms_are_read_and_the_rest_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("design.json");
+        let read = |text: &str| {
+            std::fs::write(&path, text).expect("written");
+            read_design(&path, 2).map_err(|error| error.to_string())
+        };
+        assert_eq!(read("[0.01, -5e-3]"), Ok(vec![0.01, -5e-3]));
+        assert_eq!(read(r#"{"design": {"values_m": [1, 2.5]}}"#), Ok(vec![1.0, 2.5]));
+        let cases = [
+            ("[0.01]", "has 1 values, but the problem has 2"),
+            ("[0.01, null]", "item 1 is null"),
+            ("[0.01, \"5 mm\"]", "item 1 is \"5 mm\""),
+            ("{}", "no list `design.values_m`"),
+            ("5", "no list"),
+            ("[1e999, 0]", "number out of range"),
+            ("[1, ", "line 1"),
+        ];
+        for (text, fragment) in cases {
+            let message = read(text).expect_err(text);
+            assert!(message.contains(fragment), "{text}: {message}");
+        }
+        assert!(matches!(
+            read_design(folder.path().join("none").as_path(), 1),
+            Err(DesignFileError::Read { .. })
+        ));
+    }
+}

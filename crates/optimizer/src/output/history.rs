@@ -1,0 +1,109 @@
+//! `history.csv` and `history.jsonl`: one row an evaluation, on the disk before the next evaluation starts.
+
+use serde_json::Value;
+
+use super::{OutputError, RunDirectory, SyncedLog};
+use crate::observer::Evaluation;
+
+/// Both history files of a run.
+#[derive(Debug)]
+pub struct History {
+    csv: SyncedLog,
+    jsonl: SyncedLog,
+}
+
+impl History {
+    /// Start both files, the table with its header.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn create(directory: &RunDirectory) -> Result<Self, OutputError> {
+        let mut csv = SyncedLog::create(&directory.history_csv())?;
+        csv.append(&Evaluation::COLUMNS.join(","))?;
+        Ok(Self { csv, jsonl: SyncedLog::create(&directory.history_jsonl())? })
+    }
+
+    /// Go on with the files of an earlier run.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn reopen(directory: &RunDirectory) -> Result<Self, OutputError> {
+        Ok(Self {
+            csv: SyncedLog::reopen(&directory.history_csv())?,
+            jsonl: SyncedLog::reopen(&directory.history_jsonl())?,
+        })
+    }
+
+    /// Append one evaluation to both files, and wait until it is on the disk.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn append(&mut self, evaluation: &Evaluation) -> Result<(), OutputError> {
+        self.csv.append(&csv_line(evaluation))?;
+        let line = serde_json::to_string(evaluation).expect("numbers and text have a JSON form");
+        self.jsonl.append(&line)
+    }
+}
+
+/// The row of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
+/// the device does not have.
+pub fn csv_line(evaluation: &Evaluation) -> String {
+    let value = serde_json::to_value(evaluation).expect("numbers and text have a JSON form");
+    let cell = |column: &&str| match &value[*column] {
+        Value::Null => String::new(),
+        other => other.to_string(),
+    };
+    Evaluation::COLUMNS.iter().map(cell).collect::<Vec<_>>().join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::OlderRun;
+
+    fn evaluation() -> Evaluation {
+        Evaluation {
+            evaluation: 3,
+            iteration: 2,
+            objective: 0.1 + 0.2,
+            ratio: 1.0,
+            gradient_norm: 1.25e-300,
+            step_norm: 0.0,
+            worst_quality: 0.104,
+            min_thickness_m: Some(0.005),
+            max_thickness_m: None,
+            linear_iterations: 57,
+            seconds: 4.2,
+            round: 0,
+        }
+    }
+
+    #[test]
+    fn rows_have_the_documented_columns_and_exact_numbers() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run = RunDirectory::create(folder.path(), OlderRun::Keep).expect("a run directory");
+        let mut history = History::create(&run).expect("created");
+        history.append(&evaluation()).expect("appended");
+        drop(history);
+        History::reopen(&run).and_then(|mut history| history.append(&evaluation())).expect("appended");
+
+        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,0\n";
+        let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
+                      min_thickness_m,max_thickness_m,linear_iterations,seconds,round\n";
+        let csv = std::fs::read_to_string(run.history_csv()).expect("read");
+        assert_eq!(csv, format!("{header}{row}{row}"));
+
+        let jsonl = std::fs::read_to_string(run.history_jsonl()).expect("read");
+        assert_eq!(jsonl.lines().count(), 2);
+        for line in jsonl.lines() {
+            assert_eq!(serde_json::from_str::<Evaluation>(line).expect("an evaluation"), evaluation());
+        }
+    }
+
+    #[test]
+    fn every_column_is_a_field_and_every_field_a_column() {
+        let value = serde_json::to_value(evaluation()).expect("an object");
+        let keys: Vec<_> = value.as_object().expect("an object").keys().cloned().collect();
+        assert_eq!(keys, Evaluation::COLUMNS);
+    }
+}

@@ -1,0 +1,199 @@
+//! `manifest.json`: what was run, on what, and how it ended. Written first, completed last.
+
+use std::path::Path;
+use std::time::SystemTime;
+
+use serde::{Deserialize, Serialize};
+
+use super::process::{hostname, utc_timestamp};
+use super::{OutputError, RunDirectory, write_atomic};
+
+/// The mark by which a run directory is known as ours.
+const PROGRAM: &str = "fluxmorph";
+
+/// Largest manifest that is read [bytes]: a file of this name in a foreign folder may be anything.
+const LARGEST: u64 = 1024 * 1024;
+
+/// The manifest of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Always `fluxmorph`.
+    pub program: String,
+    /// Version of this file's form.
+    pub schema_version: u32,
+    /// Version of the program.
+    pub version: String,
+    /// Command of the command line.
+    pub command: String,
+    /// How far the run is.
+    pub status: RunStatus,
+    /// The configuration.
+    pub config: Option<FileHash>,
+    /// Overrides of the command line, as TOML lines.
+    pub overrides: Vec<String>,
+    /// The mesh.
+    pub mesh: Option<MeshHash>,
+    /// The machine.
+    pub host: Host,
+    /// Threads used.
+    pub threads: usize,
+    /// Start, UTC.
+    pub started: String,
+    /// End, UTC.
+    pub finished: Option<String>,
+    /// Time from start to end [s].
+    pub seconds: Option<f64>,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunStatus {
+    /// Started, and not ended in order yet.
+    Running,
+    /// Reached what it was for.
+    Converged,
+    /// A single analysis is complete.
+    Done,
+    /// Stopped at a limit; the results are valid.
+    Stopped,
+    /// Stopped by a signal.
+    Interrupted,
+    /// Broken off by an error.
+    Failed,
+}
+
+/// A file and its content.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileHash {
+    /// The path as given.
+    pub path: String,
+    /// BLAKE3 of the bytes, hexadecimal.
+    pub blake3: String,
+}
+
+/// The mesh of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct MeshHash {
+    /// The path of its file, or the name of its generator.
+    pub origin: String,
+    /// BLAKE3 of the file, or of the generated points and tetrahedra; hexadecimal.
+    pub blake3: String,
+    /// Nodes.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tets: usize,
+}
+
+/// The machine of a run.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Host {
+    /// Its name.
+    pub name: String,
+    /// Operating system.
+    pub system: String,
+    /// Processor architecture.
+    pub architecture: String,
+    /// Threads it can run at once.
+    pub parallelism: usize,
+}
+
+impl Host {
+    /// This machine.
+    pub fn this() -> Self {
+        Self {
+            name: hostname(),
+            system: std::env::consts::OS.to_owned(),
+            architecture: std::env::consts::ARCH.to_owned(),
+            parallelism: std::thread::available_parallelism().map_or(1, usize::from),
+        }
+    }
+}
+
+impl Manifest {
+    /// The manifest of a run that starts now.
+    pub fn started(command: &str, threads: usize) -> Self {
+        Self {
+            program: PROGRAM.to_owned(),
+            schema_version: 1,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: command.to_owned(),
+            status: RunStatus::Running,
+            config: None,
+            overrides: Vec::new(),
+            mesh: None,
+            host: Host::this(),
+            threads,
+            started: utc_timestamp(SystemTime::now()),
+            finished: None,
+            seconds: None,
+        }
+    }
+
+    /// Fill in how the run ended, now; `seconds` is its duration [s].
+    pub fn complete(&mut self, status: RunStatus, seconds: f64) {
+        self.status = status;
+        self.finished = Some(utc_timestamp(SystemTime::now()));
+        self.seconds = Some(seconds);
+    }
+
+    /// Whether the file was written by this program.
+    pub fn is_ours(&self) -> bool {
+        self.program == PROGRAM
+    }
+
+    /// Write the manifest into a run directory, replacing an older one.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
+        write_atomic(&directory.manifest(), &super::result::to_json(self))
+    }
+
+    /// Read a manifest.
+    ///
+    /// # Errors
+    /// When there is none, or it is none of ours.
+    pub fn read(path: &Path) -> Result<Self, OutputError> {
+        let damaged = |message: String| OutputError::Damaged { path: path.to_owned(), message };
+        let size = std::fs::metadata(path).map_err(OutputError::io("read", path))?.len();
+        if size > LARGEST {
+            return Err(damaged(format!("{size} bytes are too many for a manifest")));
+        }
+        let bytes = std::fs::read(path).map_err(OutputError::io("read", path))?;
+        serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))
+    }
+}
+
+/// BLAKE3 of some bytes, hexadecimal.
+pub fn blake3_hex(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::OlderRun;
+
+    #[test]
+    fn a_manifest_is_written_first_and_completed_last() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run = RunDirectory::create(folder.path(), OlderRun::Keep).expect("a run directory");
+        let mut manifest = Manifest::started("run", 2);
+        manifest.config = Some(FileHash { path: "a.toml".into(), blake3: blake3_hex(b"") });
+        manifest.write(&run).expect("written");
+        let read = Manifest::read(&run.manifest()).expect("read");
+        assert_eq!((read.status, read.finished.as_deref()), (RunStatus::Running, None));
+
+        manifest.complete(RunStatus::Converged, 1.5);
+        manifest.write(&run).expect("written");
+        assert_eq!(Manifest::read(&run.manifest()).expect("read"), manifest);
+        let text = std::fs::read_to_string(run.manifest()).expect("read");
+        assert!(
+            text.contains("\"program\": \"fluxmorph\"") && text.contains("\"status\": \"converged\""),
+            "{text}"
+        );
+        // The published BLAKE3 of nothing.
+        assert!(text.contains("af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262"), "{text}");
+    }
+}

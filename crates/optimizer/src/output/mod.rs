@@ -1,0 +1,95 @@
+//! The layer through which everything is written: whole files, the history, and the run directory.
+
+mod design_file;
+mod files;
+mod history;
+mod manifest;
+mod process;
+mod result;
+mod run_directory;
+
+use std::path::PathBuf;
+
+pub use design_file::{DesignFileError, read_design};
+pub use files::{SyncedLog, write_atomic, write_atomic_with};
+pub use history::{History, csv_line};
+pub use manifest::{FileHash, Host, Manifest, MeshHash, RunStatus, blake3_hex};
+pub use process::{hostname, peak_memory_bytes, utc_timestamp};
+pub use result::{
+    DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult, StopReason,
+};
+pub use run_directory::{OlderRun, RunDirectory};
+
+/// Why something could not be written or read back.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The output directory holds something that is not a run of this program.
+    #[error(
+        "the output directory `{path}` is not empty and holds no run of fluxmorph; nothing in it was touched: \
+         choose an empty or new directory with --out or output.directory"
+    )]
+    NotOurs {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The output directory holds an earlier run, which was not to be replaced.
+    #[error(
+        "the output directory `{path}` holds an earlier run; replace it with --force, or choose another \
+         directory with --out"
+    )]
+    HoldsRun {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The output directory is something else.
+    #[error("the output directory `{path}` is a file; choose a directory with --out or output.directory")]
+    NotADirectory {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A file of a run does not hold what it should.
+    #[error("`{path}` is damaged: {message}; it must be a file as fluxmorph wrote it")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} `{path}`: {source}; {}", advice(.source))]
+    Io {
+        /// What was tried: a verb.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The cause.
+        source: std::io::Error,
+    },
+}
+
+/// What to do about an error of the operating system.
+fn advice(error: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "choose a directory you may write to with --out"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "free some space, or keep fewer files with output.fields"
+        }
+        ErrorKind::NotFound => "check that the path exists",
+        _ => "check the path and the disk",
+    }
+}
+
+impl OutputError {
+    /// Turns an error of the operating system into one that names the path, for `map_err`.
+    pub(crate) fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { action, path, source }
+    }
+}
+
+#[cfg(test)]
+pub(crate) use result::tests::example as example_result;

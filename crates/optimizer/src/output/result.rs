@@ -1,0 +1,237 @@
+//! `result.json`: what a run or a single analysis found.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::manifest::RunStatus;
+use super::{OutputError, RunDirectory, write_atomic};
+use crate::cli::ExitCode;
+
+/// The content of `result.json`. Keys carry their unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunResult {
+    /// Version of this file's form: 1.
+    pub schema_version: u32,
+    /// `run` or `solve`.
+    pub command: String,
+    /// How it ended.
+    pub status: RunStatus,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+    /// Evaluations of the objective.
+    pub evaluations: usize,
+    /// Evaluations that improved on the best so far.
+    pub iterations: usize,
+    /// The objective; `None` when the configuration has none.
+    pub objective: Option<ObjectiveResult>,
+    /// The best design; `None` when the configuration has none.
+    pub design: Option<DesignResult>,
+    /// The mesh.
+    pub mesh: MeshResult,
+    /// The field at the probes.
+    pub probes: Vec<ProbeResult>,
+    /// Eddy-current loss by region, of the meshed part [W].
+    pub losses_w: BTreeMap<String, f64>,
+    /// The linear systems.
+    pub linear_solver: LinearSolverResult,
+    /// Wall time by part, with `total` [s].
+    pub timings_s: BTreeMap<String, f64>,
+    /// Most memory held [bytes].
+    pub peak_memory_bytes: u64,
+}
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The objective changed by less than `ftol_rel`.
+    ObjectiveConverged,
+    /// The design changed by less than `xtol_rel`.
+    StepConverged,
+    /// `max_evaluations` was reached.
+    MaxEvaluations,
+    /// `max_time` was reached.
+    MaxTime,
+    /// A signal arrived.
+    Interrupted,
+    /// The mesh allows no further step.
+    MeshLimit,
+    /// A single analysis is complete.
+    Done,
+}
+
+impl StopReason {
+    /// The status of a run that ended for this reason.
+    pub fn status(self) -> RunStatus {
+        match self {
+            Self::ObjectiveConverged | Self::StepConverged => RunStatus::Converged,
+            Self::MaxEvaluations | Self::MaxTime | Self::MeshLimit => RunStatus::Stopped,
+            Self::Interrupted => RunStatus::Interrupted,
+            Self::Done => RunStatus::Done,
+        }
+    }
+
+    /// The exit code of a run that ended for this reason.
+    pub fn exit_code(self) -> ExitCode {
+        match self.status() {
+            RunStatus::Converged | RunStatus::Done => ExitCode::Success,
+            RunStatus::Interrupted => ExitCode::Interrupted,
+            _ => ExitCode::Stopped,
+        }
+    }
+
+    /// In words, for the summary.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::ObjectiveConverged => "the objective has converged",
+            Self::StepConverged => "the design has converged",
+            Self::MaxEvaluations => "all evaluations are used",
+            Self::MaxTime => "the time is over",
+            Self::Interrupted => "interrupted",
+            Self::MeshLimit => "the mesh allows no further step",
+            Self::Done => "done",
+        }
+    }
+}
+
+/// The objective of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectiveResult {
+    /// At the initial design.
+    pub initial: f64,
+    /// At the best design.
+    pub best: f64,
+    /// `best / initial`.
+    pub ratio: f64,
+    /// The evaluation of the best design.
+    pub best_evaluation: usize,
+}
+
+/// The best design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DesignResult {
+    /// The variables [m].
+    pub values_m: Vec<f64>,
+    /// Their lower bounds [m].
+    pub lower_m: Vec<f64>,
+    /// Their upper bounds [m].
+    pub upper_m: Vec<f64>,
+    /// Where they act on the undeformed mesh [m].
+    pub points_m: Vec<[f64; 3]>,
+}
+
+/// The mesh of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MeshResult {
+    /// Nodes.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tets: usize,
+    /// Unknowns of the field problem.
+    pub unknowns: usize,
+    /// Worst quality (Eq. 4) of the initial mesh.
+    pub worst_quality_initial: f64,
+    /// Worst quality of the mesh of the best design.
+    pub worst_quality_final: f64,
+}
+
+/// The field at the points of one probe, shapes `(n_points, 3)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProbeResult {
+    /// The probe's name.
+    pub name: String,
+    /// The points [m].
+    pub points_m: Vec<[f64; 3]>,
+    /// Real part of B [T].
+    pub b_re_t: Vec<[f64; 3]>,
+    /// Imaginary part of B [T].
+    pub b_im_t: Vec<[f64; 3]>,
+}
+
+/// The linear systems of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinearSolverResult {
+    /// Largest relative residual of any accepted solution.
+    pub worst_residual: f64,
+}
+
+impl RunResult {
+    /// Write `result.json`.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
+        write_atomic(&directory.result(), &self.to_json())
+    }
+
+    /// The file's content.
+    pub fn to_json(&self) -> Vec<u8> {
+        to_json(self)
+    }
+}
+
+/// Indented JSON with a line break at the end.
+pub(super) fn to_json(value: &impl Serialize) -> Vec<u8> {
+    let mut bytes = serde_json::to_vec_pretty(value).expect("structs of numbers and text have a JSON form");
+    bytes.push(b'\n');
+    bytes
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn example() -> RunResult {
+        RunResult {
+            schema_version: 1,
+            command: "run".into(),
+            status: RunStatus::Converged,
+            stop_reason: StopReason::ObjectiveConverged,
+            evaluations: 8,
+            iterations: 7,
+            objective: Some(ObjectiveResult { initial: 2.0, best: 1.0, ratio: 0.5, best_evaluation: 7 }),
+            design: Some(DesignResult {
+                values_m: vec![0.02],
+                lower_m: vec![-0.005],
+                upper_m: vec![0.02],
+                points_m: vec![[0.0, 0.0, -0.01]],
+            }),
+            mesh: MeshResult {
+                nodes: 100,
+                tets: 400,
+                unknowns: 350,
+                worst_quality_initial: 0.48,
+                worst_quality_final: 0.1,
+            },
+            probes: vec![],
+            losses_w: [("plate".to_owned(), 12.5)].into(),
+            linear_solver: LinearSolverResult { worst_residual: 1e-11 },
+            timings_s: [("total".to_owned(), 12.0)].into(),
+            peak_memory_bytes: 1 << 20,
+        }
+    }
+
+    #[test]
+    fn a_result_has_the_keys_of_the_contract_and_reads_back() {
+        let bytes = example().to_json();
+        let value: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+        let contract: &[(&str, &[&str])] = &[
+            ("", &["schema_version", "command", "evaluations", "iterations", "probes", "peak_memory_bytes"]),
+            ("/objective", &["initial", "best", "ratio", "best_evaluation"]),
+            ("/design", &["values_m", "lower_m", "upper_m", "points_m"]),
+            ("/mesh", &["nodes", "tets", "unknowns", "worst_quality_initial", "worst_quality_final"]),
+            ("/losses_w", &["plate"]),
+            ("/linear_solver", &["worst_residual"]),
+            ("/timings_s", &["total"]),
+        ];
+        for (pointer, keys) in contract {
+            let object = value.pointer(pointer).expect("an object");
+            assert!(keys.iter().all(|key| object.get(key).is_some()), "{pointer}: {object}");
+        }
+        assert_eq!(value["status"], "converged");
+        assert_eq!(value["stop_reason"], "objective_converged");
+        assert_eq!(serde_json::from_slice::<RunResult>(&bytes).expect("a result"), example());
+    }
+}

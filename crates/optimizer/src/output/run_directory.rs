@@ -1,0 +1,287 @@
+//! The run directory: which folder may become one, and the names of the files in it.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::OutputError;
+use super::files::UNFINISHED;
+use super::manifest::Manifest;
+
+/// What to do with an earlier run in the same folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OlderRun {
+    /// Leave it, and fail.
+    Keep,
+    /// Remove its files, and no others.
+    Replace,
+}
+
+/// The folder one run writes into.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunDirectory {
+    path: PathBuf,
+}
+
+const MANIFEST: &str = "manifest.json";
+const FIELDS: &str = "fields";
+/// The files of a run beside its manifest.
+const FILES: &[&str] =
+    &["config.toml", "resolved.toml", "history.csv", "history.jsonl", "fields.pvd", "result.json"];
+
+impl RunDirectory {
+    /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
+    ///
+    /// The manifest of an earlier run stays until the new one takes its place, so that the folder is never
+    /// without its mark.
+    ///
+    /// # Errors
+    /// When the folder holds something else, or the operating system refuses.
+    pub fn create(path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        let directory = Self { path: path.to_owned() };
+        match fs::read_dir(path) {
+            Ok(mut entries) => {
+                if entries.next().is_some() {
+                    directory.clear(older)?;
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+                return Err(OutputError::NotADirectory { path: path.to_owned() });
+            }
+            Err(error) => return Err(OutputError::io("read", path)(error)),
+        }
+        let fields = directory.fields();
+        fs::create_dir_all(&fields).map_err(OutputError::io("create", fields))?;
+        Ok(directory)
+    }
+
+    /// The folder of an earlier run.
+    ///
+    /// # Errors
+    /// When the folder does not hold one.
+    pub fn open(path: &Path) -> Result<Self, OutputError> {
+        let directory = Self { path: path.to_owned() };
+        if directory.holds_run() {
+            Ok(directory)
+        } else {
+            Err(OutputError::NotOurs { path: path.to_owned() })
+        }
+    }
+
+    fn holds_run(&self) -> bool {
+        Manifest::read(&self.manifest()).is_ok_and(|manifest| manifest.is_ours())
+    }
+
+    fn clear(&self, older: OlderRun) -> Result<(), OutputError> {
+        if !self.holds_run() {
+            // What is left of a start that was broken off before its manifest was complete is ours as well.
+            return if self.holds_only_leftovers()? {
+                self.remove_unfinished(&self.path)
+            } else {
+                Err(OutputError::NotOurs { path: self.path.clone() })
+            };
+        }
+        if older == OlderRun::Keep {
+            return Err(OutputError::HoldsRun { path: self.path.clone() });
+        }
+        for name in FILES {
+            remove_if_there(&self.path.join(name))?;
+        }
+        self.remove_unfinished(&self.path)?;
+        let fields = self.fields();
+        // A link may lead to the fields of another run: those stay.
+        if fs::symlink_metadata(&fields).is_ok_and(|entry| entry.is_dir()) {
+            self.remove_unfinished(&fields)?;
+            for name in entries(&fields)?.iter().filter(|name| is_field(name)) {
+                remove_if_there(&fields.join(name))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
+        let fields_are_empty = || Ok(entries(&self.fields())?.is_empty());
+        for name in entries(&self.path)? {
+            let leftover = name.starts_with(UNFINISHED) || (name == FIELDS && fields_are_empty()?);
+            if !leftover {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
+        for name in entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
+            remove_if_there(&folder.join(name))?;
+        }
+        Ok(())
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// `manifest.json`.
+    pub fn manifest(&self) -> PathBuf {
+        self.path.join(MANIFEST)
+    }
+
+    /// `config.toml`, the configuration as given.
+    pub fn config(&self) -> PathBuf {
+        self.path.join("config.toml")
+    }
+
+    /// `resolved.toml`, with every default.
+    pub fn resolved(&self) -> PathBuf {
+        self.path.join("resolved.toml")
+    }
+
+    /// `history.csv`.
+    pub fn history_csv(&self) -> PathBuf {
+        self.path.join("history.csv")
+    }
+
+    /// `history.jsonl`.
+    pub fn history_jsonl(&self) -> PathBuf {
+        self.path.join("history.jsonl")
+    }
+
+    /// `result.json`.
+    pub fn result(&self) -> PathBuf {
+        self.path.join("result.json")
+    }
+
+    /// `fields`, the folder of the VTU files.
+    pub fn fields(&self) -> PathBuf {
+        self.path.join(FIELDS)
+    }
+
+    /// The VTU file of one evaluation.
+    pub fn field(&self, evaluation: usize) -> PathBuf {
+        self.fields().join(field_name(evaluation))
+    }
+
+    /// The VTU file of one evaluation as the collection names it, relative to the run directory.
+    pub fn field_in_collection(&self, evaluation: usize) -> String {
+        format!("{FIELDS}/{}", field_name(evaluation))
+    }
+
+    /// `fields.pvd`, the collection of the VTU files.
+    pub fn collection(&self) -> PathBuf {
+        self.path.join("fields.pvd")
+    }
+}
+
+fn field_name(evaluation: usize) -> String {
+    format!("eval_{evaluation:04}.vtu")
+}
+
+fn is_field(name: &str) -> bool {
+    name.strip_prefix("eval_")
+        .and_then(|rest| rest.strip_suffix(".vtu"))
+        .is_some_and(|digits| digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+/// Names in a folder, sorted; none when there is no folder.
+fn entries(folder: &Path) -> Result<Vec<String>, OutputError> {
+    let read = || -> io::Result<Vec<String>> {
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            names.push(entry?.file_name().to_string_lossy().into_owned());
+        }
+        names.sort();
+        Ok(names)
+    };
+    match read() {
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            Ok(Vec::new())
+        }
+        other => other.map_err(OutputError::io("read", folder)),
+    }
+}
+
+fn remove_if_there(path: &Path) -> Result<(), OutputError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(OutputError::io("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::write_atomic;
+
+    fn started(path: &Path) -> RunDirectory {
+        let run = RunDirectory::create(path, OlderRun::Keep).expect("a new run directory");
+        Manifest::started("run", 2).write(&run).expect("a manifest");
+        run
+    }
+
+    #[test]
+    fn an_absent_or_empty_folder_is_taken() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        assert!(RunDirectory::create(folder.path(), OlderRun::Keep).is_ok());
+        let run = RunDirectory::create(&folder.path().join("a/b"), OlderRun::Keep).expect("made");
+        assert!(run.fields().is_dir());
+        assert!(run.field(7).ends_with("fields/eval_0007.vtu"));
+        assert_eq!(run.field_in_collection(12345), "fields/eval_12345.vtu");
+        // Broken off before the manifest: still nothing of anybody.
+        std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
+        assert!(RunDirectory::create(run.path(), OlderRun::Keep).is_ok());
+        assert!(!run.path().join(".fluxmorph-abc").exists());
+    }
+
+    #[test]
+    fn a_foreign_folder_is_left_alone_even_when_forced() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let note = folder.path().join("thesis.txt");
+        fs::write(&note, "years of work").expect("written");
+        for manifest in ["", "{}", r#"{"program": "other"}"#, "[]"] {
+            for older in [OlderRun::Keep, OlderRun::Replace] {
+                let error = RunDirectory::create(folder.path(), older).expect_err("foreign");
+                assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
+            }
+            fs::write(folder.path().join("manifest.json"), manifest).expect("written");
+        }
+        assert!(note.exists());
+        let error = RunDirectory::create(&note, OlderRun::Replace).expect_err("a file");
+        assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
+        assert!(RunDirectory::open(folder.path()).is_err());
+    }
+
+    #[test]
+    fn an_earlier_run_is_replaced_only_when_forced_and_foreign_files_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run = started(&folder.path().join("run"));
+        assert_eq!(RunDirectory::open(run.path()).expect("a run"), run);
+        let ours = [run.result(), run.history_csv(), run.field(0), run.field(10_000), run.collection()];
+        let foreign = [run.path().join("notes.md"), run.fields().join("eval_best.vtu")];
+        for path in ours.iter().chain(&foreign) {
+            write_atomic(path, b"x").expect("written");
+        }
+        let error = RunDirectory::create(run.path(), OlderRun::Keep).expect_err("holds a run");
+        assert!(matches!(error, OutputError::HoldsRun { .. }) && error.to_string().contains("--force"));
+        assert!(ours.iter().all(|path| path.exists()));
+
+        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        assert!(ours.iter().all(|path| !path.exists()));
+        assert!(foreign.iter().all(|path| path.exists()));
+        assert!(run.manifest().exists(), "the mark stays until the next manifest");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn fields_behind_a_link_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let other = started(&folder.path().join("other"));
+        write_atomic(&other.field(0), b"x").expect("written");
+        let run = started(&folder.path().join("run"));
+        fs::remove_dir(run.fields()).expect("removed");
+        std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
+        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        assert!(other.field(0).exists());
+    }
+}

@@ -1,0 +1,339 @@
+//! One run or one analysis with its directory: what the commands `run` and `solve` do, without a terminal.
+//!
+//! The manifest is written first and completed last; history and fields are written as evaluations come; `result.json`
+//! when all is done. A run that fails leaves a manifest that says so, and every file under its final name is whole.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use fluxmorph_geometry::io::pvd_text;
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::recovery;
+
+use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
+use crate::driver::{self, Recorder};
+use crate::error::Error;
+use crate::fields;
+use crate::observer::{Evaluation, Observer, Started};
+use crate::output::{
+    DesignResult, FileHash, History, LinearSolverResult, Manifest, MeshHash, MeshResult, ObjectiveResult,
+    OlderRun, ProbeResult, RunDirectory, RunResult, RunStatus, StopReason, blake3_hex, peak_memory_bytes,
+    write_atomic,
+};
+use crate::problem::{Analysis, Problem, Timings, Want};
+use crate::setup::{Purpose, Setup, set_up};
+
+/// What a session is told beside the configuration.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// What happens to an earlier run in the output directory.
+    pub older_run: OlderRun,
+    /// Threads in use, for the manifest.
+    pub threads: usize,
+    /// Whether the user wants to stop; asked before each evaluation.
+    pub interrupted: &'a dyn Fn() -> bool,
+}
+
+/// Optimises and writes everything into the run directory.
+///
+/// # Errors
+/// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
+pub fn run(
+    config: &Config,
+    source: &Source,
+    options: Options<'_>,
+    observer: &mut dyn Observer,
+) -> Result<RunResult, Error> {
+    let session = Session::open("run", config, source, options, Purpose::Optimisation, observer)?;
+    session.conclude(observer, |session, observer| {
+        let mut recorder = DirectoryRecorder {
+            directory: &session.directory,
+            history: History::create(&session.directory)?,
+            kept: config.output.fields,
+            written: Vec::new(),
+        };
+        let problem = &session.setup.problem;
+        let optimised =
+            driver::optimise(problem, &config.optimizer, observer, &mut recorder, options.interrupted)?;
+        let best = &optimised.best;
+        if config.output.fields == FieldsKept::FirstLast {
+            recorder.write(best.evaluation, problem, &best.analysis)?;
+        }
+        Ok(RunResult {
+            evaluations: optimised.evaluations,
+            iterations: optimised.iterations,
+            objective: Some(ObjectiveResult {
+                initial: optimised.initial,
+                best: best.objective,
+                ratio: best.objective / optimised.initial,
+                best_evaluation: best.evaluation,
+            }),
+            linear_solver: LinearSolverResult { worst_residual: optimised.worst_residual },
+            ..session.result(
+                optimised.stop_reason,
+                &best.analysis,
+                Some(&best.values),
+                optimised.initial_quality,
+                &optimised.timings,
+            )?
+        })
+    })
+}
+
+/// Analyses one design and writes its field and result.
+///
+/// # Errors
+/// As [`run`].
+pub fn solve(
+    config: &Config,
+    source: &Source,
+    design: Option<Vec<f64>>,
+    options: Options<'_>,
+    observer: &mut dyn Observer,
+) -> Result<RunResult, Error> {
+    let session = Session::open("solve", config, source, options, Purpose::Analysis, observer)?;
+    session.conclude(observer, |session, observer| {
+        let problem = &session.setup.problem;
+        let values = match (&problem.shape, design) {
+            (Some(shape), given) => Some(given.unwrap_or_else(|| shape.initial.clone())),
+            (None, _) => None,
+        };
+        observer.phase("solving the field");
+        let analysis = problem.evaluate(values.as_deref().unwrap_or_default(), Want::Gradient)?;
+        if config.output.fields != FieldsKept::Nothing {
+            write_field(&session.directory, 0, problem, &analysis)?;
+            write_collection(&session.directory, &[0])?;
+        }
+        let value = analysis.objective;
+        let initial_quality = problem.quality(&problem.reference).worst;
+        Ok(RunResult {
+            evaluations: 1,
+            objective: value.map(|value| ObjectiveResult {
+                initial: value,
+                best: value,
+                ratio: 1.0,
+                best_evaluation: 0,
+            }),
+            ..session.result(
+                StopReason::Done,
+                &analysis,
+                values.as_deref(),
+                initial_quality,
+                &analysis.timings,
+            )?
+        })
+    })
+}
+
+/// A run directory with its manifest, and the problem.
+struct Session<'a> {
+    command: &'static str,
+    config: &'a Config,
+    setup: Setup,
+    directory: RunDirectory,
+    manifest: Manifest,
+    clock: Instant,
+    setup_seconds: f64,
+}
+
+impl<'a> Session<'a> {
+    fn open(
+        command: &'static str,
+        config: &'a Config,
+        source: &Source,
+        options: Options<'_>,
+        purpose: Purpose,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, Error> {
+        let clock = Instant::now();
+        observer.phase("setting up mesh and matrices");
+        let setup = set_up(config, source, purpose)?;
+        let setup_seconds = clock.elapsed().as_secs_f64();
+        let directory = RunDirectory::create(&config.output.directory, options.older_run)?;
+        let mut manifest = Manifest::started(command, options.threads);
+        manifest.config = source.documents().first().map(|document| FileHash {
+            path: document.name.clone(),
+            blake3: blake3_hex(document.text.as_bytes()),
+        });
+        manifest.overrides = source.overrides().map(str::to_owned).collect();
+        manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
+        manifest.write(&directory)?;
+        write_atomic(&directory.config(), source.text().as_bytes())?;
+        write_atomic(&directory.resolved(), resolved_toml(config).as_bytes())?;
+
+        let mesh = setup.problem.reference.topology();
+        observer.started(&Started {
+            title: &config.title,
+            algorithm: (purpose == Purpose::Optimisation).then(|| config.optimizer.algorithm.name()),
+            variables: setup.problem.shape.as_ref().map_or(0, |s| s.surface.variable_count()),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            unknowns: setup.problem.states.iter().map(|model| model.unknown_count()).sum(),
+            directory: Some(directory.path()),
+        });
+        for warning in &setup.warnings {
+            observer.warning(warning);
+        }
+        Ok(Self { command, config, setup, directory, manifest, clock, setup_seconds })
+    }
+
+    /// Does the work, writes the result, and completes the manifest whatever happens.
+    fn conclude(
+        mut self,
+        observer: &mut dyn Observer,
+        work: impl FnOnce(&Self, &mut dyn Observer) -> Result<RunResult, Error>,
+    ) -> Result<RunResult, Error> {
+        let outcome = work(&self, observer).and_then(|result| {
+            result.write(&self.directory)?;
+            Ok(result)
+        });
+        let status = outcome.as_ref().map_or(RunStatus::Failed, |result| result.status);
+        self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
+        let completed = self.manifest.write(&self.directory);
+        let result = outcome?;
+        completed?;
+        observer.finished(&result);
+        Ok(result)
+    }
+
+    /// The parts of a result that run and solve share.
+    fn result(
+        &self,
+        stop_reason: StopReason,
+        analysis: &Analysis,
+        values: Option<&[f64]>,
+        initial_quality: f64,
+        timings: &Timings,
+    ) -> Result<RunResult, Error> {
+        let problem = &self.setup.problem;
+        let (model, solution, mesh) = (&problem.states[0], &analysis.solutions[0], &analysis.mesh);
+        let probes = self
+            .config
+            .probes
+            .iter()
+            .map(|probe| {
+                let b = recovery::probe(solution, model, mesh, &probe.name, &probe.points)?;
+                Ok(ProbeResult {
+                    name: probe.name.clone(),
+                    points_m: probe.points.clone(),
+                    b_re_t: b.iter().map(|b| b.map(|c| c.re)).collect(),
+                    b_im_t: b.iter().map(|b| b.map(|c| c.im)).collect(),
+                })
+            })
+            .collect::<Result<_, Error>>()?;
+        let design = match (&problem.shape, values) {
+            (Some(shape), Some(values)) => Some(DesignResult {
+                values_m: values.to_vec(),
+                lower_m: shape.lower.clone(),
+                upper_m: shape.upper.clone(),
+                points_m: shape.surface.points().to_vec(),
+            }),
+            _ => None,
+        };
+        let topology = mesh.topology();
+        Ok(RunResult {
+            schema_version: 1,
+            command: self.command.to_owned(),
+            status: stop_reason.status(),
+            stop_reason,
+            evaluations: 0,
+            iterations: 0,
+            objective: None,
+            design,
+            mesh: MeshResult {
+                nodes: topology.node_count(),
+                tets: topology.tets().len(),
+                unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
+                worst_quality_initial: initial_quality,
+                worst_quality_final: analysis.quality.worst,
+            },
+            probes,
+            losses_w: solution.losses(model, mesh).into_iter().collect(),
+            linear_solver: LinearSolverResult { worst_residual: analysis.worst_residual },
+            timings_s: BTreeMap::from([
+                ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
+                ("setup".to_owned(), self.setup_seconds),
+                ("remesh".to_owned(), timings.remesh),
+                ("assembly".to_owned(), timings.assembly),
+                ("factor".to_owned(), timings.factor),
+                ("state".to_owned(), timings.state),
+                ("adjoint".to_owned(), timings.adjoint),
+                ("gradient".to_owned(), timings.gradient),
+            ]),
+            peak_memory_bytes: peak_memory_bytes(),
+        })
+    }
+}
+
+/// Writes history and fields into the run directory.
+struct DirectoryRecorder<'a> {
+    directory: &'a RunDirectory,
+    history: History,
+    kept: FieldsKept,
+    /// Evaluations with a field file, ascending.
+    written: Vec<usize>,
+}
+
+impl DirectoryRecorder<'_> {
+    fn write(&mut self, evaluation: usize, problem: &Problem, analysis: &Analysis) -> Result<(), Error> {
+        if self.written.last() == Some(&evaluation) {
+            return Ok(());
+        }
+        write_field(self.directory, evaluation, problem, analysis)?;
+        self.written.push(evaluation);
+        write_collection(self.directory, &self.written)
+    }
+}
+
+impl Recorder for DirectoryRecorder<'_> {
+    fn record(
+        &mut self,
+        row: &Evaluation,
+        analysis: &Analysis,
+        problem: &Problem,
+        improved: bool,
+    ) -> Result<(), Error> {
+        let wanted = match self.kept {
+            FieldsKept::Every => true,
+            FieldsKept::Improved => improved,
+            FieldsKept::FirstLast => row.evaluation == 0,
+            FieldsKept::Nothing => false,
+        };
+        if wanted {
+            self.write(row.evaluation, problem, analysis)?;
+        }
+        Ok(self.history.append(row)?)
+    }
+}
+
+fn write_field(
+    directory: &RunDirectory,
+    evaluation: usize,
+    problem: &Problem,
+    analysis: &Analysis,
+) -> Result<(), Error> {
+    let bytes = fields::vtu(problem, analysis)?;
+    Ok(write_atomic(&directory.field(evaluation), &bytes)?)
+}
+
+/// The PVD file over all field files; its time is the evaluation number.
+fn write_collection(directory: &RunDirectory, evaluations: &[usize]) -> Result<(), Error> {
+    let files: Vec<String> = evaluations.iter().map(|&e| directory.field_in_collection(e)).collect();
+    let text = pvd_text(evaluations.iter().zip(&files).map(|(&e, file)| (e as f64, file.as_str())))?;
+    Ok(write_atomic(&directory.collection(), text.as_bytes())?)
+}
+
+/// Origin and content hash of the mesh with all its regions.
+fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
+    let origin = match &config.mesh {
+        MeshConfig::Shield(_) => "shield".to_owned(),
+        MeshConfig::Block(_) => "block".to_owned(),
+        MeshConfig::File { path, .. } => path.display().to_string(),
+    };
+    let topology = mesh.topology();
+    let mut bytes = Vec::with_capacity(mesh.points().len() * 24 + topology.tets().len() * 20);
+    bytes.extend(mesh.points().iter().flatten().flat_map(|c| c.to_le_bytes()));
+    bytes.extend(topology.tets().iter().flatten().flat_map(|n| n.0.to_le_bytes()));
+    bytes.extend(topology.region_of().iter().flat_map(|RegionId(r)| r.to_le_bytes()));
+    MeshHash { origin, blake3: blake3_hex(&bytes), nodes: topology.node_count(), tets: topology.tets().len() }
+}

@@ -1,0 +1,227 @@
+//! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
+//!
+//! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
+//! keys. `field` makes the field problem, `shape` the design surface and the elastic map.
+
+mod field;
+mod shape;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::{block, shield};
+use fluxmorph_geometry::{Mesh, RegionId, Topology};
+use fluxmorph_solver::audit::{SkinAudit, skin_audit};
+use fluxmorph_solver::objective::Weighting;
+use fluxmorph_solver::{Material, Objective};
+
+use crate::config::{self, Config, Fault, MeshConfig, RegionModel, Source};
+use crate::error::Error;
+use crate::problem::Problem;
+
+/// A problem, and what the user should know of it.
+#[derive(Debug)]
+pub struct Setup {
+    /// The problem.
+    pub problem: Problem,
+    /// Skin-depth audit of every conductor.
+    pub audits: Vec<Audited>,
+    /// Warnings and notices, in the order found.
+    pub warnings: Vec<String>,
+    /// The mesh as read or generated, with all its regions.
+    pub full_mesh: Mesh,
+}
+
+/// The audit of one conductor and how it is modelled.
+#[derive(Debug)]
+pub struct Audited {
+    /// What was found.
+    pub audit: SkinAudit,
+    /// Meshed, or replaced by its impedance surface.
+    pub model: RegionModel,
+}
+
+impl Audited {
+    /// What to tell the user.
+    pub fn warning(&self) -> Option<String> {
+        match self.model {
+            RegionModel::Volume => self.audit.volume_warning(),
+            RegionModel::Impedance => self.audit.impedance_warning(),
+        }
+    }
+}
+
+/// Which parts of the configuration a command needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// A field analysis: objective and design take part where they are given.
+    Analysis,
+    /// An optimisation: objective, design and remesh region must be there.
+    Optimisation,
+}
+
+/// Builds or reads the mesh of a configuration.
+///
+/// # Errors
+/// [`Error::Mesh`] names the parameter; [`Error::Config`] for a mesh file, which no reader takes yet.
+pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
+    match &config.mesh {
+        MeshConfig::Shield(parameters) => Ok(shield(&parameters.parameters())?),
+        MeshConfig::Block(parameters) => Ok(block(&parameters.parameters())?),
+        MeshConfig::File { .. } => Err(source
+            .error(vec![
+                source
+                    .fault("mesh.file", "mesh files cannot be read yet")
+                    .expected("generator = \"shield\" or \"block\""),
+            ])
+            .into()),
+    }
+}
+
+/// Sets up the problem of a configuration.
+///
+/// # Errors
+/// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
+pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setup, Error> {
+    if purpose == Purpose::Optimisation {
+        config.optimisation(source)?;
+    }
+    let full_mesh = build_mesh(config, source)?;
+    source.check(name_faults(config, source, full_mesh.topology()))?;
+
+    let mut warnings = Vec::new();
+    let audits = audits(config, &full_mesh);
+    warnings.extend(audits.iter().filter_map(Audited::warning));
+    let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
+    let model = field::field_model(config, &mesh, conductors)?;
+    let objective = match &config.objective {
+        Some(objective) => Some(self::objective(objective, &mesh)?),
+        None => None,
+    };
+    let shape = match (&config.design, &config.remesh) {
+        (Some(design), Some(remesh)) => {
+            let inputs = shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh };
+            Some(shape::shape(&inputs, config, &model, objective.as_ref(), &mut warnings)?)
+        }
+        _ => None,
+    };
+    let problem = Problem { reference: mesh, states: vec![model], objective, shape };
+    Ok(Setup { problem, audits, warnings, full_mesh })
+}
+
+/// Number of design variables of a configuration.
+///
+/// # Errors
+/// [`Error::Config`] when the configuration has no design or names no surface of the mesh.
+pub fn variable_count(config: &Config, source: &Source) -> Result<usize, Error> {
+    let Some(design) = &config.design else {
+        let fault = source.fault("design", "there is no [design], so a design has no meaning");
+        return Err(source.error(vec![fault]).into());
+    };
+    if let Some([n, m]) = design.grid {
+        return Ok(n * m);
+    }
+    let mesh = build_mesh(config, source)?;
+    source.check(name_faults(config, source, mesh.topology()))?;
+    let triangles = mesh.topology().surface(&design.surface)?;
+    Ok(triangles.iter().flatten().collect::<std::collections::BTreeSet<_>>().len())
+}
+
+/// The objective on a mesh.
+fn objective(objective: &config::Objective, mesh: &Mesh) -> Result<Objective, Error> {
+    let weighting = match objective.weighting {
+        config::Weighting::Point => Weighting::Point,
+        config::Weighting::Volume => Weighting::Volume,
+    };
+    Ok(Objective::new(mesh, mesh.topology().region(&objective.region)?, weighting)?)
+}
+
+/// Skin-depth audits of all conductors on the mesh with all regions.
+fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
+    config
+        .regions
+        .iter()
+        .filter_map(|(name, region)| {
+            let id = mesh.topology().region(name).ok()?;
+            let material = material(config, name);
+            let audit = skin_audit(mesh, id, &material, config.analysis.frequency)?;
+            Some(Audited { audit, model: region.model })
+        })
+        .collect()
+}
+
+/// The material of a region; air where the configuration says nothing.
+fn material(config: &Config, region: &str) -> Material {
+    let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
+    entry.map_or(Material::AIR, |m| Material {
+        relative_permeability: m.relative_permeability,
+        conductivity: m.conductivity,
+    })
+}
+
+/// The peak phasor of a coil [A].
+fn phasor(coil: &config::Coil) -> c64 {
+    c64::from_polar(coil.ampere_turns, coil.phase)
+}
+
+/// Every name of the configuration that the mesh does not have, and every region named that is empty.
+fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+    let surfaces: Vec<&str> = topology.surface_names().collect();
+    let mut region = |path: String, name: &str| match topology.region(name) {
+        Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
+        Ok(id) if is_empty(topology, id) => {
+            faults.push(source.fault(&path, format!("the region `{name}` has no elements")));
+        }
+        Ok(_) => {}
+    };
+    for name in config.regions.keys() {
+        region(format!("regions.{name}"), name);
+    }
+    if let Some(objective) = &config.objective {
+        region("objective.region".to_owned(), &objective.region);
+    }
+    if let Some(remesh) = &config.remesh {
+        if let config::RemeshExtent::Regions(names) = &remesh.extent {
+            for name in names {
+                region("remesh.region".to_owned(), name);
+            }
+        }
+        for (i, subregion) in remesh.subregions.iter().enumerate() {
+            region(format!("remesh.subregions[{i}].name"), &subregion.name);
+        }
+    }
+    let mut surface = |path: &str, names: &[String]| {
+        for (i, name) in names.iter().enumerate().filter(|(_, name)| topology.surface(name).is_err()) {
+            faults.push(source.unknown_name(&format!("{path}[{i}]"), "surface", name, &surfaces));
+        }
+    };
+    surface("boundaries.flux_parallel", &config.boundaries.flux_parallel);
+    surface("boundaries.flux_normal", &config.boundaries.flux_normal);
+    if let Some(remesh) = &config.remesh {
+        surface("remesh.slide", &remesh.slide);
+        surface("remesh.fixed", &remesh.fixed);
+        surface("remesh.free", &remesh.free);
+    }
+    if let Some(design) = &config.design
+        && topology.surface(&design.surface).is_err()
+    {
+        faults.push(source.unknown_name("design.surface", "surface", &design.surface, &surfaces));
+    }
+    let impedance =
+        |name: &str| config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);
+    if let Some(objective) = config.objective.as_ref().filter(|o| impedance(&o.region)) {
+        faults.push(
+            source
+                .fault(
+                    "objective.region",
+                    format!("`{}` is replaced by its impedance surface", objective.region),
+                )
+                .expected("a region that is meshed, such as air"),
+        );
+    }
+    faults
+}
+
+fn is_empty(topology: &Topology, region: RegionId) -> bool {
+    !topology.region_of().contains(&region)
+}

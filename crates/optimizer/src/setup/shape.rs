@@ -1,0 +1,249 @@
+//! The design surface and the elastic map of a configuration, and whether its bounds leave the mesh whole.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::{centroid, dot, sub};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_remesh::{
+    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
+};
+use fluxmorph_remesh::{check_step, step_to_inversion};
+use fluxmorph_solver::{FieldModel, Objective};
+
+use crate::config::{Config, Design, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
+use crate::design::DesignSurface;
+use crate::error::Error;
+use crate::problem::Shape;
+use crate::thickness::Thickness;
+
+/// What the shape is made from.
+pub(super) struct Inputs<'a> {
+    pub(super) source: &'a Source,
+    pub(super) design: &'a Design,
+    pub(super) remesh: &'a Remesh,
+    /// With all regions.
+    pub(super) full_mesh: &'a Mesh,
+    /// Without the regions that impedance surfaces replace.
+    pub(super) mesh: &'a Mesh,
+}
+
+pub(super) fn shape(
+    inputs: &Inputs<'_>,
+    config: &Config,
+    model: &FieldModel,
+    objective: Option<&Objective>,
+    warnings: &mut Vec<String>,
+) -> Result<Shape, Error> {
+    let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
+    let on = |mesh: &Mesh| -> Result<DesignSurface, Error> {
+        let triangles = mesh.topology().surface(&design.surface)?;
+        if triangles.is_empty() {
+            let message = format!("the surface `{}` has no triangles", design.surface);
+            return Err(source.error(vec![source.fault("design.surface", message)]).into());
+        }
+        Ok(DesignSurface::new(mesh, triangles, design.direction, design.grid))
+    };
+    let surface = on(mesh)?;
+    let setup = remesh_setup(inputs, &surface, warnings)?;
+    overlap_faults(inputs, &setup, model, objective)?;
+    let map = ElasticMap::new(mesh, setup)?;
+    let full_surface = on(full_mesh)?;
+    let thickness = body(full_mesh, &full_surface, config)
+        .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
+    let n = surface.variable_count();
+    let shape = Shape {
+        surface,
+        map,
+        thickness,
+        lower: vec![design.lower; n],
+        upper: vec![design.upper; n],
+        initial: vec![design.initial; n],
+    };
+    check_bounds(source, mesh, &shape)?;
+    Ok(shape)
+}
+
+/// Subregions, boundary kinds and design nodes of the elastic body.
+fn remesh_setup(
+    inputs: &Inputs<'_>,
+    surface: &DesignSurface,
+    warnings: &mut Vec<String>,
+) -> Result<RemeshSetup, Error> {
+    let Inputs { remesh, mesh, .. } = *inputs;
+    let topology = mesh.topology();
+    let mut subregions: Vec<Subregion> = match &remesh.extent {
+        RemeshExtent::Regions(names) => {
+            let mut names: BTreeSet<String> = names.iter().cloned().collect();
+            for region in regions_at(mesh, surface) {
+                let name = &topology.region_names()[region.index()];
+                if names.insert(name.clone()) {
+                    warnings.push(format!(
+                        "the region `{name}` touches the design surface and moves with it: it is taken into the remesh \
+                         region"
+                    ));
+                }
+            }
+            names
+                .iter()
+                .map(|name| Ok(Subregion::new(name, topology.elements_of(topology.region(name)?))))
+                .collect::<Result<_, Error>>()?
+        }
+        RemeshExtent::Box([lower, upper]) => {
+            let inside = |e: &ElementId| {
+                let c = centroid(mesh.vertices(*e));
+                (0..3).all(|d| lower[d] <= c[d] && c[d] <= upper[d])
+            };
+            let mut parts = Vec::new();
+            for (i, name) in topology.region_names().iter().enumerate() {
+                let elements: Vec<ElementId> =
+                    topology.elements_of(RegionId::new(i)).into_iter().filter(inside).collect();
+                if !elements.is_empty() {
+                    parts.push(Subregion::new(name, elements));
+                }
+            }
+            parts
+        }
+    };
+    // A region that an impedance surface replaces has no elements left, and is no part of the body.
+    subregions.retain(|part| !part.elements.is_empty());
+    for part in &mut subregions {
+        let own = remesh.subregions.iter().find(|own| own.name == part.name);
+        part.young = own.and_then(|own| own.young).unwrap_or(remesh.young);
+        part.poisson = own.and_then(|own| own.poisson).unwrap_or(remesh.poisson);
+        part.force = own.and_then(|own| own.force).unwrap_or(remesh.force);
+    }
+    let mut boundaries = Vec::new();
+    for (names, kind) in [
+        (&remesh.slide, BoundaryKind::Slide),
+        (&remesh.fixed, BoundaryKind::Fixed),
+        (&remesh.free, BoundaryKind::Free),
+    ] {
+        for name in names {
+            boundaries.push(Boundary::of_surface(topology, name, kind)?);
+        }
+    }
+    let policy = match remesh.stiffness {
+        StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
+        StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
+        StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
+    };
+    Ok(RemeshSetup {
+        subregions,
+        policy,
+        guidance: guidance(inputs)?,
+        design_nodes: surface.nodes().to_vec(),
+        boundaries,
+        fixed_nodes: Vec::new(),
+    })
+}
+
+/// The axis of the design's direction where the motion is to follow it.
+fn guidance(inputs: &Inputs<'_>) -> Result<Guidance, Error> {
+    let direction = inputs.design.direction;
+    match inputs.remesh.motion {
+        Motion::Free => Ok(Guidance::Free),
+        Motion::AlongDesign => match (0..3).find(|&d| direction[d].abs() == 1.0) {
+            Some(axis) => Ok(Guidance::Axis(axis)),
+            None => {
+                let fault = inputs
+                    .source
+                    .fault("remesh.motion", "the design does not move along a coordinate axis")
+                    .expected("motion = \"free\", or a design.direction along x, y or z");
+                Err(inputs.source.error(vec![fault]).into())
+            }
+        },
+    }
+}
+
+/// Regions with an element that has a face on the design surface.
+fn regions_at(mesh: &Mesh, surface: &DesignSurface) -> BTreeSet<RegionId> {
+    let topology = mesh.topology();
+    topology
+        .facets()
+        .iter()
+        .filter(|f| f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
+        .flat_map(|f| std::iter::once(f.inside).chain(f.outside))
+        .map(|e| topology.region_of()[e.index()])
+        .collect()
+}
+
+/// The region that a positive design thickens: behind the design surface, and not air.
+fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+    let topology = mesh.topology();
+    let facet = topology
+        .facets()
+        .iter()
+        .find(|f| f.outside.is_some() && f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))?;
+    let behind = |e: &ElementId| {
+        let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
+        dot(offset, surface.direction()) < 0.0
+    };
+    let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
+    let region = topology.region_of()[element.index()];
+    config.regions.contains_key(&topology.region_names()[region.index()]).then_some(region)
+}
+
+/// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
+fn overlap_faults(
+    inputs: &Inputs<'_>,
+    setup: &RemeshSetup,
+    model: &FieldModel,
+    objective: Option<&Objective>,
+) -> Result<(), Error> {
+    let Inputs { source, mesh, .. } = *inputs;
+    let moving: BTreeSet<ElementId> =
+        setup.subregions.iter().flat_map(|s| s.elements.iter().copied()).collect();
+    let mut faults = Vec::new();
+    if objective.is_some_and(|o| o.elements().any(|e| moving.contains(&e))) {
+        faults.push(
+            source
+                .fault(
+                    "objective.region",
+                    "the observation region lies inside the remesh region and would move",
+                )
+                .expected("an observation region that no remesh region holds")
+                .help("take the region out of remesh.region, or shrink remesh.box"),
+        );
+    }
+    if let Some(e) = model.source_elements().find(|e| moving.contains(e)) {
+        let place = centroid(mesh.vertices(e));
+        faults.push(
+            source
+                .fault("coils", format!("a coil reaches into the remesh region, at {place:?} m"))
+                .expected(
+                    "coils and their windows outside the remesh region: a coil does not move with the mesh",
+                )
+                .help("shrink the remesh region, or move the coil"),
+        );
+    }
+    Ok(source.check(faults)?)
+}
+
+/// Tries the two extreme designs, all variables at their lower and at their upper bound, before anything is solved.
+fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape) -> Result<(), Error> {
+    let mut faults = Vec::new();
+    for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
+        let displacement = shape.map.displacement(&shape.surface.displacement(bound));
+        match check_step(mesh, &displacement) {
+            Ok(_) => {}
+            Err(RemeshError::Inverted { element, region, centroid, .. }) => {
+                let share = step_to_inversion(mesh, &displacement).step.min(1.0);
+                faults.push(
+                    source
+                        .fault(
+                            key,
+                            format!(
+                                "the mesh breaks at {} mm: element {element} of region `{region}` at {centroid:?} m is \
+                                 inverted",
+                                bound[0] * 1e3
+                            ),
+                        )
+                        .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * share * 1e3))
+                        .help("narrow the bound, enlarge the remesh region, or take another remesh.stiffness"),
+                );
+            }
+            Err(other) => return Err(other.into()),
+        }
+    }
+    Ok(source.check(faults)?)
+}

@@ -1,0 +1,88 @@
+//! Thickness of the designed body behind every design node, measured along the direction of motion.
+//!
+//! From each node of the design surface a ray runs against the direction of motion to the body's opposite face. That
+//! face is held (docs/theory.md), so the thickness of a design is the initial one plus the node's height.
+
+use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::{Mesh, NodeId, RegionId};
+
+use crate::design::DesignSurface;
+
+/// Nodes at the rim of the body send their ray along its side: how far outside a triangle still hits.
+const RIM_TOLERANCE: f64 = 1e-6;
+
+/// Initial thickness [m] behind every design node.
+#[derive(Clone, Debug)]
+pub struct Thickness {
+    initial: Vec<f64>,
+}
+
+impl Thickness {
+    /// Measures the body `region` of the undeformed mesh; `None` where some ray does not meet an opposite face.
+    pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
+        let topology = mesh.topology();
+        let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
+        let back = surface.direction().map(|d| -d);
+        let faces: Vec<[Point; 3]> = topology
+            .facets()
+            .iter()
+            .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
+            .filter(|f| !f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
+            .map(|f| f.nodes.map(|n| mesh.point(n)))
+            .collect();
+        let initial = surface
+            .nodes()
+            .iter()
+            .map(|&node: &NodeId| {
+                let origin = mesh.point(node);
+                faces.iter().filter_map(|face| distance(origin, back, face)).min_by(f64::total_cmp)
+            })
+            .collect::<Option<Vec<f64>>>()?;
+        Some(Self { initial })
+    }
+
+    /// Least and greatest thickness [m] for the heights of the design nodes [m].
+    pub fn range(&self, heights: &[f64]) -> (f64, f64) {
+        self.initial
+            .iter()
+            .zip(heights)
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, h)| (low.min(t + h), high.max(t + h)))
+    }
+}
+
+/// Distance along the ray at which it meets a triangle that it does not touch at its origin.
+fn distance(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<f64> {
+    let normal = area_vector(*triangle);
+    let slope = dot(normal, direction);
+    let area = norm(normal);
+    if slope.abs() < RIM_TOLERANCE * area {
+        return None;
+    }
+    let t = dot(normal, sub(triangle[0], origin)) / slope;
+    let hit: Point = std::array::from_fn(|d| origin[d] + t * direction[d]);
+    // Barycentric coordinates by sub-areas.
+    let inside = (0..3).all(|k| {
+        let edge = sub(triangle[(k + 2) % 3], triangle[(k + 1) % 3]);
+        let share = 0.5 * dot(cross(edge, sub(hit, triangle[(k + 1) % 3])), normal) / (area * area);
+        share >= -RIM_TOLERANCE
+    });
+    (inside && t > RIM_TOLERANCE * area.sqrt()).then_some(t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fluxmorph_geometry::generate::{ShieldParameters, shield};
+
+    #[test]
+    fn the_plate_is_ten_millimetres_thick_at_every_node() {
+        let parameters = ShieldParameters { refinement: 0.5, ..ShieldParameters::default() };
+        let mesh = shield(&parameters).expect("defaults are valid");
+        let triangles = mesh.topology().surface("plate_bottom").expect("the shield has it");
+        let surface = DesignSurface::new(&mesh, triangles, [0.0, 0.0, -1.0], None);
+        let plate = mesh.topology().region("plate").expect("the shield has it");
+        let thickness = Thickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
+        let (low, high) = thickness.range(&vec![0.001; surface.nodes().len()]);
+        assert!((low - 0.011).abs() < 1e-12 && (high - 0.011).abs() < 1e-12, "{low} {high}");
+    }
+}

@@ -1,0 +1,214 @@
+//! `docs/configuration.md` names every key that the reader knows, and no other, so that it cannot rot unseen.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use fluxmorph_optimizer::config::{Config, ConfigError, resolved_toml};
+
+/// Configurations that together write every table, each with the alternatives that exclude one another.
+const FULL: [&str; 3] = [
+    r#"
+    [mesh]
+    generator = "shield"
+    [analysis]
+    frequency = "60 Hz"
+    [materials.steel]
+    conductivity = "7e6 S/m"
+    [regions.plate]
+    material = "steel"
+    [[coils]]
+    name = "mitred"
+    shape = "racetrack"
+    ampere_turns = 1
+    center = [0, 0, 0]
+    half_window = [1, 1]
+    width = 1
+    height = 1
+    [[coils]]
+    name = "round"
+    shape = "racetrack"
+    ampere_turns = 1
+    center = [0, 0, 0]
+    half_window = [1, 1]
+    width = 1
+    height = 1
+    inner_radius = 1
+    [objective]
+    region = "observation"
+    [design]
+    surface = "plate_bottom"
+    direction = [0, 0, -1]
+    grid = [7, 13]
+    lower = -0.005
+    upper = 0.02
+    [remesh]
+    region = "remesh"
+    [[remesh.subregions]]
+    name = "plate"
+    young = 1
+    poisson = 0.3
+    force = [0, 0, 0]
+    [optimizer]
+    max_time = "1 h"
+    [[probes]]
+    name = "here"
+    points = [[0, 0, 0]]
+    "#,
+    r#"
+    [mesh]
+    generator = "block"
+    [analysis]
+    frequency = 0
+    [design]
+    surface = "z_max"
+    direction = [0, 0, 1]
+    lower = -0.005
+    upper = 0.02
+    [remesh]
+    box = [[0, 0, 0], [1, 1, 1]]
+    "#,
+    r#"
+    [mesh]
+    file = "device.msh"
+    unit = "mm"
+    [analysis]
+    frequency = 0
+    "#,
+];
+
+/// Tables whose keys are names of the user's.
+const NAMED: [&str; 2] = ["materials", "regions"];
+
+fn page() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/configuration.md");
+    std::fs::read_to_string(path).expect("the page is in the repository")
+}
+
+/// The part of the page under a heading, down to the next heading of any level.
+fn section<'a>(page: &'a str, heading: &str) -> &'a str {
+    let start = page.find(&format!("{heading}\n")).unwrap_or_else(|| panic!("no heading `{heading}`"));
+    let body = &page[start + heading.len()..];
+    body.find("\n#").map_or(body, |end| &body[..end])
+}
+
+/// Collects `(heading, key)` for every key of a table.
+fn keys_of(path: &str, table: &toml::Table, keys: &mut BTreeSet<(String, String)>) {
+    for (key, value) in table {
+        let inner = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        let level = if path.is_empty() { "##" } else { "###" };
+        match value {
+            toml::Value::Table(tables) if NAMED.contains(&inner.as_str()) => {
+                for table in tables.values().filter_map(toml::Value::as_table) {
+                    leaves(&format!("## `[{inner}.NAME]`"), &inner, table, keys);
+                }
+            }
+            // Described with dotted keys under the table around it.
+            toml::Value::Table(_) if key == "linear_solver" => {}
+            toml::Value::Table(table) => leaves(&format!("{level} `[{inner}]`"), &inner, table, keys),
+            toml::Value::Array(items) if items.iter().any(toml::Value::is_table) => {
+                for table in items.iter().filter_map(toml::Value::as_table) {
+                    leaves(&format!("{level} `[[{inner}]]`"), &inner, table, keys);
+                }
+            }
+            toml::Value::String(_) if path.is_empty() => {
+                keys.insert((format!("## `{key}`"), key.clone()));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The keys of one table go under its heading; a small table inside may be described there with dotted keys.
+fn leaves(heading: &str, path: &str, table: &toml::Table, keys: &mut BTreeSet<(String, String)>) {
+    for (key, value) in table {
+        match value {
+            toml::Value::Table(inner) if key == "linear_solver" => {
+                keys.extend(inner.keys().map(|leaf| (heading.to_owned(), format!("{key}.{leaf}"))));
+            }
+            toml::Value::Table(_) => {}
+            toml::Value::Array(items) if items.first().is_some_and(toml::Value::is_table) => {}
+            _ => {
+                keys.insert((heading.to_owned(), key.clone()));
+            }
+        }
+    }
+    keys_of(path, table, keys);
+}
+
+/// Every key that a full configuration writes, under the heading of its table.
+fn known_keys() -> BTreeSet<(String, String)> {
+    let mut keys = BTreeSet::new();
+    for text in FULL {
+        let (config, _) = Config::from_str(text, "full.toml").unwrap_or_else(|error| panic!("{error}"));
+        let resolved: toml::Table = resolved_toml(&config).parse().expect("resolved.toml is TOML");
+        keys_of("", &resolved, &mut keys);
+    }
+    keys
+}
+
+/// What the reader says it knows in a table, from its answer to an unknown key.
+fn known_to_reader(table: &str, text: &str) -> Vec<String> {
+    let error = Config::from_str(text, "probe.toml").expect_err("an unknown key");
+    let ConfigError::Faults(report) = error else { panic!("{error}") };
+    let fault = report.faults.iter().find(|fault| fault.message.contains("unknown key `zzzzzzzzzz`"));
+    let known =
+        fault.and_then(|fault| fault.expected.as_deref()).unwrap_or_else(|| panic!("{table}: {report}"));
+    known.trim_start_matches("known: ").split(", ").map(str::to_owned).collect()
+}
+
+#[test]
+fn every_key_stands_under_the_heading_of_its_table() {
+    let page = page();
+    let keys = known_keys();
+    assert!(keys.len() > 70, "{keys:?}");
+    for (heading, key) in &keys {
+        let section = section(&page, heading);
+        assert!(section.contains(&format!("\n| `{key}` |")), "`{key}` has no row under {heading}");
+    }
+}
+
+#[test]
+fn every_key_that_the_reader_asks_for_is_mentioned() {
+    let page = page();
+    let tables = [
+        "[mesh]",
+        "[mesh.shield]",
+        "[mesh.block]",
+        "[analysis]",
+        "[analysis.linear_solver]",
+        "[materials.a]",
+        "[regions.a]",
+        "[[coils]]",
+        "[boundaries]",
+        "[objective]",
+        "[design]",
+        "[remesh]",
+        "[[remesh.subregions]]",
+        "[optimizer]",
+        "[[probes]]",
+        "[output]",
+    ];
+    for table in tables {
+        for key in known_to_reader(table, &format!("{table}\nzzzzzzzzzz = 1\n")) {
+            let forms = [format!("`{key}`"), format!(".{key}`"), format!(".{key}]")];
+            assert!(forms.iter().any(|form| page.contains(form)), "{table}: `{key}`");
+        }
+    }
+    for key in known_to_reader("the top", "zzzzzzzzzz = 1\n") {
+        assert!(page.contains(&format!("`{key}`")) || page.contains(&format!("[{key}")), "`{key}`");
+    }
+}
+
+#[test]
+fn every_row_is_a_key() {
+    let page = page();
+    let keys = known_keys();
+    let configuration = &page[..page.find("\n## Overrides").expect("the heading")];
+    for heading in configuration.lines().filter(|line| line.starts_with("##")) {
+        let rows =
+            section(&page, heading).lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+        for key in rows {
+            assert!(keys.contains(&(heading.to_owned(), key.to_owned())), "{heading}: `{key}` is no key");
+        }
+    }
+}

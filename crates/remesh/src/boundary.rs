@@ -1,0 +1,255 @@
+//! Which displacement components are unknown: the design, fixed, sliding and free parts of the remesh region.
+//!
+//! Every face of the region's elements gets a kind, and a node takes on the constraints of *all* faces that meet at it:
+//! where a sliding plane meets a fixed surface the edge is fixed, where two sliding planes meet it moves along the edge
+//! only. A face has the kind of the surface that lists it (fixed before slide before free), else by default
+//!
+//! * fixed, where the region ends: at elements outside it or at the outside of the mesh;
+//! * fixed, between two regions of the mesh: a shape contour moves only if it is designed ("suppress all the degrees
+//!   of freedom that represent the fixed shape contour", section 2 of the paper);
+//! * unconstrained elsewhere, subregions with different laws inside one region of the mesh included.
+//!
+//! Design nodes are prescribed in all components, whatever faces meet there. Nodes listed as fixed come next.
+
+use fluxmorph_geometry::tet4::{FACES, area_vector, centroid, norm};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+use rayon::prelude::*;
+
+use crate::deform::RemeshSetup;
+use crate::error::RemeshError;
+
+/// Largest component of a unit normal across the axis of a sliding face: coordinates in files carry 6 or more digits.
+const NORMAL_TOLERANCE: f64 = 1e-6;
+
+/// What the nodes of a surface may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BoundaryKind {
+    /// Displacement prescribed by the design.
+    Design,
+    /// No displacement.
+    Fixed,
+    /// No displacement along the normal of each face; faces must be normal to an axis.
+    Slide,
+    /// No constraint, where the default would be fixed.
+    Free,
+}
+
+impl BoundaryKind {
+    /// Its name in configurations and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Design => "design",
+            Self::Fixed => "fixed",
+            Self::Slide => "slide",
+            Self::Free => "free",
+        }
+    }
+}
+
+/// A surface and its kind. Triangles that are no face of the remesh region are passed over: a symmetry plane may be
+/// larger than the region.
+#[derive(Clone, Debug)]
+pub struct Boundary {
+    /// Name, for messages.
+    pub name: String,
+    /// What its nodes may do.
+    pub kind: BoundaryKind,
+    /// Its triangles, in any orientation.
+    pub triangles: Vec<[NodeId; 3]>,
+}
+
+impl Boundary {
+    /// A named surface of the mesh.
+    ///
+    /// # Errors
+    /// [`MeshError::UnknownSurface`].
+    pub fn of_surface(topology: &Topology, name: &str, kind: BoundaryKind) -> Result<Self, MeshError> {
+        Ok(Self { name: name.to_owned(), kind, triangles: topology.surface(name)?.to_vec() })
+    }
+}
+
+/// What is known at every node of the mesh.
+#[derive(Debug)]
+pub(crate) struct Constraints {
+    /// Design nodes in the order of the design displacement.
+    pub(crate) design_nodes: Vec<NodeId>,
+    /// By node: whether it is a design node.
+    pub(crate) is_design: Vec<bool>,
+    /// By node: bit `c` is set where component `c` is held at zero; all three outside the remesh region.
+    held: Vec<u8>,
+}
+
+/// All three components.
+const ALL: u8 = 0b111;
+
+impl Constraints {
+    /// Decides every node; `elements` are those of the remesh region.
+    pub(crate) fn new(mesh: &Mesh, setup: &RemeshSetup, elements: &[ElementId]) -> Result<Self, RemeshError> {
+        let topology = mesh.topology();
+        let node_count = topology.node_count();
+        check_nodes("the list of design nodes", &setup.design_nodes, node_count)?;
+        check_nodes("the list of fixed nodes", &setup.fixed_nodes, node_count)?;
+        let faces = sorted_faces(topology, elements);
+        let rules = FaceRules::new(mesh, &setup.boundaries, &faces)?;
+
+        let mut held = vec![ALL; node_count];
+        let mut touched_outside = vec![true; node_count];
+        for node in elements.iter().flat_map(|&e| topology.tet(e)) {
+            held[node.index()] = 0;
+            touched_outside[node.index()] = false;
+        }
+        let mut in_region = vec![false; topology.tets().len()];
+        elements.iter().for_each(|e| in_region[e.index()] = true);
+        for e in topology.elements().filter(|e| !in_region[e.index()]) {
+            topology.tet(e).iter().for_each(|n| touched_outside[n.index()] = true);
+        }
+
+        let region_of = topology.region_of();
+        for group in faces.chunk_by(|a, b| a.0 == b.0) {
+            let nodes = group[0].0;
+            let by_default = match group {
+                [(_, a), (_, b)] if region_of[a.index()] == region_of[b.index()] => 0,
+                _ => ALL,
+            };
+            let bits = rules.held(nodes).unwrap_or(by_default);
+            for node in nodes {
+                held[node.index()] |= bits;
+                if group.len() == 1 {
+                    touched_outside[node.index()] = false;
+                }
+            }
+        }
+        // A node that meets the outside by an edge or a corner only is on no face of the border.
+        for (held, _) in held.iter_mut().zip(&touched_outside).filter(|(_, outside)| **outside) {
+            *held = ALL;
+        }
+        setup.fixed_nodes.iter().for_each(|n| held[n.index()] = ALL);
+
+        let mut constraints = Self { design_nodes: Vec::new(), is_design: vec![false; node_count], held };
+        constraints.add_design_nodes(mesh, setup, &rules.design_nodes, elements)?;
+        Ok(constraints)
+    }
+
+    fn add_design_nodes(
+        &mut self,
+        mesh: &Mesh,
+        setup: &RemeshSetup,
+        of_surfaces: &[NodeId],
+        elements: &[ElementId],
+    ) -> Result<(), RemeshError> {
+        let topology = mesh.topology();
+        let mut in_region = vec![false; topology.node_count()];
+        for node in elements.iter().flat_map(|&e| topology.tet(e)) {
+            in_region[node.index()] = true;
+        }
+        for &node in &setup.design_nodes {
+            if !in_region[node.index()] {
+                return Err(RemeshError::DesignNodeOutside { node, point: mesh.point(node) });
+            }
+            if std::mem::replace(&mut self.is_design[node.index()], true) {
+                return Err(RemeshError::RepeatedDesignNode { node });
+            }
+        }
+        self.design_nodes.extend(&setup.design_nodes);
+        for &node in of_surfaces {
+            if !std::mem::replace(&mut self.is_design[node.index()], true) {
+                self.design_nodes.push(node);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a displacement component is an unknown of Eq. 3.
+    #[inline]
+    pub(crate) fn is_unknown(&self, node: NodeId, component: usize) -> bool {
+        !self.is_design[node.index()] && self.held[node.index()] >> component & 1 == 0
+    }
+}
+
+fn check_nodes(list: &str, nodes: &[NodeId], node_count: usize) -> Result<(), RemeshError> {
+    match nodes.iter().find(|n| n.index() >= node_count) {
+        Some(&node) => Err(RemeshError::DanglingNode { list: list.to_owned(), node, nodes: node_count }),
+        None => Ok(()),
+    }
+}
+
+/// Sorted nodes of every face of the elements, with the element; sorted, so that the two sides follow each other.
+fn sorted_faces(topology: &Topology, elements: &[ElementId]) -> Vec<([NodeId; 3], ElementId)> {
+    let mut faces: Vec<_> = elements
+        .par_iter()
+        .flat_map_iter(|&e| FACES.iter().map(move |face| (sorted(face.map(|v| topology.tet(e)[v])), e)))
+        .collect();
+    faces.par_sort_unstable();
+    faces
+}
+
+fn sorted(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
+    nodes.sort_unstable();
+    nodes
+}
+
+/// What the listed surfaces say about single faces.
+struct FaceRules {
+    /// Sorted by face; the strongest rule of a face comes first.
+    rules: Vec<([NodeId; 3], std::cmp::Reverse<u8>)>,
+    /// Nodes of design surfaces, ascending.
+    design_nodes: Vec<NodeId>,
+}
+
+impl FaceRules {
+    fn new(
+        mesh: &Mesh,
+        boundaries: &[Boundary],
+        faces: &[([NodeId; 3], ElementId)],
+    ) -> Result<Self, RemeshError> {
+        let mut rules = Vec::new();
+        let mut design_nodes = Vec::new();
+        for boundary in boundaries {
+            let list = || format!("the surface `{}`", boundary.name);
+            let mut used = false;
+            for &triangle in &boundary.triangles {
+                check_nodes(&list(), &triangle, mesh.topology().node_count())?;
+                let key = sorted(triangle);
+                if faces.binary_search_by_key(&key, |face| face.0).is_err() {
+                    continue;
+                }
+                used = true;
+                let bits = match boundary.kind {
+                    BoundaryKind::Design => {
+                        design_nodes.extend(triangle);
+                        continue;
+                    }
+                    BoundaryKind::Fixed => ALL,
+                    BoundaryKind::Slide => 1 << normal_axis(mesh, boundary, triangle)?,
+                    BoundaryKind::Free => 0,
+                };
+                rules.push((key, std::cmp::Reverse(bits)));
+            }
+            if !used {
+                let (surface, kind) = (boundary.name.clone(), boundary.kind.name());
+                return Err(RemeshError::SurfaceElsewhere { surface, kind });
+            }
+        }
+        // More bits are the stronger rule; two slides on one face have one normal.
+        rules.sort_unstable();
+        design_nodes.sort_unstable();
+        design_nodes.dedup();
+        Ok(Self { rules, design_nodes })
+    }
+
+    /// Components held on a face that a surface lists.
+    fn held(&self, face: [NodeId; 3]) -> Option<u8> {
+        let first = self.rules.partition_point(|rule| rule.0 < face);
+        self.rules.get(first).filter(|rule| rule.0 == face).map(|rule| rule.1.0)
+    }
+}
+
+/// The axis that a sliding triangle is normal to.
+fn normal_axis(mesh: &Mesh, boundary: &Boundary, triangle: [NodeId; 3]) -> Result<usize, RemeshError> {
+    let vertices = triangle.map(|n| mesh.point(n));
+    let area = area_vector(vertices);
+    let normal = area.map(|a| a / norm(area));
+    (0..3).find(|&axis| (0..3).all(|d| d == axis || normal[d].abs() <= NORMAL_TOLERANCE)).ok_or_else(|| {
+        RemeshError::SlideNormal { surface: boundary.name.clone(), centroid: centroid(vertices), normal }
+    })
+}

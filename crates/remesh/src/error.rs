@@ -1,0 +1,125 @@
+//! What can be wrong with a remesh region or with a motion of it.
+
+use fluxmorph_geometry::{ElementId, MeshError, NodeId};
+
+/// Errors of this crate; each names the culprit.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RemeshError {
+    /// The remesh region has no element.
+    #[error("the remesh region has no element: name at least one region of the mesh")]
+    EmptyRegion,
+    /// An element lies in two subregions.
+    #[error(
+        "element {element} lies in the remesh subregions `{first}` and `{second}`: they must not overlap"
+    )]
+    Overlap {
+        /// The element.
+        element: ElementId,
+        /// The subregion that has it first.
+        first: String,
+        /// The other one.
+        second: String,
+    },
+    /// A subregion names an element that the mesh does not have.
+    #[error(
+        "the remesh subregion `{subregion}` names element {element}, but the mesh has {elements} elements"
+    )]
+    DanglingElement {
+        /// The subregion.
+        subregion: String,
+        /// The element named.
+        element: ElementId,
+        /// Elements of the mesh.
+        elements: usize,
+    },
+    /// A surface or node list of the set-up names a node that the mesh does not have.
+    #[error("{list} names node {node}, but the mesh has {nodes} nodes")]
+    DanglingNode {
+        /// Which list.
+        list: String,
+        /// The node named.
+        node: NodeId,
+        /// Nodes of the mesh.
+        nodes: usize,
+    },
+    /// A parameter of a subregion is out of range.
+    #[error("{parameter} = {value} of the remesh subregion `{subregion}`: {expected}")]
+    Parameter {
+        /// The subregion.
+        subregion: String,
+        /// Name of the parameter.
+        parameter: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range expected.
+        expected: &'static str,
+    },
+    /// A design node is no node of the remesh region.
+    #[error(
+        "design node {node} at {point:?} m is not in the remesh region: enlarge the region so that it holds the \
+         elements around every design node"
+    )]
+    DesignNodeOutside {
+        /// The node.
+        node: NodeId,
+        /// Where it lies [m].
+        point: [f64; 3],
+    },
+    /// A design node is listed twice.
+    #[error("design node {node} is listed twice: a node has one displacement")]
+    RepeatedDesignNode {
+        /// The node.
+        node: NodeId,
+    },
+    /// A surface with a boundary kind does not touch the remesh region.
+    #[error(
+        "no triangle of the surface `{surface}` ({kind}) is a face of the remesh region: drop it from the list"
+    )]
+    SurfaceElsewhere {
+        /// The surface.
+        surface: String,
+        /// Its kind: design, fixed, slide or free.
+        kind: &'static str,
+    },
+    /// A sliding surface has a triangle whose normal is not along an axis.
+    #[error(
+        "the surface `{surface}` cannot slide: its triangle at {centroid:?} m has the normal {normal:?}, and only \
+         faces normal to x, y or z may slide; list it as fixed or free"
+    )]
+    SlideNormal {
+        /// The surface.
+        surface: String,
+        /// Centroid of the triangle [m].
+        centroid: [f64; 3],
+        /// Its unit normal.
+        normal: [f64; 3],
+    },
+    /// A part of the remesh region can move as a rigid body.
+    #[error(
+        "the connected part of the remesh region around {point:?} m can move as a rigid body: fix, or let slide, \
+         enough of its boundary"
+    )]
+    Unrestrained {
+        /// A node of the part [m].
+        point: [f64; 3],
+    },
+    /// A motion inverts an element.
+    #[error(
+        "the motion inverts element {element} of region `{region}` at {centroid:?} m: only {fraction:.4} of the step \
+         can be taken; shorten it, enlarge the remesh region or change its stiffness"
+    )]
+    Inverted {
+        /// The first element to invert along the motion.
+        element: ElementId,
+        /// Its region.
+        region: String,
+        /// Its centroid before the motion [m].
+        centroid: [f64; 3],
+        /// Share of the motion at which its volume vanishes, in `0 ..= 1`.
+        fraction: f64,
+    },
+    /// The mesh or the linear algebra failed.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}

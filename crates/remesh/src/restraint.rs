@@ -1,0 +1,114 @@
+//! Whether every connected part of the remesh region is held: otherwise `K_dd` of Eq. 3 is singular.
+//!
+//! A part is held when no rigid motion `t + r × x` vanishes at all its known components. With `R` the rows of the six
+//! rigid motions at those components, that is: `Rᵀ R`, shape `(6, 6)`, is regular.
+
+use fluxmorph_geometry::fem::DofMap;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+
+use crate::error::RemeshError;
+
+/// Pivots below this share of the largest are zero; lengths are scaled to the part, so that true pivots are moderate.
+const SINGULAR: f64 = 1e-10;
+
+/// Refuses a region of which a part can move as a rigid body.
+pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &DofMap<3>) -> Result<(), RemeshError> {
+    let topology = mesh.topology();
+    let mut parent: Vec<u32> = (0..topology.node_count() as u32).collect();
+    for &e in elements {
+        let [first, others @ ..] = topology.tet(e);
+        for other in others {
+            let (a, b) = (root(&mut parent, first.0), root(&mut parent, other.0));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut nodes: Vec<(u32, NodeId)> =
+        elements.iter().flat_map(|&e| topology.tet(e)).map(|n| (root(&mut parent, n.0), n)).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    for part in nodes.chunk_by(|a, b| a.0 == b.0) {
+        if part.iter().any(|&(_, n)| unknowns.unknown_bits(n) != 0) && !is_held(mesh, part, unknowns) {
+            return Err(RemeshError::Unrestrained { point: mesh.point(part[0].1) });
+        }
+    }
+    Ok(())
+}
+
+/// The representative of a node's part, with path halving.
+fn root(parent: &mut [u32], mut node: u32) -> u32 {
+    while parent[node as usize] != node {
+        let grandparent = parent[parent[node as usize] as usize];
+        parent[node as usize] = grandparent;
+        node = grandparent;
+    }
+    node
+}
+
+fn is_held(mesh: &Mesh, part: &[(u32, NodeId)], unknowns: &DofMap<3>) -> bool {
+    let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for &(_, n) in part {
+        let p = mesh.point(n);
+        for d in 0..3 {
+            limits[0][d] = limits[0][d].min(p[d]);
+            limits[1][d] = limits[1][d].max(p[d]);
+        }
+    }
+    let size = (0..3).map(|d| limits[1][d] - limits[0][d]).fold(0.0, f64::max);
+    let mut gram = [[0.0; 6]; 6];
+    for &(_, n) in part {
+        let p = mesh.point(n);
+        let x: [f64; 3] = std::array::from_fn(|d| (2.0 * p[d] - limits[0][d] - limits[1][d]) / size);
+        for c in (0..3).filter(|&c| unknowns.equation(n, c).is_none()) {
+            let mut row = [0.0; 6];
+            row[c] = 1.0;
+            // Component c of r × x.
+            let (next, last) = ((c + 1) % 3, (c + 2) % 3);
+            row[3 + next] = x[last];
+            row[3 + last] = -x[next];
+            for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+                gram[i][j] += row[i] * row[j];
+            }
+        }
+    }
+    is_regular(gram)
+}
+
+/// Elimination with diagonal pivoting on a positive semidefinite matrix.
+fn is_regular(mut gram: [[f64; 6]; 6]) -> bool {
+    let largest = (0..6).map(|i| gram[i][i]).fold(0.0, f64::max);
+    let mut left = [true; 6];
+    for _ in 0..6 {
+        let candidates = (0..6).filter(|&i| left[i]);
+        let Some(pivot) = candidates.max_by(|&i, &j| gram[i][i].total_cmp(&gram[j][j])) else { return true };
+        if gram[pivot][pivot] <= SINGULAR * largest {
+            return false;
+        }
+        left[pivot] = false;
+        for i in (0..6).filter(|&i| left[i]) {
+            let factor = gram[i][pivot] / gram[pivot][pivot];
+            for j in 0..6 {
+                gram[i][j] -= factor * gram[pivot][j];
+            }
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gram_matrix_that_misses_one_direction_is_singular() {
+        let mut identity = [[0.0; 6]; 6];
+        (0..6).for_each(|i| identity[i][i] = 1.0);
+        assert!(is_regular(identity));
+        let direction = [1.0, -2.0, 0.5, 0.0, 1.0, 3.0];
+        let square: f64 = direction.iter().map(|d| d * d).sum();
+        let projected: [[f64; 6]; 6] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| identity[i][j] - direction[i] * direction[j] / square)
+        });
+        assert!(!is_regular(projected));
+        assert!(!is_regular([[0.0; 6]; 6]));
+    }
+}

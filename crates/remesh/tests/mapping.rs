@@ -1,0 +1,191 @@
+//! The elastic map of Eq. 3 as a linear map: patch test, scaling laws of section 2 of the paper, transpose, bits.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod support;
+
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_remesh::{Boundary, BoundaryKind, ElasticMap, RemeshSetup, StiffnessPolicy, Subregion};
+use support::{Point, at, largest_difference, nodes_where, noise, outer_design, random, unit_cells, whole};
+
+const POLICIES: [StiffnessPolicy; 3] =
+    [StiffnessPolicy::Uniform, StiffnessPolicy::InverseSize, StiffnessPolicy::InverseVolume];
+
+/// A distorted block, one mesh region, cut into two subregions of different law across x.
+fn two_laws(mesh: &Mesh, young: [f64; 2], poisson: [f64; 2]) -> Vec<Subregion> {
+    let centre = mesh.bounding_box()[1][0] / 2.0;
+    let side = |e| mesh.vertices(e).iter().map(|x| x[0]).sum::<f64>() < 4.0 * centre;
+    let (left, right) = mesh.topology().elements().partition(|&e| side(e));
+    let law = |i: usize, elements| Subregion {
+        young: young[i],
+        poisson: poisson[i],
+        ..Subregion::new(["left", "right"][i], elements)
+    };
+    vec![law(0, left), law(1, right)]
+}
+
+/// Roller sides, a designed square on the top, a free rest of the top: every kind of boundary at once.
+fn mixed(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> RemeshSetup {
+    let top = mesh.bounding_box()[1][2];
+    let kinds = [
+        ("x_min", BoundaryKind::Slide),
+        ("x_max", BoundaryKind::Slide),
+        ("y_min", BoundaryKind::Slide),
+        ("z_max", BoundaryKind::Free),
+    ];
+    let boundary = |(name, kind)| Boundary::of_surface(mesh.topology(), name, kind).unwrap();
+    RemeshSetup {
+        subregions,
+        policy,
+        design_nodes: nodes_where(mesh, |p| p[2] == top && (2.0..=3.0).contains(&p[0])),
+        boundaries: kinds.map(boundary).to_vec(),
+        fixed_nodes: Vec::new(),
+    }
+}
+
+#[test]
+fn affine_motion_of_the_boundary_is_reproduced_by_any_one_law() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    let affine = |x: Point| {
+        [
+            0.1 + 0.3 * x[0] - 0.2 * x[1] + 0.05 * x[2],
+            -0.2 + 0.1 * x[0] + 0.4 * x[1] - 0.1 * x[2],
+            0.7 - 0.3 * x[0] + 0.02 * x[1] - 0.25 * x[2],
+        ]
+    };
+    for (young, poisson) in [(1.0, 0.3), (1e8, 0.3), (2.0, 0.0), (2.0, 0.45)] {
+        let subregions = vec![Subregion { young, poisson, ..whole(&mesh).remove(0) }];
+        let map = ElasticMap::new(&mesh, outer_design(&mesh, subregions, StiffnessPolicy::Uniform)).unwrap();
+        let u = map.displacement(&at(&mesh, map.design_nodes(), affine));
+        // Displacements of up to 3 m on a mesh of 6 m: 1e-12 is rounding.
+        assert!(largest_difference(&u, &at(&mesh, &all(&mesh), affine)) < 1e-12);
+    }
+}
+
+#[test]
+fn translation_and_rotation_are_reproduced_by_any_law() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    for policy in POLICIES {
+        let subregions = two_laws(&mesh, [1.0, 40.0], [0.0, 0.45]);
+        let map = ElasticMap::new(&mesh, outer_design(&mesh, subregions, policy)).unwrap();
+        // A linearised rotation has no strain in any law; a finite one is affine, and needs one law.
+        let turn =
+            |x: Point| [0.3 - 0.2 * x[1] + 0.1 * x[2], 0.2 * x[0] - 0.4 * x[2], 0.4 * x[1] - 0.1 * x[0]];
+        let u = map.displacement(&at(&mesh, map.design_nodes(), turn));
+        assert!(largest_difference(&u, &at(&mesh, &all(&mesh), turn)) < 1e-12, "{policy:?}");
+    }
+    let map = ElasticMap::new(&mesh, outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform)).unwrap();
+    let turn = support::rotation(1.0);
+    let u = map.displacement(&at(&mesh, map.design_nodes(), &turn));
+    assert!(largest_difference(&u, &at(&mesh, &all(&mesh), &turn)) < 1e-12);
+}
+
+#[test]
+fn without_force_the_motion_is_independent_of_young() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    for policy in POLICIES {
+        let motion = |scale: f64| {
+            let subregions = two_laws(&mesh, [0.5 * scale, 3.0 * scale], [0.3, 0.1]);
+            let map = ElasticMap::new(&mesh, mixed(&mesh, subregions, policy)).unwrap();
+            map.displacement(&random(map.design_nodes().len(), 1))
+        };
+        assert!(largest_difference(&motion(1.0), &motion(1e9)) < 1e-12);
+    }
+}
+
+#[test]
+fn motion_depends_on_force_over_young_and_force_is_the_constant_part() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    let map = |scale: f64| {
+        let mut subregions = two_laws(&mesh, [0.5 * scale, 3.0 * scale], [0.3, 0.1]);
+        subregions[0].force = [0.0, 0.0, -8e-3 * scale];
+        subregions[1].force = [2e-3 * scale, 0.0, 1e-3 * scale];
+        ElasticMap::new(&mesh, mixed(&mesh, subregions, StiffnessPolicy::InverseSize)).unwrap()
+    };
+    let (one, large) = (map(1.0), map(1e6));
+    let design = random(one.design_nodes().len(), 2);
+    let (u, v) = (one.displacement(&design), large.displacement(&design));
+    assert!(largest_difference(&u, &v) < 1e-12);
+
+    assert!(largest_difference(one.offset(), &vec![[0.0; 3]; u.len()]) > 1e-3);
+    assert_eq!(one.displacement(&vec![[0.0; 3]; design.len()]), one.offset());
+    let sum: Vec<Point> = one
+        .linear(&design)
+        .iter()
+        .zip(one.offset())
+        .map(|(a, b)| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+        .collect();
+    assert_eq!(u, sum);
+}
+
+#[test]
+fn the_gradient_is_the_transposed_map() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    let inner = |a: &[Point], b: &[Point]| -> f64 {
+        a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| x * y).sum()
+    };
+    for policy in POLICIES {
+        let mut setup = mixed(&mesh, two_laws(&mesh, [0.5, 30.0], [0.3, 0.1]), policy);
+        setup.subregions[0].force = [0.0, 0.0, -1.0];
+        setup.design_nodes.reverse();
+        let map = ElasticMap::new(&mesh, setup).unwrap();
+        for seed in 0..5 {
+            let x = random(map.design_nodes().len(), 2 * seed + 1);
+            let y = random(mesh.points().len(), 2 * seed + 2);
+            let (forward, transposed) = (inner(&map.linear(&x), &y), inner(&x, &map.gradient(&y)));
+            assert!((forward - transposed).abs() <= 1e-12 * forward.abs().max(1.0), "{forward} {transposed}");
+        }
+    }
+}
+
+#[test]
+fn map_and_transpose_have_the_same_bits_for_any_number_of_threads() {
+    let mesh = support::shaken(&unit_cells([16, 16, 14]), 0.15);
+    let bits = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let setup = mixed(&mesh, two_laws(&mesh, [0.5, 30.0], [0.3, 0.1]), StiffnessPolicy::InverseSize);
+            let map = ElasticMap::new(&mesh, setup).unwrap();
+            let u = map.displacement(&random(map.design_nodes().len(), 3));
+            let g = map.gradient(&random(u.len(), 4));
+            u.iter().chain(&g).flatten().map(|v| v.to_bits()).collect::<Vec<_>>()
+        })
+    };
+    let one = bits(1);
+    assert_eq!(one, bits(2));
+    assert_eq!(one, bits(4));
+}
+
+#[test]
+fn a_rebase_onto_the_moved_mesh_equals_a_new_map_there() {
+    let mesh = unit_cells([6, 5, 4]);
+    let setup = || mixed(&mesh, two_laws(&mesh, [0.5, 3.0], [0.3, 0.1]), StiffnessPolicy::InverseSize);
+    let first = ElasticMap::new(&mesh, setup()).unwrap();
+    let mut noise = noise(5);
+    let design: Vec<Point> = first.design_nodes().iter().map(|_| [0.0, 0.0, 0.2 * noise()]).collect();
+    let moved = mesh.moved(&first.displacement(&design)).unwrap();
+    let (rebased, new) = (first.rebased(&moved).unwrap(), ElasticMap::new(&moved, setup()).unwrap());
+    assert_eq!(rebased.displacement(&design), new.displacement(&design));
+    assert_ne!(rebased.displacement(&design), first.displacement(&design));
+}
+
+/// Table 2: a block with a free top, bottom and sides fixed, and a line of five nodes on the top prescribed.
+#[test]
+fn the_equation_counts_of_table_2_are_exact() {
+    for (cells, equations) in [([6, 6, 5], 360), ([10, 10, 9], 2172), ([14, 14, 13], 6576)] {
+        let mesh = unit_cells(cells);
+        let [_, [size, width, top]] = mesh.bounding_box();
+        let line = |p: Point| p[2] == top && p[1] == width / 2.0 && (p[0] - size / 2.0).abs() <= 2.0;
+        let setup = RemeshSetup {
+            subregions: whole(&mesh),
+            design_nodes: nodes_where(&mesh, line),
+            boundaries: vec![Boundary::of_surface(mesh.topology(), "z_max", BoundaryKind::Free).unwrap()],
+            ..RemeshSetup::default()
+        };
+        assert_eq!(setup.design_nodes.len(), 5);
+        assert_eq!(ElasticMap::new(&mesh, setup).unwrap().equation_count(), equations);
+    }
+}
+
+fn all(mesh: &Mesh) -> Vec<NodeId> {
+    mesh.topology().nodes().collect()
+}

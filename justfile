@@ -1,0 +1,37 @@
+# `just` alone lists the targets. None is needed to build or to test: each is one or two cargo commands.
+
+_default:
+    @{{ just_executable() }} --list --unsorted
+
+# Format all sources
+fmt:
+    cargo fmt --all
+
+# Formatting and clippy, warnings are errors
+lint:
+    cargo fmt --all --check
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# All tests but the long ones, with overflow checks and debug assertions
+test:
+    cargo test --workspace
+
+# The long tests: the paper's tables and runs, convergence on fine meshes
+test-long:
+    cargo test --release --workspace -- --ignored
+
+# The documentation of the code, warnings are errors
+doc:
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+# CPU time of assembly, factor, solve, adjoint, gradient and remesh
+bench:
+    cargo bench --workspace
+
+# A first optimisation, in seconds (it ends at its limit of evaluations): results in configs/runs/shield_quick
+demo:
+    cargo run --release -- run configs/shield_quick.toml --force || test $? -eq 1
+
+# What must be green before a change is taken
+ci:
+    .ci/run
