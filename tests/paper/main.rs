@@ -7,13 +7,13 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::setup::Setup;
-use fluxmorph_optimizer::Error;
 use fluxmorph_solver::recovery;
 use support::{ShieldReference, config, relative_l2, setup};
 
@@ -47,8 +47,9 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
     let mut cells = [0.0; 2];
     let mut probes = [0.0; 2];
     let flat_design = vec![0.0; reference.framed_design.len()];
-    for (case, (p, b)) in
-        [(&flat_design, &reference.flat), (&reference.framed_design, &reference.framed)].into_iter().enumerate()
+    for (case, (p, b)) in [(&flat_design, &reference.flat), (&reference.framed_design, &reference.framed)]
+        .into_iter()
+        .enumerate()
     {
         let analysis = value(problem, p);
         let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
@@ -63,7 +64,9 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
             flat_rms = rms(value);
         }
     }
-    println!("{name}: relative l2 of B, flat and framed: cells {cells:.4?}, recovered at points {probes:.4?}");
+    println!(
+        "{name}: relative l2 of B, flat and framed: cells {cells:.4?}, recovered at points {probes:.4?}"
+    );
     (flat_rms, cells, probes)
 }
 
@@ -120,7 +123,10 @@ fn frequency_and_box_change_the_result_as_the_reference_says() {
         "mesh.shield.outer=[\"900 mm\", \"1080 mm\"]",
         "mesh.shield.outer_z=[\"-600 mm\", \"720 mm\"]",
     ]);
-    println!("framed F/F0: {base:.4}; at 50 Hz {at_50_hertz:.4}; box +50 % {large:.4}, F0 {:+.3}", flat_large / flat - 1.0);
+    println!(
+        "framed F/F0: {base:.4}; at 50 Hz {at_50_hertz:.4}; box +50 % {large:.4}, F0 {:+.3}",
+        flat_large / flat - 1.0
+    );
     // Reference: 0.502, 0.501 (−0.001), 0.512 (+0.010), F0 +9 %. Differences on one kind of mesh are sharper than values.
     assert!((at_50_hertz - base + 0.001).abs() <= 0.003);
     assert!((large - base - 0.010).abs() <= 0.006);
@@ -196,7 +202,9 @@ fn the_meshed_run_reaches_the_papers_ratio() {
     println!("worst quality {worst:.6}, at the start {:.6}", rows[0].worst_quality);
     assert!(worst >= rows[0].worst_quality / 3.0);
     let kept = skin_layers_kept(&setup, &optimised.best.analysis);
-    println!("least share of their thickness that the skin layers keep, from the moving face inwards: {kept:.3?}");
+    println!(
+        "least share of their thickness that the skin layers keep, from the moving face inwards: {kept:.3?}"
+    );
     assert!(kept[..2].iter().all(|&share| share >= 0.7), "{kept:?}");
 }
 

@@ -150,7 +150,8 @@ pub fn measure(
     let least_slope = directions.iter().map(|d| d.slope).fold(f64::INFINITY, f64::min);
     let largest_error = directions.iter().map(|d| d.error).fold(0.0, f64::max);
     // A comparison with NaN is false: a certificate that cannot be measured does not hold.
-    let holds = directions.iter().all(|d| d.slope >= settings.least_slope && d.error <= settings.largest_error);
+    let holds =
+        directions.iter().all(|d| d.slope >= settings.least_slope && d.error <= settings.largest_error);
     Ok(Certificate { objective, directions, least_slope, largest_error, holds })
 }
 
