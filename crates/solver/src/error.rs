@@ -35,6 +35,20 @@ pub enum SolverError {
         /// Why, and what to do.
         cause: String,
     },
+    /// A coil's window or winding meets a face on which its source would be wrong.
+    #[error(
+        "the coil `{coil}` or its window meets {surface} at {place:?} m, where H is prescribed and not B: the source \
+         T of the coil has a tangential part there, which would act as a surface current. Move the coil away, or make \
+         the face flux-parallel"
+    )]
+    SourceOnBoundary {
+        /// Name of the coil.
+        coil: String,
+        /// Which face.
+        surface: String,
+        /// Centroid of the offending triangle [m].
+        place: [f64; 3],
+    },
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]
     EmptyRegion {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, ElementGroup, LocalMatrix, c64,
 };
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::{self, Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::coil::{self, Coil};
@@ -22,6 +22,9 @@ use crate::linear::{LinearSolverSettings, PreparedSystem, SystemAnalysis};
 use crate::material::Material;
 use crate::solution::FieldSolution;
 use crate::unknowns::{PSI, Unknowns};
+
+/// Sine of the angle between a face's normal and a coil's axis up to which `T` counts as normal to the face: rounding.
+const NORMAL_TOLERANCE: f64 = 1e-6;
 
 /// A condition on a planar outer surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,6 +150,7 @@ impl FieldModel {
         let (tets, triangles) = (pattern.bind(&volumes), pattern.bind(&surfaces));
         let analysis = SystemAnalysis::new(pattern.structure(), setup.linear_solver)?;
         let moments = total_moments(mesh, &setup.coils)?;
+        check_sources(mesh, &setup)?;
         Ok(Self {
             topology,
             angular_frequency,
@@ -286,6 +290,51 @@ impl FieldModel {
     }
 }
 
+/// Refuses a coil whose `T` has a tangential part on a face that is not flux-parallel.
+///
+/// The load `∫T·curl w` holds the surface term `∮(T × n)·w`: it vanishes where the tangential `w` does (flux-parallel
+/// planes) or where `T` is normal to the face; elsewhere it would make the natural condition `n × (H − T) = 0`.
+fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let topology = mesh.topology();
+    let mut flux_parallel = HashSet::new();
+    for (name, _) in setup.boundaries.iter().filter(|(_, b)| *b == Boundary::FluxParallel) {
+        flux_parallel.extend(topology.surface(name)?.iter().map(sorted));
+    }
+    let open = topology.facets().iter().filter(|f| f.outside.is_none());
+    for facet in open.filter(|f| !flux_parallel.contains(&sorted(&f.nodes))) {
+        let vertices = facet.nodes.map(|n| mesh.point(n));
+        let place = tet4::centroid(vertices);
+        let normal = tet4::area_vector(vertices);
+        let area = tet4::norm(normal);
+        for coil in &setup.coils {
+            let across = (1.0 - (normal[coil.shape.axis()] / area).powi(2)).max(0.0).sqrt();
+            if across > NORMAL_TOLERANCE && coil.shape.potential(place) != 0.0 {
+                let surface = setup
+                    .boundaries
+                    .iter()
+                    .find(|(name, _)| {
+                        topology
+                            .surface(name)
+                            .is_ok_and(|s| s.iter().any(|t| sorted(t) == sorted(&facet.nodes)))
+                    })
+                    .map_or_else(
+                        || "an outer face without a condition, or an impedance surface,".to_owned(),
+                        |(name, _)| format!("the flux-normal surface `{name}`"),
+                    );
+                return Err(SolverError::SourceOnBoundary { coil: coil.name.clone(), surface, place });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The nodes of a triangle, ascending: the same for both orientations.
+fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
+    let mut key = *triangle;
+    key.sort_unstable();
+    key
+}
+
 /// ψ with itself and with every component of `A`.
 fn with_psi() -> Coupling {
     (0..4).fold(Coupling::NONE, |set, i| set.with(i, PSI).with(PSI, i))
@@ -336,20 +385,14 @@ fn surface_terms(
     // On planes at right angles to an axis the term couples components that the condition fixes: nothing to store.
     let mut conditioned = HashSet::new();
     for (name, _) in &setup.boundaries {
-        for triangle in topology.surface(name)? {
-            let mut key = *triangle;
-            key.sort_unstable();
-            conditioned.insert(key);
-        }
+        conditioned.extend(topology.surface(name)?.iter().map(sorted));
     }
     let reluctivity = |e: ElementId| coefficients[topology.region_of()[e.index()].index()].reluctivity;
     let (mut nodes, mut terms) = (Vec::new(), Vec::new());
     for facet in topology.facets() {
         let outside = facet.outside.map_or(0.0, reluctivity);
         let jump = reluctivity(facet.inside) - outside;
-        let mut key = facet.nodes;
-        key.sort_unstable();
-        if jump != 0.0 && !(facet.outside.is_none() && conditioned.contains(&key)) {
+        if jump != 0.0 && !(facet.outside.is_none() && conditioned.contains(&sorted(&facet.nodes))) {
             nodes.push(facet.nodes);
             terms.push(SurfaceTerm::Interface(jump));
         }

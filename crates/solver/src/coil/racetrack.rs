@@ -106,6 +106,11 @@ impl Racetrack {
         }
     }
 
+    /// The coordinate axis that `T` points along.
+    pub fn axis(&self) -> usize {
+        self.axis
+    }
+
     /// `T_e` [A/m] at a point for one ampere-turn.
     pub fn potential(&self, x: Point) -> f64 {
         let local = self.local(x);
