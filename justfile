@@ -20,6 +20,10 @@ test:
 test-long:
     cargo test --release --workspace -- --ignored
 
+# The fields of fresh runs read through VTK; installs pyvista with pip below target/
+test-pyvista:
+    cargo test --release --test acceptance -- --ignored --nocapture pyvista
+
 # The documentation of the code, warnings are errors
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps

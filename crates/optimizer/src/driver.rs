@@ -6,7 +6,8 @@
 //!   started afresh at the best design, in a box shrunk by [`SHRINK`] towards it, so that the refused design lies
 //!   outside. After [`MAX_RESTARTS`] such restarts the run ends with [`StopReason::MeshLimit`] and the best design.
 //!   Such an attempt has no objective: it is no evaluation and leaves no row in the history, but a warning.
-//! * Limits of evaluations and time are checked before each evaluation, and a signal too: what was computed is kept.
+//! * Limits of evaluations and time are checked before each evaluation but the first, and a signal too: what was
+//!   computed is kept, and there always is a best design.
 
 use std::time::Instant;
 
@@ -97,7 +98,7 @@ enum Stop {
 
 /// Runs the optimisation of a problem with a shape and an objective.
 ///
-/// `interrupted` is asked before each evaluation.
+/// `interrupted` is asked before each evaluation but the first.
 ///
 /// # Errors
 /// [`Error`] of the first evaluation that fails for another reason than its mesh. What the recorder kept is whole.
@@ -231,7 +232,8 @@ impl Run<'_> {
     }
 
     fn check_limits(&self) -> Result<(), Stop> {
-        if (self.interrupted)() {
+        // Without a first evaluation there would be nothing to keep.
+        if self.evaluations > 0 && (self.interrupted)() {
             return Err(Stop::Limit(StopReason::Interrupted));
         }
         if self.evaluations == self.settings.max_evaluations {

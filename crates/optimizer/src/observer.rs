@@ -107,6 +107,25 @@ pub struct Silent;
 
 impl Observer for Silent {}
 
+/// Shows the warnings alone.
+#[derive(Debug)]
+pub struct Quiet<W>(pub W);
+
+impl<W: Write> Observer for Quiet<W> {
+    fn warning(&mut self, message: &str) {
+        show_warning(&mut self.0, message);
+    }
+}
+
+fn show_warning(writer: &mut impl Write, message: &str) {
+    show(writer, &format!("warning: {message}"));
+}
+
+/// A message that cannot be shown, as on a closed terminal, is no reason to stop a run.
+fn show(writer: &mut impl Write, text: &str) {
+    let _ = writeln!(writer, "{text}").and_then(|()| writer.flush());
+}
+
 /// Shows one plain line for each evaluation, and a summary.
 #[derive(Debug)]
 pub struct Console<W> {
@@ -127,9 +146,8 @@ impl<W: Write> Console<W> {
         Self { writer, header_is_shown: false }
     }
 
-    /// A message that cannot be shown, as on a closed terminal, is no reason to stop a run.
     fn line(&mut self, text: &str) {
-        let _ = writeln!(self.writer, "{text}").and_then(|()| self.writer.flush());
+        show(&mut self.writer, text);
     }
 }
 
@@ -174,7 +192,7 @@ impl<W: Write> Observer for Console<W> {
     }
 
     fn warning(&mut self, message: &str) {
-        self.line(&format!("warning: {message}"));
+        show_warning(&mut self.writer, message);
     }
 
     fn finished(&mut self, result: &RunResult) {

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use fluxmorph_geometry::io::pvd_text;
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::recovery;
+use fluxmorph_solver::{SolverError, recovery};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::driver::{self, Recorder};
@@ -30,7 +30,7 @@ pub struct Options<'a> {
     pub older_run: OlderRun,
     /// Threads in use, for the manifest.
     pub threads: usize,
-    /// Whether the user wants to stop; asked before each evaluation.
+    /// Whether the user wants to stop; asked before each evaluation but the first.
     pub interrupted: &'a dyn Fn() -> bool,
 }
 
@@ -75,6 +75,7 @@ pub fn run(
                 Some(&best.values),
                 optimised.initial_quality,
                 &optimised.timings,
+                observer,
             )?
         })
     })
@@ -120,6 +121,7 @@ pub fn solve(
                 values.as_deref(),
                 initial_quality,
                 &analysis.timings,
+                observer,
             )?
         })
     })
@@ -204,6 +206,7 @@ impl<'a> Session<'a> {
         values: Option<&[f64]>,
         initial_quality: f64,
         timings: &Timings,
+        observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
         let (model, solution, mesh) = (&problem.states[0], &analysis.solutions[0], &analysis.mesh);
@@ -212,12 +215,21 @@ impl<'a> Session<'a> {
             .probes
             .iter()
             .map(|probe| {
-                let b = recovery::probe(solution, model, mesh, &probe.name, &probe.points)?;
+                let at = |&point| match recovery::probe(solution, model, mesh, &probe.name, &[point]) {
+                    Ok(b) => Ok(b.first().copied()),
+                    // It was inside before the mesh moved: the result of a whole run is worth more than this point.
+                    Err(error @ SolverError::ProbeOutside { .. }) => {
+                        observer.warning(&format!("{error}: its field is left out"));
+                        Ok(None)
+                    }
+                    Err(error) => Err(error.into()),
+                };
+                let b = probe.points.iter().map(at).collect::<Result<Vec<_>, Error>>()?;
                 Ok(ProbeResult {
                     name: probe.name.clone(),
                     points_m: probe.points.clone(),
-                    b_re_t: b.iter().map(|b| b.map(|c| c.re)).collect(),
-                    b_im_t: b.iter().map(|b| b.map(|c| c.im)).collect(),
+                    b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
+                    b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
                 })
             })
             .collect::<Result<_, Error>>()?;

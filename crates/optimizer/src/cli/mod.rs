@@ -18,7 +18,7 @@ pub use exit::ExitCode;
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
-use crate::observer::{Console, Observer, Silent};
+use crate::observer::{Console, Observer, Quiet};
 use args::{Cli, Command};
 
 /// Do what the arguments of this process say.
@@ -55,7 +55,7 @@ fn message(error: &Error) -> String {
 
 /// Who shows the progress.
 fn observer(quiet: bool) -> Box<dyn Observer> {
-    if quiet { Box::new(Silent) } else { Box::new(Console::stderr()) }
+    if quiet { Box::new(Quiet(std::io::stderr())) } else { Box::new(Console::stderr()) }
 }
 
 /// Works on as many threads as asked for, or as the machine has; `work` is told how many.

@@ -4,6 +4,7 @@ use super::args::RunArgs;
 use super::exit::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
+use crate::output::StopReason;
 use crate::session::{self, Options};
 
 /// Do what the command line says.
@@ -20,6 +21,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         if args.common.json {
             stdout::print_json(&result)?;
         }
-        Ok(signal.received().filter(|_| interrupted()).unwrap_or_else(|| result.stop_reason.exit_code()))
+        // A signal that came too late to stop anything does not change how the run ended.
+        let stopped_by = signal.received().filter(|_| result.stop_reason == StopReason::Interrupted);
+        Ok(stopped_by.unwrap_or_else(|| result.stop_reason.exit_code()))
     })
 }

@@ -43,8 +43,11 @@ pub struct Region {
 pub(super) fn read_materials(root: &Section<'_>) -> BTreeMap<String, Material> {
     let read = |(name, section): (String, Section<'_>)| {
         let relative_permeability = section.number("relative_permeability", Range::POSITIVE).unwrap_or(1.0);
-        let conductivity =
-            section.quantity("conductivity", Dimension::Conductivity, Range::NOT_NEGATIVE).unwrap_or(0.0);
+        // A conductivity that is written but wrong stays unknown: nothing follows from it.
+        let left_out = if section.has("conductivity") { f64::NAN } else { 0.0 };
+        let conductivity = section
+            .quantity("conductivity", Dimension::Conductivity, Range::NOT_NEGATIVE)
+            .unwrap_or(left_out);
         section.finish();
         (name, Material { relative_permeability, conductivity })
     };

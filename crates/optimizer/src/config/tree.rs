@@ -146,7 +146,8 @@ pub(super) fn override_document(typed: &str) -> Document {
     } else {
         format!("{key} = {}", toml::Value::String(value.to_owned()))
     };
-    Document { name: format!("--set '{}'", typed.escape_debug()), text }
+    let shown: String = typed.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    Document { name: format!("--set '{shown}'"), text }
 }
 
 /// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.

@@ -43,7 +43,9 @@ pub enum OutputError {
         path: PathBuf,
     },
     /// The output directory is something else.
-    #[error("the output directory `{path}` is a file; choose a directory with --out or output.directory")]
+    #[error(
+        "the output directory `{path}` is a file or lies below one; choose a directory with --out or output.directory"
+    )]
     NotADirectory {
         /// The path.
         path: PathBuf,

@@ -144,10 +144,10 @@ pub struct ProbeResult {
     pub name: String,
     /// The points [m].
     pub points_m: Vec<[f64; 3]>,
-    /// Real part of B [T].
-    pub b_re_t: Vec<[f64; 3]>,
-    /// Imaginary part of B [T].
-    pub b_im_t: Vec<[f64; 3]>,
+    /// Real part of B [T]; `null` for a point that the moved mesh no longer holds.
+    pub b_re_t: Vec<Option<[f64; 3]>>,
+    /// Imaginary part of B [T]; `null` likewise.
+    pub b_im_t: Vec<Option<[f64; 3]>>,
 }
 
 /// The linear systems of a run.

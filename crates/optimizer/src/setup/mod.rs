@@ -8,9 +8,10 @@ mod shape;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{block, shield};
-use fluxmorph_geometry::{Mesh, RegionId, Topology};
+use fluxmorph_geometry::{Mesh, MeshError, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::objective::Weighting;
+use fluxmorph_solver::recovery::locate;
 use fluxmorph_solver::{Material, Objective};
 
 use crate::config::{self, Config, Fault, MeshConfig, RegionModel, Source};
@@ -64,8 +65,12 @@ pub enum Purpose {
 /// [`Error::Mesh`] names the parameter; [`Error::Config`] for a mesh file, which no reader takes yet.
 pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
     match &config.mesh {
-        MeshConfig::Shield(parameters) => Ok(shield(&parameters.parameters())?),
-        MeshConfig::Block(parameters) => Ok(block(&parameters.parameters())?),
+        MeshConfig::Shield(parameters) => {
+            shield(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
+        }
+        MeshConfig::Block(parameters) => {
+            block(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
+        }
         MeshConfig::File { .. } => Err(source
             .error(vec![
                 source
@@ -74,6 +79,13 @@ pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
             ])
             .into()),
     }
+}
+
+/// A parameter that a generator refuses becomes a fault at its key.
+fn parameter_fault(error: MeshError, source: &Source) -> Error {
+    let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
+    let path = if parameter.starts_with("mesh.") { parameter } else { "mesh" };
+    source.error(vec![source.fault(path, format!("{parameter} = {value}")).expected(expected)]).into()
 }
 
 /// Sets up the problem of a configuration.
@@ -91,6 +103,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
+    source.check(probe_faults(config, source, &full_mesh, &mesh))?;
     let model = field::field_model(config, &mesh, conductors)?;
     let objective = match &config.objective {
         Some(objective) => Some(self::objective(objective, &mesh)?),
@@ -220,6 +233,40 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
         );
     }
     faults
+}
+
+/// Every probe point that no element holds, before a run is spent on it.
+fn probe_faults(config: &Config, source: &Source, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (i, probe) in config.probes.iter().enumerate() {
+        for (j, &point) in probe.points.iter().enumerate().filter(|(_, p)| locate(mesh, **p).is_none()) {
+            let at = millimetres(point);
+            let name = &probe.name;
+            let (message, expected) = match locate(full_mesh, point) {
+                Some(_) => (
+                    format!(
+                        "the point {at} of the probe `{name}` lies in a region that its impedance surface replaces"
+                    ),
+                    "a point in a region that is meshed".to_owned(),
+                ),
+                None => {
+                    let [lower, upper] = full_mesh.bounding_box().map(millimetres);
+                    (
+                        format!("the point {at} of the probe `{name}` lies outside the mesh"),
+                        format!("a point inside the mesh, which goes from {lower} to {upper}"),
+                    )
+                }
+            };
+            faults.push(source.fault(&format!("probes[{i}].points[{j}]"), message).expected(expected));
+        }
+    }
+    faults
+}
+
+/// A point for messages, to a micrometre.
+fn millimetres([x, y, z]: [f64; 3]) -> String {
+    let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
+    format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
 }
 
 fn is_empty(topology: &Topology, region: RegionId) -> bool {

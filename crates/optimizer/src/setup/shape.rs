@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
-use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
 };
 use fluxmorph_remesh::{check_step, step_to_inversion};
 use fluxmorph_solver::{FieldModel, Objective};
 
+use super::millimetres;
 use crate::config::{Config, Design, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
 use crate::design::DesignSurface;
 use crate::error::Error;
@@ -41,9 +42,26 @@ pub(super) fn shape(
             let message = format!("the surface `{}` has no triangles", design.surface);
             return Err(source.error(vec![source.fault("design.surface", message)]).into());
         }
+        if design.grid.is_some() && !spans_a_grid(mesh, triangles, design.direction) {
+            let message =
+                format!("a control grid cannot be laid across `design.direction` on `{}`", design.surface);
+            let fault = source
+                .fault("design.direction", message)
+                .expected("the direction that stands most upright on the surface, or no design.grid");
+            return Err(source.error(vec![fault]).into());
+        }
         Ok(DesignSurface::new(mesh, triangles, design.direction, design.grid))
     };
     let surface = on(mesh)?;
+    let idle = surface.gradient(&vec![surface.direction(); surface.nodes().len()]);
+    let idle = idle.iter().filter(|&&weight| weight == 0.0).count();
+    if idle > 0 {
+        warnings.push(format!(
+            "{idle} of {} design variables move no node: the control grid is finer than the mesh; refine the mesh, or take \
+             a smaller design.grid",
+            surface.variable_count()
+        ));
+    }
     let setup = remesh_setup(inputs, &surface, warnings)?;
     overlap_faults(inputs, &setup, model, objective)?;
     let map = ElasticMap::new(mesh, setup)?;
@@ -63,13 +81,23 @@ pub(super) fn shape(
     Ok(shape)
 }
 
+/// Whether a surface has an extent along both coordinates across the main component of a direction.
+fn spans_a_grid(mesh: &Mesh, triangles: &[[NodeId; 3]], direction: [f64; 3]) -> bool {
+    let along = (0..3).fold(0, |best, d| if direction[d].abs() > direction[best].abs() { d } else { best });
+    (0..3).filter(|&d| d != along).all(|d| {
+        let mut coordinates = triangles.iter().flatten().map(|&n| mesh.point(n)[d]);
+        let first = coordinates.next();
+        coordinates.any(|x| Some(x) != first)
+    })
+}
+
 /// Subregions, boundary kinds and design nodes of the elastic body.
 fn remesh_setup(
     inputs: &Inputs<'_>,
     surface: &DesignSurface,
     warnings: &mut Vec<String>,
 ) -> Result<RemeshSetup, Error> {
-    let Inputs { remesh, mesh, .. } = *inputs;
+    let Inputs { source, remesh, mesh, .. } = *inputs;
     let topology = mesh.topology();
     let mut subregions: Vec<Subregion> = match &remesh.extent {
         RemeshExtent::Regions(names) => {
@@ -106,6 +134,14 @@ fn remesh_setup(
     };
     // A region that an impedance surface replaces has no elements left, and is no part of the body.
     subregions.retain(|part| !part.elements.is_empty());
+    if subregions.is_empty() {
+        let (key, expected) = match &remesh.extent {
+            RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
+            RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
+        };
+        let fault = source.fault(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+        return Err(source.error(vec![fault]).into());
+    }
     for part in &mut subregions {
         let own = remesh.subregions.iter().find(|own| own.name == part.name);
         part.young = own.and_then(|own| own.young).unwrap_or(remesh.young);
@@ -209,7 +245,7 @@ fn overlap_faults(
         let place = centroid(mesh.vertices(e));
         faults.push(
             source
-                .fault("coils", format!("a coil reaches into the remesh region, at {place:?} m"))
+                .fault("coils", format!("a coil reaches into the remesh region, at {}", millimetres(place)))
                 .expected(
                     "coils and their windows outside the remesh region: a coil does not move with the mesh",
                 )
@@ -233,9 +269,10 @@ fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape) -> Result<(), Error
                         .fault(
                             key,
                             format!(
-                                "the mesh breaks at {} mm: element {element} of region `{region}` at {centroid:?} m is \
+                                "`{key}`: the mesh breaks at {:.3} mm: element {element} of region `{region}` at {} is \
                                  inverted",
-                                bound[0] * 1e3
+                                bound[0] * 1e3,
+                                millimetres(centroid)
                             ),
                         )
                         .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * share * 1e3))

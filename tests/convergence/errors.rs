@@ -1,0 +1,200 @@
+//! Solving for a known field, and the errors of what comes out.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::{Point, Tet4, centroid};
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_solver::element::Complex3;
+use fluxmorph_solver::linear::LinearSolverSettings;
+use fluxmorph_solver::recovery::recovered_flux_density;
+use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, FieldSolution, Material};
+
+use crate::meshes::Distortion;
+use crate::orders::Study;
+use crate::quadrature::{point_in, tet_rule};
+
+/// A known field at one point.
+pub(crate) struct Sample {
+    /// `A` [T m].
+    pub(crate) vector_potential: Complex3,
+    /// `∇ψ` [T m].
+    pub(crate) scalar_gradient: Complex3,
+    /// `B = curl A` [T].
+    pub(crate) flux_density: Complex3,
+    /// `curl ν curl A − ∇ pν div A + jωσ(A + ∇ψ)` [A/m²].
+    pub(crate) source: Complex3,
+}
+
+/// A field known in closed form, with the problem it solves.
+pub(crate) trait KnownField {
+    /// Name in the output.
+    fn name(&self) -> String;
+    /// The field at a point, in the region of the point `inside`.
+    fn at(&self, x: Point, inside: Point) -> Sample;
+    /// The mesh of the unit cube in `n` cells a side, not distorted.
+    fn mesh(&self, n: usize) -> Mesh;
+    /// The problem, without a coil.
+    fn setup(&self) -> FieldModelSetup;
+}
+
+/// A problem without coils and impedance surfaces, with one condition on all six faces.
+pub(crate) fn setup(
+    frequency: f64,
+    penalty: f64,
+    materials: Vec<Material>,
+    faces: Boundary,
+) -> FieldModelSetup {
+    FieldModelSetup {
+        frequency,
+        penalty,
+        materials,
+        impedance_surfaces: Vec::new(),
+        coils: Vec::new(),
+        boundaries: crate::meshes::FACES.map(|face| (face.to_owned(), faces)).to_vec(),
+        linear_solver: LinearSolverSettings::default(),
+    }
+}
+
+/// `jωσ` of every region.
+fn eddy(model: &FieldModel) -> Vec<c64> {
+    model.materials().iter().map(|m| c64::new(0.0, model.angular_frequency() * m.conductivity)).collect()
+}
+
+/// `∫ f·w + ∫_c jωσ(A + ∇ψ)·∇q` of the known field.
+///
+/// The second term stands in its weak form: it then holds for any current through the conductor's surface, and its sum
+/// over all q is zero, as grounding ψ in one node requires.
+fn load(field: &impl KnownField, model: &FieldModel, mesh: &Mesh) -> Vec<c64> {
+    let (rule, eddy) = (tet_rule(), eddy(model));
+    let topology = mesh.topology();
+    let mut load = vec![c64::default(); model.unknown_count()];
+    for e in topology.elements() {
+        let vertices = mesh.vertices(e);
+        let (tet, inside) = (Tet4::new(vertices), centroid(vertices));
+        let sigma = eddy[topology.region_of()[e.index()].index()];
+        let mut local = [[c64::default(); 4]; 4];
+        for &(bary, weight) in &rule {
+            let known = field.at(point_in(vertices, bary), inside);
+            let weight = weight * tet.volume;
+            for a in 0..4 {
+                for d in 0..3 {
+                    local[a][d] += weight * bary[a] * known.source[d];
+                    let drive = known.vector_potential[d] + known.scalar_gradient[d];
+                    local[a][3] += weight * sigma * drive * tet.gradients[a][d];
+                }
+            }
+        }
+        for (node, values) in topology.tet(e).into_iter().zip(local) {
+            model.unknowns().dofs.scatter_add(&mut load, node, values);
+        }
+    }
+    load
+}
+
+/// Relative errors in L², by quadrature.
+struct Errors {
+    /// Of `A`.
+    vector_potential: f64,
+    /// Of `B` in elements.
+    flux_density: f64,
+    /// Of the recovered `B`, at the centroids of every seventh element.
+    recovered: f64,
+    /// Of `A + ∇ψ` in conductors; not a number where there are none.
+    drive: f64,
+}
+
+fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Errors {
+    let (rule, eddy) = (tet_rule(), eddy(model));
+    let topology = mesh.topology();
+    let distance = |x: Complex3, y: Complex3| (0..3).map(|d| (x[d] - y[d]).norm_sqr()).sum::<f64>();
+    let zero = [c64::default(); 3];
+    let mut sums = [[0.0; 2]; 4];
+    for e in topology.elements() {
+        let vertices = mesh.vertices(e);
+        let (tet, inside) = (Tet4::new(vertices), centroid(vertices));
+        let conducts = eddy[topology.region_of()[e.index()].index()] != c64::default();
+        let nodes: [NodeId; 4] = topology.tet(e);
+        let nodal = nodes.map(|n| solution.potentials(model, n));
+        if e.index() % 7 == 0 {
+            let recovered = recovered_flux_density(solution, model, mesh, e, inside);
+            let exact = field.at(inside, inside).flux_density;
+            sums[3][0] += tet.volume * distance(recovered, exact);
+            sums[3][1] += tet.volume * distance(exact, zero);
+        }
+        let slope: Complex3 =
+            std::array::from_fn(|d| (0..4).map(|a| nodal[a][3] * tet.gradients[a][d]).sum());
+        let flux_density = solution.flux_density(model, mesh, e);
+        for &(bary, weight) in &rule {
+            let known = field.at(point_in(vertices, bary), inside);
+            let weight = weight * tet.volume;
+            let potential: Complex3 = std::array::from_fn(|d| (0..4).map(|a| bary[a] * nodal[a][d]).sum());
+            let drive = std::array::from_fn(|d| potential[d] + slope[d]);
+            let exact_drive = std::array::from_fn(|d| known.vector_potential[d] + known.scalar_gradient[d]);
+            let pairs = [
+                (potential, known.vector_potential),
+                (flux_density, known.flux_density),
+                if conducts { (drive, exact_drive) } else { (zero, zero) },
+            ];
+            for (sum, (computed, exact)) in sums.iter_mut().zip(pairs) {
+                sum[0] += weight * distance(computed, exact);
+                sum[1] += weight * distance(exact, zero);
+            }
+        }
+    }
+    let [vector_potential, flux_density, drive, recovered] = sums.map(|[e, n]| (e / n).sqrt());
+    Errors { vector_potential, flux_density, recovered, drive }
+}
+
+/// Orders that linear elements must reach: 2 in `A` and 1 in its derivatives. The margins of 0.1 and 0.05 are for
+/// meshes that are not yet fine.
+const ORDER_OF_B: f64 = 0.95;
+pub(crate) const ORDER_OF_A: f64 = 1.9;
+
+/// Solves for a known field on distorted cubes of `cells` and asserts the orders of `A` (at least `order_of_a`), `B` and
+/// `A + ∇ψ`; returns the order of the recovered `B`.
+pub(crate) fn assert_orders(
+    field: &impl KnownField,
+    distortion: Distortion,
+    cells: &[usize],
+    order_of_a: f64,
+) -> f64 {
+    let study = |what: &str| Study::new(format!("{}, {distortion:?}: {what}", field.name()));
+    let mut potential = study("A");
+    let mut flux_density = study("B");
+    let mut recovered = study("recovered B");
+    let mut drive = study("A + grad psi");
+    for &n in cells {
+        let mesh = distortion.apply(&field.mesh(n), n);
+        let model = FieldModel::new(&mesh, field.setup()).expect("a sound problem");
+        let system = model.prepare(model.assemble(&mesh)).expect("a definite system");
+        let solution =
+            model.solve_prepared(&system, &load(field, &model, &mesh)).expect("the iteration converges");
+        assert_iterations(&model, &solution);
+        let found = errors(field, &model, &mesh, &solution);
+        let size = 1.0 / n as f64;
+        potential.add(size, found.vector_potential);
+        flux_density.add(size, found.flux_density);
+        recovered.add(size, found.recovered);
+        drive.add(size, found.drive);
+    }
+    potential.assert_order(order_of_a);
+    flux_density.assert_order(ORDER_OF_B);
+    if field.setup().frequency > 0.0 {
+        drive.assert_order(ORDER_OF_B);
+    }
+    // What is fitted to values of second order is at least of first.
+    recovered.assert_order(ORDER_OF_B);
+    recovered.order()
+}
+
+/// One iteration in statics, where the factor is the matrix's own; at most 30 for a residual of 1e-11 by the bound of
+/// docs/theory.md, (2.13).
+fn assert_iterations(model: &FieldModel, solution: &FieldSolution) {
+    let limit = if model.angular_frequency() > 0.0 { 30 } else { 1 };
+    let iterations = solution.report().iterations;
+    println!(
+        "    {} unknowns, {iterations} iterations, residual {:.1e}",
+        model.unknown_count(),
+        solution.report().residual
+    );
+    assert!(iterations <= limit, "{iterations} iterations");
+}

@@ -1,0 +1,16 @@
+//! Convergence of the field solver: manufactured solutions with fitted orders, the assembled matrix against its plain
+//! weak form, and closed forms (slab, air coil, infinite plate).
+//!
+//! `cargo test --release --test convergence -- --nocapture` prints every error and fitted order.
+
+mod air_coil;
+mod errors;
+mod layered;
+mod manufactured;
+mod meshes;
+mod orders;
+mod plain_matrix;
+mod plate;
+mod quadrature;
+mod references;
+mod slab;

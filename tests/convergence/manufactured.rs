@@ -1,0 +1,121 @@
+//! A smooth field in one material on the unit cube.
+//!
+//! With `Φ = Π_d sin πx_d` (flux-parallel faces) or `Φ = Π_d cos πx_d` (flux-normal ones) take `A_i = k_i ∂_iΦ/π` and
+//! `ψ = q (Φ − Φ(0))`. Then `div A = −π Σk Φ`, `−ΔA = 3π² A`, and all conditions hold: on flux-parallel faces
+//! `A_t = 0`, `ψ = 0` and `div A = 0`; on flux-normal ones `A_n = 0`, `n × curl A = 0` and `∂ψ/∂n = 0`.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_solver::element::Complex3;
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{Boundary, FieldModelSetup, Material};
+
+use crate::errors::{KnownField, ORDER_OF_A, Sample, assert_orders, setup};
+use crate::meshes::{Distortion, unit_cube};
+
+const PI: f64 = std::f64::consts::PI;
+
+/// `k_i` [T m²]: different, so that curl and divergence are there.
+const K: [c64; 3] = [c64::new(1.0, 0.3), c64::new(-0.4, 0.8), c64::new(0.6, -0.5)];
+
+/// `q` [T m²].
+const Q: c64 = c64::new(0.2, -0.4);
+
+const CELLS: [usize; 3] = [12, 16, 22];
+
+struct Smooth {
+    faces: Boundary,
+    frequency: f64,
+    penalty: f64,
+}
+
+impl Smooth {
+    /// `ωσμ = 10/m²` at 50 Hz: a skin depth of 0.45 m.
+    fn material(&self) -> Material {
+        let conductivity =
+            if self.frequency > 0.0 { 10.0 / (2.0 * PI * self.frequency * VACUUM_PERMEABILITY) } else { 0.0 };
+        Material { relative_permeability: 1.0, conductivity }
+    }
+}
+
+impl KnownField for Smooth {
+    fn name(&self) -> String {
+        let Self { faces, frequency, penalty } = self;
+        format!("smooth, {faces:?}, {frequency} Hz, p = {penalty}")
+    }
+
+    fn at(&self, x: Point, _: Point) -> Sample {
+        let (value, slope): ([f64; 3], [f64; 3]) = match self.faces {
+            Boundary::FluxParallel => (x.map(|t| (PI * t).sin()), x.map(|t| PI * (PI * t).cos())),
+            Boundary::FluxNormal => (x.map(|t| (PI * t).cos()), x.map(|t| -PI * (PI * t).sin())),
+        };
+        let gradient: Point =
+            std::array::from_fn(|i| (0..3).map(|d| if d == i { slope[d] } else { value[d] }).product());
+        let vector_potential: Complex3 = std::array::from_fn(|i| K[i] * (gradient[i] / PI));
+        let scalar_gradient: Complex3 = gradient.map(|g| Q * g);
+        // (curl A)_i = (k_k − k_j) ∂_j∂_kΦ/π for i, j, k in cyclic order.
+        let flux_density = std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            (K[k] - K[j]) * (value[i] * slope[j] * slope[k] / PI)
+        });
+        // curl curl A − p grad div A = −ΔA + (1 − p) grad div A.
+        let material = self.material();
+        let eddy = c64::new(0.0, 2.0 * PI * self.frequency * material.conductivity);
+        let sum: c64 = K.iter().sum();
+        let source = std::array::from_fn(|i| {
+            let magnetic =
+                3.0 * PI * PI * vector_potential[i] - (1.0 - self.penalty) * PI * sum * gradient[i];
+            material.reluctivity() * magnetic + eddy * (vector_potential[i] + scalar_gradient[i])
+        });
+        Sample { vector_potential, scalar_gradient, flux_density, source }
+    }
+
+    fn mesh(&self, n: usize) -> Mesh {
+        unit_cube(n, &["all"], |_| 0)
+    }
+
+    fn setup(&self) -> FieldModelSetup {
+        setup(self.frequency, self.penalty, vec![self.material()], self.faces)
+    }
+}
+
+#[test]
+fn a_static_field_converges_between_flux_parallel_faces() {
+    let field = Smooth { faces: Boundary::FluxParallel, frequency: 0.0, penalty: 1.0 };
+    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+}
+
+#[test]
+fn a_harmonic_field_converges_between_flux_parallel_faces() {
+    let field = Smooth { faces: Boundary::FluxParallel, frequency: 50.0, penalty: 1.0 };
+    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+}
+
+#[test]
+fn a_penalty_that_couples_all_components_keeps_the_order() {
+    for frequency in [0.0, 50.0] {
+        let field = Smooth { faces: Boundary::FluxParallel, frequency, penalty: 0.5 };
+        assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+    }
+}
+
+#[test]
+fn a_static_field_converges_between_flux_normal_faces() {
+    let field = Smooth { faces: Boundary::FluxNormal, frequency: 0.0, penalty: 1.0 };
+    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+}
+
+#[test]
+fn a_harmonic_field_with_one_grounded_node_converges_between_flux_normal_faces() {
+    let field = Smooth { faces: Boundary::FluxNormal, frequency: 50.0, penalty: 1.0 };
+    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+}
+
+#[test]
+fn recovered_flux_density_converges_faster_than_its_elements_on_a_smooth_mesh() {
+    let field = Smooth { faces: Boundary::FluxParallel, frequency: 50.0, penalty: 1.0 };
+    // Second order, with a margin for fits that reach over two or three of a dozen cells.
+    let order = assert_orders(&field, Distortion::Smooth, &CELLS, ORDER_OF_A);
+    assert!(order >= 1.7, "{order}");
+}
