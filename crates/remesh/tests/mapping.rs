@@ -4,7 +4,9 @@
 mod support;
 
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_remesh::{Boundary, BoundaryKind, ElasticMap, RemeshSetup, StiffnessPolicy, Subregion};
+use fluxmorph_remesh::{
+    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshSetup, StiffnessPolicy, Subregion,
+};
 use support::{Point, at, largest_difference, nodes_where, noise, outer_design, random, unit_cells, whole};
 
 const POLICIES: [StiffnessPolicy; 3] =
@@ -36,6 +38,7 @@ fn mixed(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> Re
     RemeshSetup {
         subregions,
         policy,
+        guidance: Guidance::Free,
         design_nodes: nodes_where(mesh, |p| p[2] == top && (2.0..=3.0).contains(&p[0])),
         boundaries: kinds.map(boundary).to_vec(),
         fixed_nodes: Vec::new(),
@@ -134,6 +137,34 @@ fn the_gradient_is_the_transposed_map() {
             let (forward, transposed) = (inner(&map.linear(&x), &y), inner(&x, &map.gradient(&y)));
             assert!((forward - transposed).abs() <= 1e-12 * forward.abs().max(1.0), "{forward} {transposed}");
         }
+    }
+}
+
+#[test]
+fn guided_motion_stays_on_its_axis_and_keeps_patch_test_and_transpose() {
+    let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
+    let affine = |x: Point| [0.0, 0.0, 0.7 - 0.3 * x[0] + 0.02 * x[1] - 0.25 * x[2]];
+    let guided = |setup: RemeshSetup| RemeshSetup { guidance: Guidance::Axis(2), ..setup };
+    let setup = guided(outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform));
+    let map = ElasticMap::new(&mesh, setup).unwrap();
+    let free = ElasticMap::new(&mesh, outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform)).unwrap();
+    assert_eq!(3 * map.equation_count(), free.equation_count());
+    let u = map.displacement(&at(&mesh, map.design_nodes(), affine));
+    assert!(largest_difference(&u, &at(&mesh, &all(&mesh), affine)) < 1e-12);
+
+    for policy in POLICIES {
+        let map = ElasticMap::new(&mesh, guided(mixed(&mesh, whole(&mesh), policy))).unwrap();
+        let along =
+            |points: Vec<Point>| -> Vec<Point> { points.into_iter().map(|p| [0.0, 0.0, p[2]]).collect() };
+        let x = along(random(map.design_nodes().len(), 5));
+        let y = random(mesh.points().len(), 6);
+        let (tx, ty) = (map.linear(&x), map.gradient(&y));
+        assert!(tx.iter().all(|u| u[0] == 0.0 && u[1] == 0.0));
+        let product = |a: &[Point], b: &[Point]| -> f64 {
+            a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
+        };
+        let (left, right) = (product(&tx, &y), product(&x, &ty));
+        assert!((left - right).abs() < 1e-12 * (1.0 + left.abs()), "{policy:?}: {left} {right}");
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shield};
 use fluxmorph_geometry::tet4::{centroid, cross};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
-use fluxmorph_remesh::{Boundary, BoundaryKind, RemeshSetup, StiffnessPolicy, Subregion};
+use fluxmorph_remesh::{Boundary, BoundaryKind, Guidance, RemeshSetup, StiffnessPolicy, Subregion};
 
 pub type Point = [f64; 3];
 
@@ -126,6 +126,7 @@ pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, pois
     RemeshSetup {
         subregions: regions.iter().map(subregion).collect(),
         policy,
+        guidance: Guidance::Free,
         design_nodes: plate_bottom(mesh),
         boundaries: ["x_min", "y_min", "plate_side"].map(slide).to_vec(),
         fixed_nodes: Vec::new(),
