@@ -3,8 +3,10 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_optimizer::verify::{Settings, certify};
+use fluxmorph_geometry::NodeId;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify, measure};
 use support::setup;
 
 /// Small meshes: the exactness of a discrete gradient does not depend on the mesh.
@@ -17,12 +19,37 @@ const MESHED: [&str; 5] = [
 ];
 
 fn holds(problem: &Problem, p: &[f64]) {
-    let certificate = certify(problem, p, &Settings::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    check(&certify(problem, p, &Settings::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}")));
+}
+
+fn check(certificate: &Certificate) {
     for direction in &certificate.directions {
         println!("slope {:.4}, central difference {:.2e}", direction.slope, direction.error);
     }
     assert!(certificate.holds, "slope {}, error {:e}", certificate.least_slope, certificate.largest_error);
     assert!(certificate.directions.len() >= 5 && certificate.directions[0].steps.len() >= 6);
+}
+
+/// dF/dx against the motion of every node that the elastic map may move, each on its own.
+fn node_gradient_holds(problem: &Problem) {
+    let shape = problem.shape.as_ref().expect("a shape");
+    let (mesh, displacement) = problem.mesh_of(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
+    let base = problem.analyse(mesh.clone(), displacement, Want::Gradient).unwrap_or_else(|e| panic!("{e}"));
+    let gradient: Vec<f64> = base.sensitivity.expect("it was asked for").into_iter().flatten().collect();
+    // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
+    let moves = |k: usize| {
+        let node = NodeId::new(k / 3);
+        shape.map.is_unknown(node, k % 3) || shape.surface.nodes().binary_search(&node).is_ok()
+    };
+    let span: Vec<f64> = (0..gradient.len()).map(|k| if moves(k) { 1e-5 } else { 0.0 }).collect();
+    let settings = Settings { first_step: 1.0, difference_step: 0.01, ..Settings::default() };
+    let value = |v: &[f64]| -> Result<f64, Error> {
+        let moved = mesh.moved(v.as_chunks::<3>().0)?;
+        let still = vec![[0.0; 3]; moved.points().len()];
+        Ok(problem.analyse(moved, still, Want::Value)?.objective.expect("an objective"))
+    };
+    let zero = vec![0.0; gradient.len()];
+    check(&measure(&value, &zero, &gradient, &span, &settings, |_, _| {}).unwrap_or_else(|e| panic!("{e}")));
 }
 
 /// A design inside the bounds that is flat nowhere.
@@ -62,5 +89,24 @@ fn the_gradient_is_exact_in_statics_on_a_coarse_control_grid() {
     let mut overrides = MESHED.to_vec();
     overrides.extend(["analysis.frequency=\"0 Hz\"", "remesh.motion=\"along_design\"", "design.grid=[2, 3]"]);
     let setup = setup("shield_quick.toml", &overrides);
+    holds(&setup.problem, &wavy(&setup.problem));
+}
+
+#[test]
+fn the_derivative_at_every_node_is_exact_in_the_impedance_model() {
+    node_gradient_holds(&setup("shield_quick.toml", &[]).problem);
+}
+
+#[test]
+fn the_derivative_at_every_node_is_exact_in_the_volume_model() {
+    node_gradient_holds(&setup("shield_quick.toml", &MESHED).problem);
+}
+
+#[test]
+fn the_gradient_is_exact_with_fictitious_forces_and_a_fine_control_grid() {
+    let setup = setup(
+        "shield_quick.toml",
+        &["remesh.force=[0.0, 0.0, 2e-6]", "remesh.stiffness=\"uniform\"", "design.grid=[13, 25]"],
+    );
     holds(&setup.problem, &wavy(&setup.problem));
 }
