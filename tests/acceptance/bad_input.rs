@@ -282,7 +282,9 @@ fn every_fault_is_named_with_its_line_and_the_expectation() {
         let (finished, line) = run_changed(home.path(), case.from, case.to);
         assert_eq!(finished.code, Some(3), "{}:\n{}", case.name, finished.stderr);
         let place = match case.line {
-            Some(offset) => format!("device.toml:{}:", line.strict_add_signed(offset)),
+            Some(offset) => {
+                format!("device.toml:{}:", line.checked_add_signed(offset).expect("the line is in the file"))
+            }
             None => "device.toml:".to_owned(),
         };
         for fragment in case.says.iter().copied().chain([place.as_str(), "error: ", " fault"]) {

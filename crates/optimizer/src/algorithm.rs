@@ -1,8 +1,8 @@
 //! NLopt's gradient methods behind one function; the only file that names the library.
 //!
 //! NLopt knows bounds, a value and a gradient. It never sees a value that is not the objective's: a closure that cannot
-//! evaluate returns an error, NLopt is stopped by its stop value (−∞, which all its methods check at once) and what it
-//! then believes is thrown away. A panic inside the closure would abort the process at the C boundary: it is caught
+//! evaluate returns an error, NLopt is stopped by a value below its stop value (which all its methods check at once), and
+//! what it then believes is thrown away. A panic inside the closure would abort the process at the C boundary: it is caught
 //! here and goes on after NLopt has returned.
 
 use std::cell::RefCell;
@@ -95,7 +95,9 @@ pub fn minimise<E>(
         if interruption.is_some() {
             return 2.0 * STOP_VALUE;
         }
-        let physical: Vec<f64> = x.iter().zip(&unit).map(|(x, unit)| x * unit).collect();
+        // Scaling back may leave the bounds by a rounding: what is recorded must not.
+        let physical: Vec<f64> =
+            (0..n).map(|k| (x[k] * unit[k]).clamp(settings.lower[k], settings.upper[k])).collect();
         let mut derivative = vec![0.0; n];
         match catch_unwind(AssertUnwindSafe(|| objective(&physical, &mut derivative))) {
             Ok(Ok(value)) => {

@@ -3,8 +3,8 @@
 //! * An *evaluation* is one computation of objective and gradient; an *iteration* is an evaluation that improves on the
 //!   best so far (the first counts as none).
 //! * **A mesh that would break is never shown to the method** as NaN, infinity or a penalty: the method is stopped and
-//!   started afresh at the best design, in a box shrunk by [`SHRINK`] towards it, so that the refused design lies
-//!   outside. After [`MAX_RESTARTS`] such restarts the run ends with [`StopReason::MeshLimit`] and the best design.
+//!   started afresh at the best design, in a box shrunk by [`SHRINK`] towards it. After [`MAX_RESTARTS`] such restarts
+//!   the run ends with [`StopReason::MeshLimit`] and the best design.
 //!   Such an attempt has no objective: it is no evaluation and leaves no row in the history, but a warning.
 //! * Limits of evaluations and time are checked before each evaluation but the first, and a signal too: what was
 //!   computed is kept, and there always is a best design.
@@ -14,6 +14,7 @@ use std::time::Instant;
 use fluxmorph_remesh::RemeshError;
 
 use crate::algorithm::{self, Ending, Minimisation};
+use crate::cli::ExitCode;
 use crate::config::Optimizer;
 use crate::error::Error;
 use crate::observer::{Evaluation, Observer};
@@ -101,7 +102,8 @@ enum Stop {
 /// `interrupted` is asked before each evaluation but the first.
 ///
 /// # Errors
-/// [`Error`] of the first evaluation that fails for another reason than its mesh. What the recorder kept is whole.
+/// [`Error`] of an evaluation that fails for another reason than its mesh, unless there is a best design to save: then
+/// the run ends with [`StopReason::NumericalFailure`]. What the recorder kept is whole.
 ///
 /// # Panics
 /// If the problem has no shape or no objective.
@@ -143,8 +145,18 @@ pub fn optimise(
         match outcome {
             algorithm::Outcome::Ended(Ending::Objective) => break StopReason::ObjectiveConverged,
             algorithm::Outcome::Ended(Ending::Step) => break StopReason::StepConverged,
+            algorithm::Outcome::Failed(cause) if run.best.is_some() => {
+                run.observer.warning(cause);
+                break StopReason::MethodStalled;
+            }
             algorithm::Outcome::Failed(cause) => return Err(Error::Optimisation { cause }),
             algorithm::Outcome::Interrupted(Stop::Limit(reason)) => break reason,
+            algorithm::Outcome::Interrupted(Stop::Error(error))
+                if run.best.is_some() && error.exit_code() == ExitCode::Numerical =>
+            {
+                run.observer.warning(&error.to_string());
+                break StopReason::NumericalFailure;
+            }
             algorithm::Outcome::Interrupted(Stop::Error(error)) => return Err(*error),
             algorithm::Outcome::Interrupted(Stop::BrokenMesh(cause)) => {
                 let Some(best) = &run.best else {

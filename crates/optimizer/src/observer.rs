@@ -164,6 +164,10 @@ impl<W: Write> Observer for Console<W> {
         }
     }
 
+    fn phase(&mut self, name: &str) {
+        self.line(&format!("{name} ..."));
+    }
+
     fn evaluation(&mut self, row: &Evaluation) {
         if !self.header_is_shown {
             self.header_is_shown = true;

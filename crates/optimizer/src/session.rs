@@ -131,6 +131,8 @@ pub fn solve(
 struct Session<'a> {
     command: &'static str,
     config: &'a Config,
+    /// The configuration's text as given.
+    given: String,
     setup: Setup,
     directory: RunDirectory,
     manifest: Manifest,
@@ -160,8 +162,6 @@ impl<'a> Session<'a> {
         manifest.overrides = source.overrides().map(str::to_owned).collect();
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
         manifest.write(&directory)?;
-        write_atomic(&directory.config(), source.text().as_bytes())?;
-        write_atomic(&directory.resolved(), resolved_toml(config).as_bytes())?;
 
         let mesh = setup.problem.reference.topology();
         observer.started(&Started {
@@ -176,7 +176,8 @@ impl<'a> Session<'a> {
         for warning in &setup.warnings {
             observer.warning(warning);
         }
-        Ok(Self { command, config, setup, directory, manifest, clock, setup_seconds })
+        let given = source.text().to_owned();
+        Ok(Self { command, config, given, setup, directory, manifest, clock, setup_seconds })
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens.
@@ -185,7 +186,7 @@ impl<'a> Session<'a> {
         observer: &mut dyn Observer,
         work: impl FnOnce(&Self, &mut dyn Observer) -> Result<RunResult, Error>,
     ) -> Result<RunResult, Error> {
-        let outcome = work(&self, observer).and_then(|result| {
+        let outcome = self.write_configuration().and_then(|()| work(&self, observer)).and_then(|result| {
             result.write(&self.directory)?;
             Ok(result)
         });
@@ -196,6 +197,11 @@ impl<'a> Session<'a> {
         completed?;
         observer.finished(&result);
         Ok(result)
+    }
+
+    fn write_configuration(&self) -> Result<(), Error> {
+        write_atomic(&self.directory.config(), self.given.as_bytes())?;
+        Ok(write_atomic(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
     }
 
     /// The parts of a result that run and solve share.

@@ -13,7 +13,7 @@ use fluxmorph_geometry::fem::{
 use fluxmorph_geometry::tet4::{self, Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
-use crate::coil::{self, Coil};
+use crate::coil::{self, Coil, Racetrack};
 use crate::element::impedance::{self, ImpedanceTriangle};
 use crate::element::interface::InterfaceTriangle;
 use crate::element::volume::{AphiTet, Coefficients, source_load};
@@ -105,7 +105,7 @@ pub struct FieldModel {
     triangles: BoundGroup<3>,
     surface_nodes: Vec<[NodeId; 3]>,
     surface_terms: Vec<SurfaceTerm>,
-    /// `∫_e T dV` of all coils with their currents, real and imaginary part [A² m² / A].
+    /// `∫_e T dV` of all coils with their currents, real and imaginary part [A m²].
     moments: Vec<(ElementId, [c64; 3])>,
     analysis: SystemAnalysis,
 }
@@ -308,7 +308,7 @@ fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError
         let area = tet4::norm(normal);
         for coil in &setup.coils {
             let across = (1.0 - (normal[coil.shape.axis()] / area).powi(2)).max(0.0).sqrt();
-            if across > NORMAL_TOLERANCE && coil.shape.potential(place) != 0.0 {
+            if across > NORMAL_TOLERANCE && meets(&coil.shape, vertices) {
                 let surface = setup
                     .boundaries
                     .iter()
@@ -326,6 +326,18 @@ fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError
         }
     }
     Ok(())
+}
+
+/// Whether a coil's `T` is felt on a triangle, looked at on a fine grid of its points.
+fn meets(coil: &Racetrack, vertices: [Point; 3]) -> bool {
+    const STEPS: usize = 12;
+    (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))).any(|(i, j)| {
+        let (s, t) = (i as f64 / STEPS as f64, j as f64 / STEPS as f64);
+        let x: Point = std::array::from_fn(|d| {
+            vertices[0][d] + s * (vertices[1][d] - vertices[0][d]) + t * (vertices[2][d] - vertices[0][d])
+        });
+        coil.potential(x) != 0.0
+    })
 }
 
 /// The nodes of a triangle, ascending: the same for both orientations.

@@ -28,7 +28,7 @@ impl Design {
     pub(super) fn read(section: Section<'_>) -> Self {
         let surface = section.text("surface");
         let direction = read_direction(&section);
-        let grid = section.integers("grid", 2, 10_000);
+        let grid = section.integers("grid", 2, 300);
         let length = |key| section.quantity(key, Dimension::Length, Range::FINITE);
         let (lower, upper, initial) = (length("lower"), length("upper"), length("initial"));
 

@@ -58,6 +58,10 @@ pub enum StopReason {
     Interrupted,
     /// The mesh allows no further step.
     MeshLimit,
+    /// The method can make no further step.
+    MethodStalled,
+    /// A field could not be computed; the best design before it is saved.
+    NumericalFailure,
     /// A single analysis is complete.
     Done,
 }
@@ -67,7 +71,10 @@ impl StopReason {
     pub fn status(self) -> RunStatus {
         match self {
             Self::ObjectiveConverged | Self::StepConverged => RunStatus::Converged,
-            Self::MaxEvaluations | Self::MaxTime | Self::MeshLimit => RunStatus::Stopped,
+            Self::MaxEvaluations | Self::MaxTime | Self::MeshLimit | Self::MethodStalled => {
+                RunStatus::Stopped
+            }
+            Self::NumericalFailure => RunStatus::Failed,
             Self::Interrupted => RunStatus::Interrupted,
             Self::Done => RunStatus::Done,
         }
@@ -78,6 +85,7 @@ impl StopReason {
         match self.status() {
             RunStatus::Converged | RunStatus::Done => ExitCode::Success,
             RunStatus::Interrupted => ExitCode::Interrupted,
+            RunStatus::Failed => ExitCode::Numerical,
             _ => ExitCode::Stopped,
         }
     }
@@ -91,6 +99,8 @@ impl StopReason {
             Self::MaxTime => "the time is over",
             Self::Interrupted => "interrupted",
             Self::MeshLimit => "the mesh allows no further step",
+            Self::MethodStalled => "the method can make no further step",
+            Self::NumericalFailure => "a field could not be computed",
             Self::Done => "done",
         }
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
@@ -11,7 +12,7 @@ use fluxmorph_remesh::{check_step, step_to_inversion};
 use fluxmorph_solver::{FieldModel, Objective};
 
 use super::millimetres;
-use crate::config::{Config, Design, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
+use crate::config::{Config, Design, Fault, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
 use crate::design::DesignSurface;
 use crate::error::Error;
 use crate::problem::Shape;
@@ -77,7 +78,7 @@ pub(super) fn shape(
         upper: vec![design.upper; n],
         initial: vec![design.initial; n],
     };
-    check_bounds(source, mesh, &shape)?;
+    check_bounds(source, mesh, &shape, config.optimizer.minimum_quality)?;
     Ok(shape)
 }
 
@@ -134,6 +135,21 @@ fn remesh_setup(
     };
     // A region that an impedance surface replaces has no elements left, and is no part of the body.
     subregions.retain(|part| !part.elements.is_empty());
+    let outside: Vec<Fault> = remesh
+        .subregions
+        .iter()
+        .enumerate()
+        .filter(|(_, own)| subregions.iter().all(|part| part.name != own.name))
+        .map(|(i, own)| {
+            source
+                .fault(
+                    &format!("remesh.subregions[{i}].name"),
+                    format!("the region `{}` is no part of the remesh region", own.name),
+                )
+                .help("name it in remesh.region too, or take the subregion out")
+        })
+        .collect();
+    source.check(outside)?;
     if subregions.is_empty() {
         let (key, expected) = match &remesh.extent {
             RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
@@ -256,12 +272,43 @@ fn overlap_faults(
 }
 
 /// Tries the two extreme designs, all variables at their lower and at their upper bound, before anything is solved.
-fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape) -> Result<(), Error> {
+fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f64) -> Result<(), Error> {
     let mut faults = Vec::new();
+    let initial = shape.map.displacement(&shape.surface.displacement(&shape.initial));
+    if let Err(RemeshError::Inverted { element, region, centroid, .. }) = check_step(mesh, &initial) {
+        let fault = source
+            .fault(
+                "remesh",
+                format!(
+                    "the initial design breaks the mesh: element {element} of region `{region}` at {} is inverted",
+                    millimetres(centroid)
+                ),
+            )
+            .help("shrink remesh.force or design.initial");
+        return Err(source.error(vec![fault]).into());
+    }
     for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
         let displacement = shape.map.displacement(&shape.surface.displacement(bound));
         match check_step(mesh, &displacement) {
-            Ok(_) => {}
+            Ok(moved) => {
+                let quality = QualityReport::of_elements(&moved, shape.map.elements());
+                if let Some(quality) = quality.filter(|q| q.worst < minimum_quality) {
+                    faults.push(
+                        source
+                            .fault(
+                                key,
+                                format!(
+                                    "`{key}`: at {:.3} mm element {} has the quality {:.4}",
+                                    bound[0] * 1e3,
+                                    quality.worst_element,
+                                    quality.worst
+                                ),
+                            )
+                            .expected(format!("at least optimizer.minimum_quality = {minimum_quality}"))
+                            .help("narrow the bound, or lower optimizer.minimum_quality"),
+                    );
+                }
+            }
             Err(RemeshError::Inverted { element, region, centroid, .. }) => {
                 let share = step_to_inversion(mesh, &displacement).step.min(1.0);
                 faults.push(

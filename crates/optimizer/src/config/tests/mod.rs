@@ -67,7 +67,7 @@ fn the_shipped_configurations_are_read() {
     let (impedance, _) = shipped("shield_impedance.toml");
     assert_eq!(impedance.regions["plate"].model, RegionModel::Impedance);
     let MeshConfig::Shield(shield) = impedance.mesh else { panic!("the shield's generator") };
-    assert_eq!((shield.skin.as_slice(), shield.side_skin.as_slice()), (&[][..], &[0.005][..]));
+    assert_eq!((shield.skin.as_slice(), shield.side_skin.as_slice()), (&[][..], &[0.008][..]));
 }
 
 #[test]
@@ -93,10 +93,11 @@ fn a_mesh_left_to_its_defaults_is_that_of_the_generator() {
 
 #[test]
 fn the_default_skin_fits_every_thickness_of_the_plate() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/shield.toml");
     for (thickness, deepest) in [(5, 0.0025), (6, 0.0025), (10, 0.005), (20, 0.005), (30, 0.005)] {
-        let plate = format!("mesh.shield.plate=[\"120 mm\", \"240 mm\", \"{thickness} mm\"]");
-        let (config, _) = Config::from_file(&path, &[plate]).unwrap_or_else(|error| panic!("{error}"));
+        let plate = format!("plate = [\"120 mm\", \"240 mm\", \"{thickness} mm\"]");
+        let text =
+            format!("[mesh]\ngenerator = \"shield\"\n[mesh.shield]\n{plate}\n[analysis]\nfrequency = 60\n");
+        let (config, _) = Config::from_str(&text, "plate.toml").unwrap_or_else(|error| panic!("{error}"));
         let MeshConfig::Shield(shield) = config.mesh else { panic!("the shield's generator") };
         assert_eq!(shield.skin.last(), Some(&deepest), "{thickness} mm");
         let mesh = fluxmorph_geometry::generate::shield(&shield.parameters());
