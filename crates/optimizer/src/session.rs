@@ -44,7 +44,10 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
-    let session = Session::open("run", config, source, options, Purpose::Optimisation, observer)?;
+    let clock = Instant::now();
+    observer.phase("setting up mesh and matrices");
+    let setup = set_up(config, source, Purpose::Optimisation)?;
+    let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let mut recorder = DirectoryRecorder {
             directory: &session.directory,
@@ -92,15 +95,30 @@ pub fn solve(
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
-    let session = Session::open("solve", config, source, options, Purpose::Analysis, observer)?;
+    let clock = Instant::now();
+    observer.phase("setting up mesh and matrices");
+    let setup = set_up(config, source, Purpose::Analysis)?;
+    let values = match (&setup.problem.shape, design) {
+        (Some(shape), given) => {
+            let values = given.unwrap_or_else(|| shape.initial.clone());
+            let outside = |k: usize| values[k] < shape.lower[k] || values[k] > shape.upper[k];
+            if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
+                observer.warning(&format!(
+                    "design variable {k} = {} mm lies outside its bounds",
+                    values[k] * 1e3
+                ));
+            }
+            Some(values)
+        }
+        (None, _) => None,
+    };
+    // A design that breaks the mesh is refused before an earlier run is replaced.
+    let (mesh, displacement) = setup.problem.mesh_of(values.as_deref().unwrap_or_default())?;
+    let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
-        let values = match (&problem.shape, design) {
-            (Some(shape), given) => Some(given.unwrap_or_else(|| shape.initial.clone())),
-            (None, _) => None,
-        };
         observer.phase("solving the field");
-        let analysis = problem.evaluate(values.as_deref().unwrap_or_default(), Want::Gradient)?;
+        let analysis = problem.analyse(mesh, displacement, Want::Gradient)?;
         if config.output.fields != FieldsKept::Nothing {
             write_field(&session.directory, 0, problem, &analysis)?;
             write_collection(&session.directory, &[0])?;
@@ -146,12 +164,9 @@ impl<'a> Session<'a> {
         config: &'a Config,
         source: &Source,
         options: Options<'_>,
-        purpose: Purpose,
+        (setup, clock): (Setup, Instant),
         observer: &mut dyn Observer,
     ) -> Result<Self, Error> {
-        let clock = Instant::now();
-        observer.phase("setting up mesh and matrices");
-        let setup = set_up(config, source, purpose)?;
         let setup_seconds = clock.elapsed().as_secs_f64();
         let directory = RunDirectory::create(&config.output.directory, options.older_run)?;
         let mut manifest = Manifest::started(command, options.threads);
@@ -166,7 +181,7 @@ impl<'a> Session<'a> {
         let mesh = setup.problem.reference.topology();
         observer.started(&Started {
             title: &config.title,
-            algorithm: (purpose == Purpose::Optimisation).then(|| config.optimizer.algorithm.name()),
+            algorithm: (command == "run").then(|| config.optimizer.algorithm.name()),
             variables: setup.problem.shape.as_ref().map_or(0, |s| s.surface.variable_count()),
             nodes: mesh.node_count(),
             tets: mesh.tets().len(),

@@ -112,6 +112,10 @@ pub fn measure(
     mut progress: impl FnMut(usize, &Direction),
 ) -> Result<Certificate, Error> {
     let objective = function(p)?;
+    if objective == 0.0 {
+        let cause = "the objective is zero: there is no field to differentiate; check coils and regions";
+        return Err(Error::Optimisation { cause });
+    }
     let value = |direction: &[f64], h: f64| -> Result<f64, Error> {
         let at: Vec<f64> = p.iter().zip(direction).map(|(p, d)| p + h * d).collect();
         Ok(function(&at)? / objective)

@@ -106,8 +106,9 @@ pub enum RemeshError {
     },
     /// A motion inverts an element.
     #[error(
-        "the motion inverts element {element} of region `{region}` at {centroid:?} m: only {fraction:.4} of the step \
-         can be taken; shorten it, enlarge the remesh region or change its stiffness"
+        "the motion inverts element {element} of region `{region}` at ({:.3}, {:.3}, {:.3}) mm: only {fraction:.4} of \
+         it can be taken; move less, enlarge the remesh region or change its stiffness",
+        centroid[0] * 1e3, centroid[1] * 1e3, centroid[2] * 1e3
     )]
     Inverted {
         /// The first element to invert along the motion.

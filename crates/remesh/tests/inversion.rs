@@ -90,7 +90,7 @@ fn a_step_that_inverts_is_refused_with_element_region_place_and_share() {
             if region == "coil gap" && (fraction - 0.25).abs() < 1e-15),
         "{err}"
     );
-    assert!(err.to_string().contains("only 0.2500 of the step can be taken"), "{err}");
+    assert!(err.to_string().contains("only 0.2500 of it can be taken"), "{err}");
     let almost = displacement.map(|u| u.map(|u| 0.249_999 * u));
     assert!(check_step(&unit_tet(), &almost).is_ok());
     let flat = displacement.map(|u| u.map(|u| 0.25 * u));

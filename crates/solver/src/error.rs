@@ -37,9 +37,10 @@ pub enum SolverError {
     },
     /// A coil's window or winding meets a face on which its source would be wrong.
     #[error(
-        "the coil `{coil}` or its window meets {surface} at {place:?} m, where H is prescribed and not B: the source \
-         T of the coil has a tangential part there, which would act as a surface current. Move the coil away, or make \
-         the face flux-parallel"
+        "the coil `{coil}` or its window meets {surface} at ({:.3}, {:.3}, {:.3}) mm, where H is prescribed and not B: \
+         the source T of the coil has a tangential part there, which would act as a surface current; name the face in \
+         boundaries.flux_parallel, or move the coil away",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
     )]
     SourceOnBoundary {
         /// Name of the coil.

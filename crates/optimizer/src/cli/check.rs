@@ -222,7 +222,7 @@ fn table(summary: &Summary) -> String {
     if !summary.skin.is_empty() {
         text += &format!(
             "\n{:<18}{:<12}{:>14}{:>24}{:>22}\n",
-            "conductor", "model", "skin depth mm", "elements per depth", "thickness in depths"
+            "conductor", "model", "skin depth mm", "elements per depth", "2V/S in depths"
         );
     }
     for s in &summary.skin {

@@ -2,7 +2,7 @@
 
 use super::args::SolveArgs;
 use super::exit::ExitCode;
-use super::{observer, stdout, with_threads};
+use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::output::read_design;
 use crate::session::{self, Options};
@@ -15,6 +15,8 @@ use crate::setup::variable_count;
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     with_threads(args.common.threads, |threads| {
+        // A single analysis is finished and saved; then the signal decides the exit code.
+        let signal = interrupt::watch();
         let design = match &args.design {
             Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
             None => None,
@@ -24,6 +26,6 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
         if args.common.json {
             stdout::print_json(&result)?;
         }
-        Ok(result.stop_reason.exit_code())
+        Ok(signal.received().unwrap_or_else(|| result.stop_reason.exit_code()))
     })
 }

@@ -102,6 +102,9 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     let mut warnings = Vec::new();
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
+    if config.coils.is_empty() {
+        warnings.push("there is no coil: the field is zero everywhere; add [[coils]]".to_owned());
+    }
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
     source.check(probe_faults(config, source, &full_mesh, &mesh))?;
     let model = field::field_model(config, &mesh, conductors)?;

@@ -63,10 +63,23 @@ pub(super) fn shape(
             surface.variable_count()
         ));
     }
+    let full_surface = on(full_mesh)?;
+    let materials: BTreeSet<&str> = regions_at(full_mesh, &full_surface)
+        .into_iter()
+        .map(|region| {
+            let name = full_mesh.topology().region_names()[region.index()].as_str();
+            config.regions.get(name).map_or("air", |region| region.material.as_str())
+        })
+        .collect();
+    if materials.len() < 2 {
+        warnings.push(format!(
+            "both sides of the design surface `{}` have the same material: moving it changes no field; check [regions]",
+            design.surface
+        ));
+    }
     let setup = remesh_setup(inputs, &surface, warnings)?;
     overlap_faults(inputs, &setup, model, objective)?;
     let map = ElasticMap::new(mesh, setup)?;
-    let full_surface = on(full_mesh)?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
