@@ -37,7 +37,7 @@ def main(run: Path, output: Path) -> None:
         show_edges=True,
         edge_color="#00000030",
         line_width=0.5,
-        scalar_bar_args={"vertical": True, "color": "black", "position_x": 0.91, "position_y": 0.15, "height": 0.7},
+        scalar_bar_args={"vertical": True, "color": "black", "position_x": 0.87, "position_y": 0.15, "height": 0.7},
     )
     plotter.add_text(
         f"F/F0 = {result['objective']['ratio']:.4f} after {result['evaluations']} evaluations",
