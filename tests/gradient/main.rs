@@ -35,6 +35,7 @@ fn node_gradient_holds(problem: &Problem) {
     let shape = problem.shape.as_ref().expect("a shape");
     let (mesh, displacement) = problem.mesh_of(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
     let base = problem.analyse(mesh.clone(), displacement, Want::Gradient).unwrap_or_else(|e| panic!("{e}"));
+    let objective = base.objective.expect("an objective");
     let gradient: Vec<f64> = base.sensitivity.expect("it was asked for").into_iter().flatten().collect();
     // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
     let moves = |k: usize| {
@@ -49,7 +50,8 @@ fn node_gradient_holds(problem: &Problem) {
         Ok(problem.analyse(moved, still, Want::Value)?.objective.expect("an objective"))
     };
     let zero = vec![0.0; gradient.len()];
-    check(&measure(&value, &zero, &gradient, &span, &settings, |_, _| {}).unwrap_or_else(|e| panic!("{e}")));
+    let certificate = measure(&value, &zero, objective, &gradient, &span, &settings, |_, _| {});
+    check(&certificate.unwrap_or_else(|e| panic!("{e}")));
 }
 
 /// A design inside the bounds that is flat nowhere.

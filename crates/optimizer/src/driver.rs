@@ -11,6 +11,7 @@
 
 use std::time::Instant;
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_remesh::RemeshError;
 
 use crate::algorithm::{self, Ending, Minimisation};
@@ -214,13 +215,7 @@ impl Run<'_> {
             RemeshError::Inverted { .. } => Stop::BrokenMesh(error.to_string()),
             other => Stop::Error(Box::new(other.into())),
         })?;
-        let quality = self.problem.quality(&mesh);
-        if quality.worst < self.settings.minimum_quality {
-            return Err(Stop::BrokenMesh(format!(
-                "element {} would have the quality {:.4}, below optimizer.minimum_quality = {}",
-                quality.worst_element, quality.worst, self.settings.minimum_quality
-            )));
-        }
+        self.check_quality(&mesh)?;
         let remesh = clock.elapsed().as_secs_f64();
         let mut analysis = self
             .problem
@@ -256,6 +251,22 @@ impl Run<'_> {
             return Err(Stop::Limit(StopReason::MaxTime));
         }
         Ok(())
+    }
+
+    /// Refuses a mesh below the quality asked for; without such a limit there is nothing to compute.
+    fn check_quality(&self, mesh: &Mesh) -> Result<(), Stop> {
+        let minimum = self.settings.minimum_quality;
+        if minimum <= 0.0 {
+            return Ok(());
+        }
+        let quality = self.problem.quality(mesh);
+        if quality.worst >= minimum {
+            return Ok(());
+        }
+        Err(Stop::BrokenMesh(format!(
+            "element {} would have the quality {:.4}, below optimizer.minimum_quality = {minimum}",
+            quality.worst_element, quality.worst
+        )))
     }
 
     /// Counts an evaluation, tells observer and recorder, and remembers the best.

@@ -149,8 +149,7 @@ pub fn solve(
 struct Session<'a> {
     command: &'static str,
     config: &'a Config,
-    /// The configuration's text as given.
-    given: String,
+    source: &'a Source,
     setup: Setup,
     directory: RunDirectory,
     manifest: Manifest,
@@ -162,7 +161,7 @@ impl<'a> Session<'a> {
     fn open(
         command: &'static str,
         config: &'a Config,
-        source: &Source,
+        source: &'a Source,
         options: Options<'_>,
         (setup, clock): (Setup, Instant),
         observer: &mut dyn Observer,
@@ -191,8 +190,7 @@ impl<'a> Session<'a> {
         for warning in &setup.warnings {
             observer.warning(warning);
         }
-        let given = source.text().to_owned();
-        Ok(Self { command, config, given, setup, directory, manifest, clock, setup_seconds })
+        Ok(Self { command, config, source, setup, directory, manifest, clock, setup_seconds })
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens.
@@ -215,7 +213,7 @@ impl<'a> Session<'a> {
     }
 
     fn write_configuration(&self) -> Result<(), Error> {
-        write_atomic(&self.directory.config(), self.given.as_bytes())?;
+        write_atomic(&self.directory.config(), self.source.text().as_bytes())?;
         Ok(write_atomic(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
     }
 

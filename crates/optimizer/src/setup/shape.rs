@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_remesh::check_step;
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
 };
-use fluxmorph_remesh::{check_step, step_to_inversion};
 use fluxmorph_solver::{FieldModel, Objective};
 
 use super::millimetres;
@@ -322,8 +322,7 @@ fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f6
                     );
                 }
             }
-            Err(RemeshError::Inverted { element, region, centroid, .. }) => {
-                let share = step_to_inversion(mesh, &displacement).step.min(1.0);
+            Err(RemeshError::Inverted { element, region, centroid, fraction }) => {
                 faults.push(
                     source
                         .fault(
@@ -335,7 +334,7 @@ fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f6
                                 millimetres(centroid)
                             ),
                         )
-                        .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * share * 1e3))
+                        .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * fraction * 1e3))
                         .help("narrow the bound, enlarge the remesh region, or take another remesh.stiffness"),
                 );
             }
