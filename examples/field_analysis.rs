@@ -5,7 +5,6 @@
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, SolverError, recovery};
 
 pub(crate) fn main() -> Result<(), SolverError> {
@@ -34,7 +33,7 @@ pub(crate) fn main() -> Result<(), SolverError> {
             boundaries: ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
                 .map(|surface| (surface.to_owned(), Boundary::FluxParallel))
                 .to_vec(),
-            linear_solver: LinearSolverSettings::default(),
+            ..FieldModelSetup::default()
         },
     )?;
     let (field, _) = model.solve(&mesh)?;

@@ -10,7 +10,6 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, uniform};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
@@ -83,7 +82,7 @@ fn model(mesh: &Mesh, corner: Corner) -> FieldModel {
         impedance_surfaces: Vec::new(),
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::from(AMPERE_TURNS), shape }],
         boundaries: boundaries.map(|(name, kind)| (name.to_owned(), kind)).collect(),
-        linear_solver: LinearSolverSettings::default(),
+        ..FieldModelSetup::default()
     };
     FieldModel::new(mesh, setup).expect("a sound problem")
 }
@@ -121,7 +120,7 @@ fn the_discrete_source_carries_the_ampere_turns_exactly() {
     let corner = Corner::Round { inner_radius: 0.022 };
     let model = model(&mesh, corner);
     let load = model.load(&mesh);
-    let dofs = &model.unknowns().dofs;
+    let unknowns = model.unknowns();
     // All nodes of one line of y stand for w = φ(y) e_y, one where x > 0: ∫J·w = ½ N I ∫φ dy while φ stays beside the
     // straight side, half the current being above the middle plane.
     let y = grid.lines(1);
@@ -129,7 +128,7 @@ fn the_discrete_source_carries_the_ampere_turns_exactly() {
     let mut checked = 0;
     for j in straight {
         let nodes = mesh.topology().nodes().filter(|&n| grid.lines_of(n)[1] == j);
-        let sum: c64 = nodes.map(|n| dofs.gather(&load, n)[1]).sum();
+        let sum: c64 = nodes.map(|n| unknowns.gather(&load, n)[1]).sum();
         let expected = 0.5 * AMPERE_TURNS * 0.5 * (y[j + 1] - y[j - 1]);
         // T is linear across the winding, where its integral is exact up to rounding.
         assert!((sum / expected - 1.0).norm() < 1e-11, "line {j}: {sum} {expected}");

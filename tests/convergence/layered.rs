@@ -18,7 +18,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{Boundary, FieldModelSetup, Material};
 
-use crate::errors::{KnownField, ORDER_OF_A, Sample, assert_orders, setup};
+use crate::errors::{KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Quadratic, Sample, assert_orders, setup};
 use crate::meshes::{Distortion, unit_cube};
 
 const PI: f64 = std::f64::consts::PI;
@@ -34,6 +34,9 @@ const Q: c64 = c64::new(0.3, 0.2);
 
 /// Even numbers: a mesh line lies on the interface.
 const CELLS: [usize; 3] = [12, 16, 22];
+
+/// Those for quadratic elements.
+const COARSE_CELLS: [usize; 3] = [6, 8, 12];
 
 struct Layered {
     /// Of the lower side; the upper has 1.
@@ -138,5 +141,15 @@ fn another_penalty_keeps_the_order_across_a_jump_of_the_reluctivity() {
     for frequency in [0.0, 50.0] {
         let field = Layered { relative_permeability: 2.5, frequency, penalty: 0.5 };
         assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+    }
+}
+
+#[test]
+fn quadratic_elements_gain_an_order_across_a_jump() {
+    for (frequency, penalty) in [(0.0, 1.0), (50.0, 1.0), (50.0, 0.5)] {
+        let field = Quadratic(Layered { relative_permeability: 4.0, frequency, penalty });
+        // A penalty that couples the components reaches the order of B later.
+        let cells = if penalty == 1.0 { COARSE_CELLS } else { [8, 10, 14] };
+        assert_orders(&field, Distortion::Random, &cells, QUADRATIC_ORDER_OF_A);
     }
 }

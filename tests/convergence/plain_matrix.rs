@@ -11,7 +11,6 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
-use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material};
 
 use crate::meshes::{FACES, shaken, unit_cube};
@@ -155,7 +154,7 @@ fn setup(frequency: f64, penalty: f64, boundaries: &[(&str, Boundary)]) -> Field
         impedance_surfaces: Vec::new(),
         coils: Vec::new(),
         boundaries: boundaries.iter().map(|&(name, kind)| (name.to_owned(), kind)).collect(),
-        linear_solver: LinearSolverSettings::default(),
+        ..FieldModelSetup::default()
     }
 }
 

@@ -7,7 +7,6 @@
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, uniform};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
 
@@ -73,7 +72,7 @@ fn behind(name: &str) -> (c64, c64) {
         impedance_surfaces: Vec::new(),
         coils: vec![Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape }],
         boundaries: FACES.map(|face| (face.to_owned(), Boundary::FluxParallel)).to_vec(),
-        linear_solver: LinearSolverSettings::default(),
+        ..FieldModelSetup::default()
     };
     let model = FieldModel::new(&mesh, setup).expect("a sound problem");
     let (solution, _) = model.solve(&mesh).expect("it converges");

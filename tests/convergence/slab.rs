@@ -9,7 +9,6 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, subdivided, uniform};
 use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material};
 
 use crate::meshes::{boxed, shaken};
@@ -82,7 +81,7 @@ impl Slab {
             impedance_surfaces,
             coils: Vec::new(),
             boundaries: faces.map(|(name, kind)| (name.to_owned(), kind)).to_vec(),
-            linear_solver: LinearSolverSettings::default(),
+            ..FieldModelSetup::default()
         };
         let model = FieldModel::new(mesh, setup).expect("a sound problem");
         let mut load = vec![c64::default(); model.unknown_count()];
@@ -92,7 +91,7 @@ impl Slab {
                 // e_y × n, a third of it for each node.
                 let third = [n[2], 0.0, -n[0], 0.0].map(|c| c64::from(c / 3.0));
                 for &node in triangle {
-                    model.unknowns().dofs.scatter_add(&mut load, node, third);
+                    model.unknowns().scatter_add(&mut load, node, third);
                 }
             }
         }

@@ -4,20 +4,23 @@
 //!
 //! `dF/dx = −2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )`;
 //!
-//! `∂f/∂x` vanishes because elements that meet a coil do not move, `∂F/∂x` because the observation cells do not.
+//! `∂f/∂x` is that of magnets alone: elements that meet a coil do not move. `∂F/∂x` vanishes because the observation
+//! cells do not move.
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
-use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
-use crate::element::volume;
-use crate::element::{Complex3, impedance, interface};
+use crate::element::lagrange::Lagrange;
+use crate::element::{Complex3, impedance, interface, point};
 use crate::error::SolverError;
 use crate::linear::{LinearSolverReport, PreparedSystem};
-use crate::model::{FieldModel, SurfaceTerm};
+use crate::model::FieldModel;
 use crate::objective::ObjectiveValue;
 use crate::solution::FieldSolution;
+use crate::space::Order;
+use crate::surface::SurfaceTerm;
 
 /// Solves the adjoint problem with the state's prepared system.
 ///
@@ -25,7 +28,7 @@ use crate::solution::FieldSolution;
 /// As [`PreparedSystem::solve`].
 pub fn solve(system: &PreparedSystem, objective: &ObjectiveValue) -> Result<FieldSolution, SolverError> {
     let (values, report): (Vec<c64>, LinearSolverReport) = system.solve(&objective.derivative)?;
-    Ok(FieldSolution::new(values, report))
+    Ok(FieldSolution::adjoint(values, report))
 }
 
 /// `dF/dx` at every node [unit of F per m], shape `(n_nodes, 3)`; of tetrahedra, only the `moving` ones contribute.
@@ -39,46 +42,72 @@ pub fn node_gradient(
     adjoint: &FieldSolution,
     moving: &[ElementId],
 ) -> Vec<Point> {
+    match model.space().order() {
+        Order::Linear => {
+            let shapes = (Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle());
+            gradient_of_order(shapes, |triangle| triangle, (model, mesh), (state, adjoint), moving)
+        }
+        Order::Quadratic => {
+            let shapes = (Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle());
+            let nodes_of = |triangle| model.space().quadratic_triangle(triangle);
+            gradient_of_order(shapes, nodes_of, (model, mesh), (state, adjoint), moving)
+        }
+    }
+}
+
+/// [`node_gradient`] on elements with `N` and faces with `F` nodes.
+fn gradient_of_order<const N: usize, const F: usize>(
+    (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
+    nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F],
+    (model, mesh): (&FieldModel, &Mesh),
+    (state, adjoint): (&FieldSolution, &FieldSolution),
+    moving: &[ElementId],
+) -> Vec<Point> {
     let topology = model.topology();
+    let mut gradient = vec![[0.0; 3]; topology.node_count()];
+    let mut add = |nodes: &[NodeId], terms: &[Complex3], factor: f64| {
+        for (node, term) in nodes.iter().zip(terms) {
+            for d in 0..3 {
+                gradient[node.index()][d] += factor * term[d].re;
+            }
+        }
+    };
     let contributions: Vec<[Complex3; 4]> = moving
         .par_iter()
         .map(|&e| {
-            volume::shape_derivative(
-                &Tet4::new(mesh.vertices(e)),
-                model.coefficients_of(e),
-                &adjoint.nodal_field(model, e),
-                &state.nodal_field(model, e),
-            )
+            let (tet, law) = (Tet4::new(mesh.vertices(e)), model.coefficients_of(e));
+            let (l, u) = (adjoint.element_field(model, e), state.element_field(model, e));
+            point::shape_derivative(tet_shape, &tet, law, &l, &u)
         })
         .collect();
-    let mut gradient = vec![[0.0; 3]; topology.node_count()];
-    let mut add = |node: fluxmorph_geometry::NodeId, term: Complex3| {
-        for d in 0..3 {
-            gradient[node.index()][d] -= 2.0 * term[d].re;
-        }
-    };
     for (&e, terms) in moving.iter().zip(&contributions) {
-        for (node, term) in topology.tet(e).into_iter().zip(terms) {
-            add(node, *term);
-        }
+        add(&topology.tet(e), terms, -2.0);
     }
-    for (nodes, term) in model.surface() {
-        let vector_potential = |s: &FieldSolution| {
-            nodes.map(|n| {
-                let [x, y, z, _] = s.potentials(model, n);
-                [x, y, z]
-            })
-        };
-        let (l, u) = (vector_potential(adjoint), vector_potential(state));
-        let terms = match term {
-            SurfaceTerm::Interface(jump) => interface::shape_derivative(jump, &l, &u),
-            SurfaceTerm::Impedance(coefficient, _) => {
-                impedance::shape_derivative(nodes.map(|n| mesh.point(n)), coefficient, &l, &u)
-            }
-        };
-        for (node, term) in nodes.into_iter().zip(terms) {
-            add(node, term);
-        }
+    let magnets =
+        model.sources().shape_derivatives(tet_shape, mesh, moving, |e| adjoint.element_field(model, e));
+    for (e, terms) in magnets {
+        add(&topology.tet(e), &terms, 2.0);
+    }
+    for (triangle, term) in model.surface() {
+        let field = |s: &FieldSolution| s.nodal_field(model, nodes_of(triangle)).vector_potential;
+        let vertices = triangle.map(|n| mesh.point(n));
+        add(&triangle, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)), -2.0);
     }
     gradient
+}
+
+/// `∂/∂x_k (λᵀ M u)` of one surface term.
+fn surface_derivative<const N: usize>(
+    shape: &Lagrange<N, 3>,
+    vertices: [Point; 3],
+    term: SurfaceTerm,
+    adjoint: &[Complex3; N],
+    state: &[Complex3; N],
+) -> [Complex3; 3] {
+    match term {
+        SurfaceTerm::Interface(jump) => interface::shape_derivative(shape, jump, adjoint, state),
+        SurfaceTerm::Impedance(coefficient, _) => {
+            impedance::shape_derivative(shape, vertices, coefficient, adjoint, state)
+        }
+    }
 }

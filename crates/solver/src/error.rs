@@ -19,15 +19,16 @@ pub enum SolverError {
         /// The range, and what to do.
         expected: String,
     },
-    /// A boundary condition is asked on a surface that it cannot be applied to.
-    #[error("the surface `{surface}` has a triangle with the normal {normal:?}: {expected}")]
-    BoundaryNormal {
-        /// Name of the surface.
-        surface: String,
-        /// Unit normal of the offending triangle.
-        normal: [f64; 3],
-        /// What is expected.
-        expected: &'static str,
+    /// An applied field and another condition contradict each other.
+    #[error(
+        "at ({:.3}, {:.3}, {:.3}) mm the applied field of boundaries.uniform_field contradicts another condition: a \
+         flux-parallel plane must be parallel to the field and hold the field's center, a flux-normal one at right angles \
+         to it",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    Conflict {
+        /// A node at which both are asked [m].
+        place: [f64; 3],
     },
     /// A model without any excitation.
     #[error("no current flows: {cause}")]

@@ -9,20 +9,29 @@
 
 pub mod adjoint;
 pub mod audit;
+pub mod boundary;
 pub mod coil;
+mod constraint;
 pub mod element;
 pub mod error;
+mod framed;
 pub mod linear;
+mod load;
 pub mod material;
 pub mod model;
 pub mod objective;
 pub mod recovery;
 pub mod solution;
+pub mod space;
+pub mod surface;
 pub mod unknowns;
 
+pub use boundary::{Boundary, UniformField};
 pub use error::SolverError;
 pub use linear::{LinearSolver, LinearSolverReport};
 pub use material::Material;
-pub use model::{Boundary, Conductor, FieldModel, FieldModelSetup};
+pub use model::{FieldModel, FieldModelSetup};
 pub use objective::Objective;
 pub use solution::FieldSolution;
+pub use space::{Order, Space};
+pub use surface::Conductor;

@@ -4,7 +4,6 @@
 //! and assembly of matrix and load. Does not live here: element formulas ([`crate::element`]), what is done with a
 //! solution ([`crate::solution`], [`crate::objective`]).
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{
@@ -13,48 +12,38 @@ use fluxmorph_geometry::fem::{
 use fluxmorph_geometry::tet4::{self, Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
-use crate::coil::{self, Coil, Racetrack};
-use crate::element::impedance::{self, ImpedanceTriangle};
-use crate::element::interface::InterfaceTriangle;
-use crate::element::volume::{AphiTet, Coefficients, source_load};
+use crate::boundary::Boundary;
+use crate::coil::{Coil, Racetrack};
+use crate::element::lagrange::Lagrange;
+use crate::element::quadratic::LagrangeTet;
+use crate::element::volume::{AphiTet, Coefficients};
+use crate::element::{impedance::ImpedanceTriangle, interface::InterfaceTriangle};
 use crate::error::SolverError;
+use crate::framed::Framed;
 use crate::linear::{LinearSolverSettings, PreparedSystem, SystemAnalysis};
+use crate::load::Sources;
 use crate::material::Material;
 use crate::solution::FieldSolution;
+use crate::space::{Order, Space};
+use crate::surface::{Conductor, SurfaceMatrix, SurfaceTerm, Surfaces, sorted};
 use crate::unknowns::{PSI, Unknowns};
 
 /// Sine of the angle between a face's normal and a coil's axis up to which `T` counts as normal to the face: rounding.
 const NORMAL_TOLERANCE: f64 = 1e-6;
-
-/// A condition on a planar outer surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Boundary {
-    /// B·n = 0.
-    FluxParallel,
-    /// n × H = 0.
-    FluxNormal,
-}
-
-/// A conductor that is not meshed but replaced by its impedance surface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Conductor {
-    /// Name of the region it stood for.
-    pub name: String,
-    /// Its surface, oriented out of the surrounding mesh.
-    pub surface: Vec<[NodeId; 3]>,
-    /// Its material.
-    pub material: Material,
-}
 
 /// Everything that defines a field problem beside the mesh.
 #[derive(Clone, Debug)]
 pub struct FieldModelSetup {
     /// Frequency [Hz]; zero for magnetostatics.
     pub frequency: f64,
-    /// Penalty factor `p = ν_p/ν` [1].
+    /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
     pub penalty: f64,
+    /// Polynomial order of the potentials. Default linear.
+    pub order: Order,
     /// Material of every region, by `RegionId`.
     pub materials: Vec<Material>,
+    /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
+    pub remanence: Vec<Point>,
     /// Conductors replaced by impedance surfaces.
     pub impedance_surfaces: Vec<Conductor>,
     /// Coils.
@@ -65,27 +54,19 @@ pub struct FieldModelSetup {
     pub linear_solver: LinearSolverSettings,
 }
 
-/// A term of the weak form on one triangle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum SurfaceTerm {
-    /// Jump of the reluctivity `ν_inside − ν_outside` [m/H].
-    Interface(f64),
-    /// `jω/Zs` [1/H] of the conductor with this index.
-    Impedance(c64, usize),
-}
-
-/// The matrix of one surface term.
-enum SurfaceMatrix {
-    Interface(InterfaceTriangle),
-    Impedance(ImpedanceTriangle),
-}
-
-impl LocalMatrix<c64, 3, 4> for SurfaceMatrix {
-    #[inline]
-    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
-        match self {
-            Self::Interface(triangle) => triangle.block(a, b),
-            Self::Impedance(triangle) => triangle.block(a, b),
+impl Default for FieldModelSetup {
+    /// A static problem without anything in it.
+    fn default() -> Self {
+        Self {
+            frequency: 0.0,
+            penalty: 1.0,
+            order: Order::default(),
+            materials: Vec::new(),
+            remanence: Vec::new(),
+            impedance_surfaces: Vec::new(),
+            coils: Vec::new(),
+            boundaries: Vec::new(),
+            linear_solver: LinearSolverSettings::default(),
         }
     }
 }
@@ -94,20 +75,28 @@ impl LocalMatrix<c64, 3, 4> for SurfaceMatrix {
 #[derive(Debug)]
 pub struct FieldModel {
     topology: Arc<Topology>,
+    space: Space,
     angular_frequency: f64,
     coefficients: Vec<Coefficients>,
     materials: Vec<Material>,
+    remanence: Vec<Point>,
     conductors: Vec<Conductor>,
     coils: Vec<Coil>,
     unknowns: Unknowns,
     pattern: BlockPattern<4>,
-    tets: BoundGroup<4>,
-    triangles: BoundGroup<3>,
-    surface_nodes: Vec<[NodeId; 3]>,
-    surface_terms: Vec<SurfaceTerm>,
-    /// `∫_e T dV` of all coils with their currents, real and imaginary part [A m²].
-    moments: Vec<(ElementId, [c64; 3])>,
+    groups: Groups,
+    surfaces: Surfaces,
+    sources: Sources,
+    /// Elements and surface triangles with a node whose `A` is prescribed.
+    lifted: (Vec<ElementId>, Vec<usize>),
     analysis: SystemAnalysis,
+}
+
+/// Elements and surface triangles bound to the pattern, by order.
+#[derive(Debug)]
+enum Groups {
+    Linear { tets: BoundGroup<4>, triangles: BoundGroup<3> },
+    Quadratic { tets: BoundGroup<10>, triangles: BoundGroup<6> },
 }
 
 impl FieldModel {
@@ -118,6 +107,7 @@ impl FieldModel {
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
         check(mesh, &setup)?;
         let topology = Arc::clone(mesh.topology());
+        let space = Space::new(&topology, setup.order);
         let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
         let coefficients: Vec<Coefficients> = setup
             .materials
@@ -131,40 +121,46 @@ impl FieldModel {
         let conducting =
             |e: ElementId| coefficients[topology.region_of()[e.index()].index()].eddy != c64::default();
         let conductor_elements: Vec<ElementId> = topology.elements().filter(|&e| conducting(e)).collect();
-        let unknowns = Unknowns::new(mesh, &conductor_elements, &setup.boundaries)?;
+        let unknowns = Unknowns::new(mesh, &space, &conductor_elements, &setup.boundaries)?;
 
-        let potential = if setup.penalty == 1.0 { Coupling::diagonal(3) } else { Coupling::full(3) };
+        let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
         let couplings = topology
             .elements()
-            .map(|e| if conducting(e) { potential.union(with_psi()) } else { potential })
+            .map(|e| {
+                let decoupled = setup.penalty == 1.0 && !turned(space.nodes_of(e));
+                let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
+                if conducting(e) { potential.union(with_psi()) } else { potential }
+            })
             .collect();
-        let volumes = ElementGroup::new(topology.node_count(), topology.tets().to_vec(), couplings);
-        let (surface_nodes, surface_terms) =
-            surface_terms(&topology, &coefficients, &setup, angular_frequency)?;
-        let surfaces = ElementGroup::new(
-            topology.node_count(),
-            surface_nodes.clone(),
-            vec![Coupling::full(3); surface_nodes.len()],
-        );
-        let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &surfaces);
-        let (tets, triangles) = (pattern.bind(&volumes), pattern.bind(&surfaces));
+        let surfaces = Surfaces::new(
+            mesh,
+            &coefficients,
+            &setup.boundaries,
+            &setup.impedance_surfaces,
+            angular_frequency,
+        )?;
+        let (pattern, groups) = pattern(&space, &unknowns, couplings, &surfaces);
         let analysis = SystemAnalysis::new(pattern.structure(), setup.linear_solver)?;
-        let moments = total_moments(mesh, &setup.coils)?;
+        let magnetisation: Vec<Point> =
+            setup.remanence.iter().zip(&coefficients).map(|(b, c)| b.map(|b| c.reluctivity * b)).collect();
+        let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
         check_sources(mesh, &setup)?;
+        let lifted = lifted(&topology, &space, &unknowns, &surfaces);
         Ok(Self {
             topology,
+            space,
             angular_frequency,
             coefficients,
             materials: setup.materials,
+            remanence: setup.remanence,
             conductors: setup.impedance_surfaces,
             coils: setup.coils,
             unknowns,
             pattern,
-            tets,
-            triangles,
-            surface_nodes,
-            surface_terms,
-            moments,
+            groups,
+            surfaces,
+            sources,
+            lifted,
             analysis,
         })
     }
@@ -172,36 +168,109 @@ impl FieldModel {
     /// Assembles the matrix on a mesh with this model's topology.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
-        self.pattern.assemble(&self.tets, &mut matrix.values, |e| {
-            AphiTet::new(Tet4::new(mesh.vertices(e)), *self.coefficients_of(e))
-        });
-        self.pattern.assemble(&self.triangles, &mut matrix.values, |t| {
-            let vertices = self.surface_nodes[t.index()].map(|n| mesh.point(n));
-            match self.surface_terms[t.index()] {
-                SurfaceTerm::Interface(jump) => {
-                    SurfaceMatrix::Interface(InterfaceTriangle::new(vertices, jump))
-                }
-                SurfaceTerm::Impedance(coefficient, _) => {
-                    SurfaceMatrix::Impedance(ImpedanceTriangle::new(vertices, coefficient))
-                }
+        let values = &mut matrix.values;
+        match &self.groups {
+            Groups::Linear { tets, triangles } => {
+                self.add_group(tets, values, |e| self.linear_tet(mesh, e));
+                self.add_group(triangles, values, |t| {
+                    self.surface_matrix(Lagrange::<3, 3>::triangle(), mesh, t.index())
+                });
             }
-        });
+            Groups::Quadratic { tets, triangles } => {
+                self.add_group(tets, values, |e| self.quadratic_tet(mesh, e));
+                self.add_group(triangles, values, |t| {
+                    self.surface_matrix(Lagrange::<6, 3>::triangle(), mesh, t.index())
+                });
+            }
+        }
         matrix
     }
 
-    /// The load `∫T·curl w` [A m] of all coils, one entry per unknown.
+    /// Assembles one group, turned into the frames of the nodes where some have their own.
+    fn add_group<const N: usize, L: LocalMatrix<c64, N, 4>>(
+        &self,
+        group: &BoundGroup<N>,
+        values: &mut [c64],
+        matrix: impl Fn(ElementId) -> L + Sync,
+    ) {
+        if self.unknowns.has_frames() {
+            self.pattern.assemble(group, values, |e| {
+                Framed::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
+            });
+        } else {
+            self.pattern.assemble(group, values, matrix);
+        }
+    }
+
+    fn linear_tet(&self, mesh: &Mesh, e: ElementId) -> AphiTet {
+        AphiTet::new(Tet4::new(mesh.vertices(e)), *self.coefficients_of(e))
+    }
+
+    fn quadratic_tet(&self, mesh: &Mesh, e: ElementId) -> LagrangeTet<10> {
+        let tet = Tet4::new(mesh.vertices(e));
+        LagrangeTet::new(Lagrange::<10, 4>::tet(), tet, *self.coefficients_of(e))
+    }
+
+    fn surface_matrix<const N: usize>(
+        &self,
+        shape: &'static Lagrange<N, 3>,
+        mesh: &Mesh,
+        triangle: usize,
+    ) -> SurfaceMatrix<N> {
+        let vertices = self.surfaces.triangles[triangle].map(|n| mesh.point(n));
+        match self.surfaces.terms[triangle] {
+            SurfaceTerm::Interface(jump) => {
+                SurfaceMatrix::Interface(InterfaceTriangle::new(shape, vertices, jump))
+            }
+            SurfaceTerm::Impedance(coefficient, _) => {
+                SurfaceMatrix::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient))
+            }
+        }
+    }
+
+    /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
         let mut load = vec![c64::default(); self.unknowns.dofs.count()];
-        for &(e, moment) in &self.moments {
-            let tet = Tet4::new(mesh.vertices(e));
-            let re = source_load(&tet, moment.map(|m| m.re));
-            let im = source_load(&tet, moment.map(|m| m.im));
-            for (a, n) in self.topology.tet(e).into_iter().enumerate() {
-                let at = |d: usize| c64::new(re[a][d], im[a][d]);
-                self.unknowns.dofs.scatter_add(&mut load, n, [at(0), at(1), at(2), c64::default()]);
+        self.sources.add_load(&self.space, &self.unknowns, mesh, &mut load);
+        let (elements, triangles) = &self.lifted;
+        match &self.groups {
+            Groups::Linear { triangles: bound, .. } => {
+                for &e in elements {
+                    self.subtract_lift(self.space.nodes_of(e), &self.linear_tet(mesh, e), &mut load);
+                }
+                for &t in triangles {
+                    let matrix = self.surface_matrix(Lagrange::<3, 3>::triangle(), mesh, t);
+                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, &mut load);
+                }
+            }
+            Groups::Quadratic { triangles: bound, .. } => {
+                for &e in elements {
+                    self.subtract_lift(self.space.nodes_of(e), &self.quadratic_tet(mesh, e), &mut load);
+                }
+                for &t in triangles {
+                    let matrix = self.surface_matrix(Lagrange::<6, 3>::triangle(), mesh, t);
+                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, &mut load);
+                }
             }
         }
         load
+    }
+
+    /// `f −= K A_prescribed` for one element.
+    fn subtract_lift<const N: usize>(
+        &self,
+        nodes: &[NodeId],
+        matrix: &impl LocalMatrix<c64, N, 4>,
+        load: &mut [c64],
+    ) {
+        for (b, &from) in nodes.iter().enumerate() {
+            let Some(potential) = self.unknowns.prescribed_at(from) else { continue };
+            for (a, &to) in nodes.iter().enumerate() {
+                let block = matrix.block(a, b);
+                let row = |i: usize| -> c64 { (0..3).map(|j| -block[i][j] * potential[j]).sum() };
+                self.unknowns.scatter_add(load, to, [row(0), row(1), row(2), row(PSI)]);
+            }
+        }
     }
 
     /// Factors what the linear solver needs for a mesh; shared by the state and its adjoint.
@@ -232,7 +301,7 @@ impl FieldModel {
         load: &[c64],
     ) -> Result<FieldSolution, SolverError> {
         let (values, report) = system.solve(load)?;
-        Ok(FieldSolution::new(values, report))
+        Ok(FieldSolution::state(values, report))
     }
 
     /// Number of unknowns.
@@ -240,9 +309,14 @@ impl FieldModel {
         self.unknowns.dofs.count()
     }
 
-    /// Equation numbers and grounded nodes.
+    /// Equation numbers, fixed values and grounded nodes.
     pub fn unknowns(&self) -> &Unknowns {
         &self.unknowns
+    }
+
+    /// The nodes that carry the unknowns.
+    pub fn space(&self) -> &Space {
+        &self.space
     }
 
     /// The topology the model was set up on.
@@ -260,6 +334,12 @@ impl FieldModel {
         &self.materials
     }
 
+    /// `B_r` [T] of the region of an element.
+    pub fn remanence_of(&self, e: ElementId) -> Point {
+        let region = self.topology.region_of()[e.index()];
+        self.remanence.get(region.index()).copied().unwrap_or_default()
+    }
+
     /// Conductors replaced by impedance surfaces.
     pub fn conductors(&self) -> &[Conductor] {
         &self.conductors
@@ -270,9 +350,14 @@ impl FieldModel {
         &self.coils
     }
 
-    /// Elements that a coil's `T` meets: these must not move.
+    /// Elements that a coil meets: these must not move.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.moments.iter().map(|&(e, _)| e)
+        self.sources.fixed_elements()
+    }
+
+    /// Whether nothing excites a field: no coil, magnet or applied field.
+    pub fn is_unexcited(&self) -> bool {
+        self.sources.is_empty() && self.unknowns.prescribed_nodes().next().is_none()
     }
 
     /// Bytes of the matrix and the factor that one solution needs.
@@ -281,13 +366,64 @@ impl FieldModel {
         entries * (size_of::<c64>() + size_of::<f64>() + size_of::<u32>()) + self.analysis.factor_bytes()
     }
 
-    pub(crate) fn coefficients_of(&self, e: ElementId) -> &Coefficients {
+    /// `ν`, `(p − 1)ν` and `jωσ` of an element.
+    pub fn coefficients_of(&self, e: ElementId) -> &Coefficients {
         &self.coefficients[self.topology.region_of()[e.index()].index()]
     }
 
     pub(crate) fn surface(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
-        self.surface_nodes.iter().copied().zip(self.surface_terms.iter().copied())
+        self.surfaces.iter()
     }
+
+    pub(crate) fn sources(&self) -> &Sources {
+        &self.sources
+    }
+}
+
+/// The pattern of the system, and its elements and triangles bound to it.
+fn pattern(
+    space: &Space,
+    unknowns: &Unknowns,
+    couplings: Vec<Coupling>,
+    surfaces: &Surfaces,
+) -> (BlockPattern<4>, Groups) {
+    let surface_couplings = vec![Coupling::full(3); surfaces.triangles.len()];
+    let count = space.node_count();
+    match (space.linear_tets(), space.quadratic_tets()) {
+        (Some(tets), _) => {
+            let volumes = ElementGroup::new(count, tets.to_vec(), couplings);
+            let faces = ElementGroup::new(count, surfaces.triangles.clone(), surface_couplings);
+            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
+            (pattern, groups)
+        }
+        (None, tets) => {
+            let volumes = ElementGroup::new(count, tets.unwrap_or_default().to_vec(), couplings);
+            let triangles = surfaces.triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
+            let faces = ElementGroup::new(count, triangles, surface_couplings);
+            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let groups = Groups::Quadratic { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
+            (pattern, groups)
+        }
+    }
+}
+
+/// Elements and surface triangles with a node whose `A` is prescribed, ascending.
+fn lifted(
+    topology: &Topology,
+    space: &Space,
+    unknowns: &Unknowns,
+    surfaces: &Surfaces,
+) -> (Vec<ElementId>, Vec<usize>) {
+    let mut prescribed = vec![false; space.node_count()];
+    for n in unknowns.prescribed_nodes() {
+        prescribed[n.index()] = true;
+    }
+    let touches = |nodes: &[NodeId]| nodes.iter().any(|n| prescribed[n.index()]);
+    let elements = topology.elements().filter(|&e| touches(space.nodes_of(e))).collect();
+    let triangles =
+        (0..surfaces.triangles.len()).filter(|&t| touches(&space.triangle(surfaces.triangles[t]))).collect();
+    (elements, triangles)
 }
 
 /// Refuses a coil whose `T` has a tangential part on a face that is not flux-parallel.
@@ -296,7 +432,7 @@ impl FieldModel {
 /// planes) or where `T` is normal to the face; elsewhere it would make the natural condition `n × (H − T) = 0`.
 fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     let topology = mesh.topology();
-    let mut flux_parallel = HashSet::new();
+    let mut flux_parallel = std::collections::HashSet::new();
     for (name, _) in setup.boundaries.iter().filter(|(_, b)| *b == Boundary::FluxParallel) {
         flux_parallel.extend(topology.surface(name)?.iter().map(sorted));
     }
@@ -340,13 +476,6 @@ fn meets(coil: &Racetrack, vertices: [Point; 3]) -> bool {
     })
 }
 
-/// The nodes of a triangle, ascending: the same for both orientations.
-fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
-    let mut key = *triangle;
-    key.sort_unstable();
-    key
-}
-
 /// ψ with itself and with every component of `A`.
 fn with_psi() -> Coupling {
     (0..4).fold(Coupling::NONE, |set, i| set.with(i, PSI).with(PSI, i))
@@ -376,6 +505,9 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
             return refuse(&format!("conductivity of `{region}`"), sigma, "zero or more siemens per metre");
         }
     }
+    if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
+        return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
+    }
     for conductor in &setup.impedance_surfaces {
         if conductor.surface.is_empty() {
             return Err(SolverError::EmptyRegion {
@@ -385,75 +517,4 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
         }
     }
     Ok(())
-}
-
-/// Triangles at which ν jumps, natural outer faces, and impedance surfaces.
-fn surface_terms(
-    topology: &Topology,
-    coefficients: &[Coefficients],
-    setup: &FieldModelSetup,
-    angular_frequency: f64,
-) -> Result<(Vec<[NodeId; 3]>, Vec<SurfaceTerm>), SolverError> {
-    // On planes at right angles to an axis the term couples components that the condition fixes: nothing to store.
-    let mut conditioned = HashSet::new();
-    for (name, _) in &setup.boundaries {
-        conditioned.extend(topology.surface(name)?.iter().map(sorted));
-    }
-    let reluctivity = |e: ElementId| coefficients[topology.region_of()[e.index()].index()].reluctivity;
-    let (mut nodes, mut terms) = (Vec::new(), Vec::new());
-    for facet in topology.facets() {
-        let outside = facet.outside.map_or(0.0, reluctivity);
-        let jump = reluctivity(facet.inside) - outside;
-        if jump != 0.0 && !(facet.outside.is_none() && conditioned.contains(&sorted(&facet.nodes))) {
-            nodes.push(facet.nodes);
-            terms.push(SurfaceTerm::Interface(jump));
-        }
-    }
-    for (index, conductor) in setup.impedance_surfaces.iter().enumerate() {
-        let Some(skin_depth) = conductor.material.skin_depth(angular_frequency) else {
-            return Err(SolverError::Parameter {
-                what: format!("model of `{}`", conductor.name),
-                value: "impedance".to_owned(),
-                expected: "an impedance surface needs a conductivity and a frequency above zero; use model = \"volume\""
-                    .to_owned(),
-            });
-        };
-        let coefficient =
-            impedance::surface_coefficient(angular_frequency, conductor.material.conductivity, skin_depth);
-        for triangle in &conductor.surface {
-            nodes.push(*triangle);
-            terms.push(SurfaceTerm::Impedance(coefficient, index));
-        }
-    }
-    Ok((nodes, terms))
-}
-
-/// `Σ_coils N I ∫_e T dV`, ascending by element.
-fn total_moments(mesh: &Mesh, coils: &[Coil]) -> Result<Vec<(ElementId, [c64; 3])>, SolverError> {
-    let mut all: Vec<(ElementId, [c64; 3])> = Vec::new();
-    for coil in coils {
-        let moments: Vec<(ElementId, Point)> = coil::moments(&coil.shape, mesh);
-        if moments.is_empty() {
-            return Err(SolverError::NoSource {
-                cause: format!(
-                    "the coil `{}` lies outside the mesh; check its centre and the mesh unit",
-                    coil.name
-                ),
-            });
-        }
-        all.extend(moments.into_iter().map(|(e, m)| (e, m.map(|m| coil.ampere_turns * m))));
-    }
-    all.sort_by_key(|&(e, _)| e);
-    let mut merged: Vec<(ElementId, [c64; 3])> = Vec::with_capacity(all.len());
-    for (e, moment) in all {
-        match merged.last_mut() {
-            Some((last, sum)) if *last == e => {
-                for d in 0..3 {
-                    sum[d] += moment[d];
-                }
-            }
-            _ => merged.push((e, moment)),
-        }
-    }
-    Ok(merged)
 }

@@ -82,9 +82,9 @@ impl Objective {
         mesh: &Mesh,
         solution: &FieldSolution,
     ) -> Result<ObjectiveValue, SolverError> {
-        let dofs = &model.unknowns().dofs;
+        let unknowns = model.unknowns();
         let mut value = 0.0;
-        let mut derivative = vec![c64::default(); dofs.count()];
+        let mut derivative = vec![c64::default(); model.unknown_count()];
         for cell in &self.cells {
             let (b, volume) = mean(cell, model, mesh, solution);
             let weight = match self.weighting {
@@ -101,7 +101,7 @@ impl Objective {
                     let re = cross(conjugate.map(|c| c.re), gradient);
                     let im = cross(conjugate.map(|c| c.im), gradient);
                     let at = |d: usize| share * c64::new(re[d], im[d]);
-                    dofs.scatter_add(&mut derivative, node, [at(0), at(1), at(2), c64::default()]);
+                    unknowns.scatter_add(&mut derivative, node, [at(0), at(1), at(2), c64::default()]);
                 }
             }
         }

@@ -1,7 +1,8 @@
-//! Flux density at points: the curl of a quadratic polynomial fitted to the potentials around.
+//! Flux density at points: the curl of a polynomial fitted to the potentials around.
 //!
 //! `B` of linear elements is constant in each and of first order. The potentials at the nodes are of second order, so
-//! the curl of a quadratic fitted to them is better by one order where the mesh is regular, and it stays so beside a
+//! the curl of a quadratic fitted to them (of quadratic elements: of a cubic) is better by one order where the mesh is
+//! regular, and it stays so beside a
 //! symmetry plane or a material's face, where all elements lie on one side and a mean of their `B` would not
 //! (polynomial-preserving recovery; Zhang and Naga, SIAM J. Sci. Comput. 26 (2005) 1192). Across a material boundary
 //! the true field jumps, so only elements of the probed element's material take part.
@@ -43,8 +44,18 @@ pub fn locate(mesh: &Mesh, point: Point) -> Option<(ElementId, [f64; 4])> {
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
 
-/// Coefficients of a quadratic polynomial in space.
-const TERMS: usize = 10;
+/// Exponents of `x, y, z` in the monomials up to a degree: the constant, the coordinates, then the higher ones.
+fn monomials(degree: usize) -> Vec<[i32; 3]> {
+    let mut exponents: Vec<[i32; 3]> = Vec::new();
+    for total in 0..=degree as i32 {
+        for i in (0..=total).rev() {
+            for j in (0..=total - i).rev() {
+                exponents.push([i, j, total - i - j]);
+            }
+        }
+    }
+    exponents
+}
 
 /// The part of a monomial that the others do not already contain, relative to it, below which the nodes do not
 /// determine its coefficient: nodes in two parallel planes, for instance, leave one square open.
@@ -52,9 +63,9 @@ const DEPENDENT: f64 = 1e-3;
 
 /// The recovered flux density [T] at a point of an element.
 ///
-/// `A` at the nodes of all elements that share a node with `element` and have its material, fitted by least squares
-/// with a quadratic polynomial; a further layer of elements where these do not determine it. In a part of the material
-/// too small for any fit, the element's own value.
+/// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares
+/// with a polynomial of one degree more than the elements'; a further layer of elements where these do not determine it.
+/// In a part of the material too small for any fit, the element's own mean.
 pub fn recovered_flux_density(
     solution: &FieldSolution,
     model: &FieldModel,
@@ -64,15 +75,18 @@ pub fn recovered_flux_density(
 ) -> Complex3 {
     let topology = model.topology();
     let material = |e: ElementId| model.materials()[topology.region_of()[e.index()].index()];
-    let mut nodes: BTreeSet<NodeId> = topology.tet(element).into_iter().collect();
+    let space = model.space();
+    let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {
-        nodes = nodes
+        elements = elements
             .iter()
-            .flat_map(|&n| topology.elements_around(n))
-            .filter(|&&e| material(e) == material(element))
             .flat_map(|&e| topology.tet(e))
+            .flat_map(|n| topology.elements_around(n))
+            .copied()
+            .filter(|&e| material(e) == material(element))
             .collect();
-        let offsets: Vec<Point> = nodes.iter().map(|&n| sub(mesh.point(n), point)).collect();
+        let nodes: BTreeSet<NodeId> = elements.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
+        let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
         let values: Vec<Complex3> = nodes
             .iter()
             .map(|&n| {
@@ -80,38 +94,39 @@ pub fn recovered_flux_density(
                 [x, y, z]
             })
             .collect();
-        if let Some(gradient) = fitted_gradient(&offsets, &values) {
+        if let Some(gradient) = fitted_gradient(space.order().degree() + 1, &offsets, &values) {
             return curl(&gradient);
         }
     }
     solution.flux_density(model, mesh, element)
 }
 
-/// The gradient at the origin, `gradient[d][j] = ∂_d A_j`, of the quadratic polynomial fitted to values at points.
+/// The gradient at the origin, `gradient[d][j] = ∂_d A_j`, of the polynomial of a degree fitted to values at points.
 ///
 /// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), coordinates
 /// scaled to the extent of the points in each direction; the weight `exp(−|ξ|²)` in these coordinates lets the nearest
 /// nodes count most. `None` where the points do not determine the polynomial.
-fn fitted_gradient(points: &[Point], values: &[Complex3]) -> Option<[Complex3; 3]> {
-    if points.len() < TERMS {
+fn fitted_gradient(degree: usize, points: &[Point], values: &[Complex3]) -> Option<[Complex3; 3]> {
+    let monomials = monomials(degree);
+    let terms = monomials.len();
+    if points.len() < terms {
         return None;
     }
     let scale: Point = std::array::from_fn(|d| points.iter().map(|p| p[d].abs()).fold(0.0, f64::max));
-    let mut columns: [Vec<f64>; TERMS] = std::array::from_fn(|_| Vec::with_capacity(points.len()));
+    let mut columns = vec![Vec::with_capacity(points.len()); terms];
     let mut rest = Vec::with_capacity(points.len());
     for (p, value) in points.iter().zip(values) {
         let [x, y, z]: Point = std::array::from_fn(|d| p[d] / scale[d]);
-        let monomials = [1.0, x, y, z, x * x, y * y, z * z, x * y, y * z, z * x];
         let weight = (-(x * x + y * y + z * z)).exp();
-        for (column, monomial) in columns.iter_mut().zip(monomials) {
-            column.push(weight * monomial);
+        for (column, &[i, j, k]) in columns.iter_mut().zip(&monomials) {
+            column.push(weight * x.powi(i) * y.powi(j) * z.powi(k));
         }
         rest.push(value.map(|v| weight * v));
     }
     let product = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(u, v)| u * v).sum::<f64>();
-    let mut upper = [[0.0; TERMS]; TERMS];
-    let mut right = [[c64::default(); 3]; TERMS];
-    for k in 0..TERMS {
+    let mut upper = vec![vec![0.0; terms]; terms];
+    let mut right = vec![[c64::default(); 3]; terms];
+    for k in 0..terms {
         let (done, open) = columns.split_at_mut(k);
         let column = &mut open[0];
         let before = product(column, column).sqrt();
@@ -137,9 +152,9 @@ fn fitted_gradient(points: &[Point], values: &[Complex3]) -> Option<[Complex3; 3
             }
         }
     }
-    for k in (0..TERMS).rev() {
+    for k in (0..terms).rev() {
         for d in 0..3 {
-            for later in k + 1..TERMS {
+            for later in k + 1..terms {
                 let known = right[later][d];
                 right[k][d] -= upper[k][later] * known;
             }
@@ -195,7 +210,7 @@ mod tests {
         };
         let points = grid([3, 3, 3]);
         let values: Vec<Complex3> = points.iter().map(|&p| field(p)).collect();
-        let gradient = fitted_gradient(&points, &values).expect("27 points determine a quadratic");
+        let gradient = fitted_gradient(2, &points, &values).expect("27 points determine a quadratic");
         let exact = [[2.0, -5.0], [-1.0, -1.0], [70.0, 70.0]];
         for d in 0..3 {
             // Values of order 1 on a patch of 0.2 mm: rounding of 1e-16 / 2e-4, a hundredfold.
@@ -209,7 +224,7 @@ mod tests {
         let constant = |n: usize| vec![[c64::from(1.0); 3]; n];
         for lines in [[3, 3, 2], [3, 3, 1], [9, 2, 1]] {
             let points = grid(lines);
-            assert!(fitted_gradient(&points, &constant(points.len())).is_none(), "{lines:?}");
+            assert!(fitted_gradient(2, &points, &constant(points.len())).is_none(), "{lines:?}");
         }
     }
 }

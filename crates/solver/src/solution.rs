@@ -5,22 +5,40 @@ use fluxmorph_geometry::tet4::Tet4;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
-use crate::element::impedance;
-use crate::element::volume::{NodalField, curl, gradient, scalar_gradient};
-use crate::element::{Complex3, dot3};
+use crate::element::lagrange::Lagrange;
+use crate::element::point::PointField;
+use crate::element::quadrature::{self, Node};
+use crate::element::volume::NodalField;
+use crate::element::{Complex3, impedance};
 use crate::linear::LinearSolverReport;
-use crate::model::{FieldModel, SurfaceTerm};
+use crate::model::FieldModel;
+use crate::space::{Basis, Order};
+use crate::surface::SurfaceTerm;
 
-/// Potentials of one state, and how the solver reached them.
+/// Whose potentials a solution holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// The field: fixed components have their prescribed values.
+    State,
+    /// The adjoint: fixed components are zero.
+    Adjoint,
+}
+
+/// Potentials of one state or adjoint, and how the solver reached them.
 #[derive(Clone, Debug)]
 pub struct FieldSolution {
     values: Vec<c64>,
+    role: Role,
     report: LinearSolverReport,
 }
 
 impl FieldSolution {
-    pub(crate) fn new(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, report }
+    pub(crate) fn state(values: Vec<c64>, report: LinearSolverReport) -> Self {
+        Self { values, role: Role::State, report }
+    }
+
+    pub(crate) fn adjoint(values: Vec<c64>, report: LinearSolverReport) -> Self {
+        Self { values, role: Role::Adjoint, report }
     }
 
     /// The unknowns, one per equation.
@@ -33,23 +51,57 @@ impl FieldSolution {
         self.report
     }
 
-    /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at a node; zero where fixed, ψ zero outside conductors.
+    /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at a node of the space; ψ is zero outside conductors.
     #[inline]
     pub fn potentials(&self, model: &FieldModel, node: NodeId) -> [c64; 4] {
-        model.unknowns().dofs.gather(&self.values, node)
+        let unknowns = model.unknowns();
+        let mut potentials = unknowns.gather(&self.values, node);
+        if self.role == Role::State
+            && let Some(prescribed) = unknowns.prescribed_at(node)
+        {
+            for d in 0..3 {
+                potentials[d] += prescribed[d];
+            }
+        }
+        potentials
     }
 
-    /// Potentials at the four nodes of an element.
+    /// Potentials at the given nodes.
     #[inline]
-    pub(crate) fn nodal_field(&self, model: &FieldModel, e: ElementId) -> NodalField {
-        NodalField::new(model.topology().tet(e).map(|n| self.potentials(model, n)))
+    pub(crate) fn nodal_field<const N: usize>(
+        &self,
+        model: &FieldModel,
+        nodes: [NodeId; N],
+    ) -> NodalField<N> {
+        NodalField::new(nodes.map(|n| self.potentials(model, n)))
     }
 
-    /// `B = curl A` [T] in an element, where it is constant.
+    /// Potentials at the nodes of an element.
+    ///
+    /// # Panics
+    /// If the elements of the model's space have another number of nodes.
+    #[inline]
+    pub(crate) fn element_field<const N: usize>(&self, model: &FieldModel, e: ElementId) -> NodalField<N> {
+        let nodes = model.space().nodes_of(e);
+        self.nodal_field(model, nodes.try_into().expect("the caller knows the order of the space"))
+    }
+
+    /// The field at a point of an element, given by the shape functions there.
+    #[inline]
+    pub fn at(&self, model: &FieldModel, basis: &Basis) -> PointField {
+        let mut field = PointField::default();
+        for (node, value, gradient) in basis.iter() {
+            let [x, y, z, psi] = self.potentials(model, node);
+            field.add(value, gradient, [x, y, z], psi);
+        }
+        field
+    }
+
+    /// The mean of `B = curl A` [T] over an element; of linear elements, the constant.
     #[inline]
     pub fn flux_density(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> Complex3 {
-        let field = self.nodal_field(model, e);
-        curl(&gradient(&Tet4::new(mesh.vertices(e)), &field.vector_potential))
+        let tet = Tet4::new(mesh.vertices(e));
+        self.at(model, &model.space().basis(e, &tet, &[0.25; 4])).flux_density()
     }
 
     /// `B` [T] in every element, shape `(n_tets, 3)`.
@@ -68,12 +120,9 @@ impl FieldSolution {
                 if eddy == c64::default() {
                     return [c64::default(); 3];
                 }
-                let field = self.nodal_field(model, e);
-                let slope = scalar_gradient(&Tet4::new(mesh.vertices(e)), &field.scalar_potential);
-                std::array::from_fn(|d| {
-                    let mean: c64 = field.vector_potential.iter().map(|a| 0.25 * a[d]).sum();
-                    -eddy * (mean + slope[d])
-                })
+                let tet = Tet4::new(mesh.vertices(e));
+                let field = self.at(model, &model.space().basis(e, &tet, &[0.25; 4]));
+                field.electric_potential().map(|v| -eddy * v)
             })
             .collect()
     }
@@ -89,13 +138,18 @@ impl FieldSolution {
         if eddy == c64::default() {
             return 0.0;
         }
-        let field = self.nodal_field(model, e);
-        let slope = scalar_gradient(&Tet4::new(mesh.vertices(e)), &field.scalar_potential);
-        let total: [Complex3; 4] = field.vector_potential.map(|a| std::array::from_fn(|d| a[d] + slope[d]));
-        let sum: Complex3 = std::array::from_fn(|d| total.iter().map(|v| v[d]).sum());
-        let magnitude = |v: Complex3| dot3(v, v.map(|c| c.conj())).re;
-        // ∫N_a N_b / V = (1 + δ_ab)/20.
-        let mean_square = 0.05 * (magnitude(sum) + total.iter().map(|v| magnitude(*v)).sum::<f64>());
+        let tet = Tet4::new(mesh.vertices(e));
+        let rule: &[Node] = match model.space().order() {
+            Order::Linear => quadrature::degree_2(),
+            Order::Quadratic => quadrature::degree_5(),
+        };
+        let mean_square: f64 = rule
+            .iter()
+            .map(|(lambda, share)| {
+                let field = self.at(model, &model.space().basis(e, &tet, lambda));
+                share * field.electric_potential().iter().map(|c| c.norm_sqr()).sum::<f64>()
+            })
+            .sum();
         0.5 * model.angular_frequency() * eddy.im * mean_square
     }
 
@@ -119,12 +173,23 @@ impl FieldSolution {
         for (nodes, term) in model.surface() {
             if let SurfaceTerm::Impedance(coefficient, index) = term {
                 let vertices = nodes.map(|n| mesh.point(n));
-                let potential = nodes.map(|n| {
-                    let [x, y, z, _] = self.potentials(model, n);
-                    [x, y, z]
-                });
-                by_surface[index] +=
-                    impedance::loss(vertices, coefficient, model.angular_frequency(), &potential);
+                let omega = model.angular_frequency();
+                by_surface[index] += match model.space().order() {
+                    Order::Linear => impedance::loss(
+                        Lagrange::<3, 3>::triangle(),
+                        vertices,
+                        coefficient,
+                        omega,
+                        &self.nodal_field(model, nodes).vector_potential,
+                    ),
+                    Order::Quadratic => impedance::loss(
+                        Lagrange::<6, 3>::triangle(),
+                        vertices,
+                        coefficient,
+                        omega,
+                        &self.nodal_field(model, model.space().quadratic_triangle(nodes)).vector_potential,
+                    ),
+                };
             }
         }
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));

@@ -1,69 +1,96 @@
 //! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors, less what the boundaries fix.
 //!
-//! * *flux-parallel* plane (B·n = 0): the tangential components of `A` are zero, and `ψ = 0` where the plane cuts a
+//! * *flux-parallel* surface (B·n = 0): the tangential components of `A` are zero, and `ψ = 0` where the surface cuts a
 //!   conductor, since the current crosses it at right angles;
-//! * *flux-normal* plane (n × H = 0): the normal component of `A` is zero, `ψ` is free;
-//! * `ψ` is defined up to a constant on every connected conductor: where no plane fixes it, one node is grounded.
+//! * *flux-normal* surface (n × H = 0): the normal component of `A` is zero, `ψ` is free;
+//! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
+//! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
+//!
+//! On planes along the axes the unknowns are components of `A`; at the nodes of other conditioned surfaces they are
+//! components in the node's own frame ([`crate::constraint`]), and [`Unknowns::gather`] and
+//! [`Unknowns::scatter_add`] turn between the two.
 
-use fluxmorph_geometry::fem::DofMap;
-use fluxmorph_geometry::tet4::{area_vector, norm};
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::fem::{DofMap, c64};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
+use crate::boundary::{self, Boundary};
+use crate::constraint::{Constraint, Fix, Frame, constraint};
 use crate::error::SolverError;
-use crate::model::Boundary;
+use crate::space::Space;
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
 
-/// How far a unit normal may be from a coordinate axis: a generator's or file's rounding, not a slope.
-const AXIS_TOLERANCE: f64 = 1e-6;
+/// Share of an applied field's largest potential that may be left where another condition says zero: rounding.
+const CONFLICT: f64 = 1e-6;
 
 /// Equation numbers of the A–ψ system.
 #[derive(Clone, Debug)]
 pub struct Unknowns {
-    /// Components `A_x, A_y, A_z, ψ`.
+    /// Components along the node's directions, and `ψ`.
     pub dofs: DofMap<4>,
     /// One node per connected conductor whose ψ no boundary fixes.
     pub grounded: Vec<NodeId>,
+    /// Directions at the nodes where they are not the coordinates'.
+    frames: BTreeMap<NodeId, Frame>,
+    /// Fixed components that are not zero [T m], along the node's directions.
+    prescribed: BTreeMap<NodeId, Point>,
+}
+
+/// What conditions say at one node.
+#[derive(Default)]
+struct AtNode {
+    faces: Vec<(Fix, Point)>,
+    /// Without the faces of the applied field.
+    own: Vec<(Fix, Point)>,
+    potential: Option<Point>,
+    psi_zero: bool,
 }
 
 impl Unknowns {
-    /// Numbers the unknowns of a mesh with conducting elements `conductor` and conditions on named surfaces.
+    /// Numbers the unknowns of a space with conducting elements `conductor` and conditions on named surfaces.
     ///
     /// # Errors
-    /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::BoundaryNormal`] for one that is not a plane at
-    /// right angles to a coordinate axis.
+    /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::Conflict`] where an applied field contradicts
+    /// another condition.
     pub fn new(
         mesh: &Mesh,
+        space: &Space,
         conductor: &[ElementId],
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
-        let topology = mesh.topology();
-        let node_count = topology.node_count();
-        // Bit c: component c is fixed to zero.
+        let at_nodes = conditions(mesh, space, boundaries)?;
+        let potentials = at_nodes.values().filter_map(|at| at.potential).map(norm);
+        let tolerance = CONFLICT * potentials.fold(0.0, f64::max);
+        let node_count = space.node_count();
         let mut fixed = vec![0u8; node_count];
         let mut psi_zero = vec![false; node_count];
-        for (surface, boundary) in boundaries {
-            for triangle in topology.surface(surface)? {
-                let axis = normal_axis(mesh, *triangle, surface)?;
-                for n in triangle {
-                    match boundary {
-                        Boundary::FluxParallel => {
-                            fixed[n.index()] |= 0b111 & !(1 << axis);
-                            psi_zero[n.index()] = true;
-                        }
-                        Boundary::FluxNormal => fixed[n.index()] |= 1 << axis,
-                    }
-                }
+        let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
+        for (node, at) in at_nodes {
+            let Constraint { frame, fixed: bits } = constraint(&at.faces);
+            fixed[node.index()] = bits;
+            psi_zero[node.index()] = at.psi_zero;
+            if frame != Frame::COORDINATES {
+                frames.insert(node, frame);
+            }
+            if let Some(potential) = at.potential {
+                check_agreement(mesh, space, node, &at.own, potential, tolerance)?;
+                let component = |k: usize| {
+                    if bits >> k & 1 == 1 { dot(frame.axes[k], potential) } else { 0.0 }
+                };
+                prescribed.insert(node, [component(0), component(1), component(2)]);
             }
         }
         let mut has_psi = vec![false; node_count];
         for &e in conductor {
-            for n in topology.tet(e) {
+            for n in space.nodes_of(e) {
                 has_psi[n.index()] = true;
             }
         }
-        let grounded = ground(mesh, conductor, &psi_zero);
+        let grounded = ground(space, conductor, &psi_zero);
         for n in &grounded {
             psi_zero[n.index()] = true;
         }
@@ -71,26 +98,130 @@ impl Unknowns {
             let i = node.index();
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
-        Ok(Self { dofs, grounded })
+        Ok(Self { dofs, grounded, frames, prescribed })
+    }
+
+    /// `A_x, A_y, A_z` and `ψ` at a node out of a vector of unknowns; zero where a component is fixed.
+    #[inline]
+    pub fn gather(&self, values: &[c64], node: NodeId) -> [c64; 4] {
+        let local = self.dofs.gather(values, node);
+        match self.frame(node) {
+            None => local,
+            Some(frame) => {
+                let mut global = [c64::default(), c64::default(), c64::default(), local[PSI]];
+                for (k, axis) in frame.axes.iter().enumerate() {
+                    for d in 0..3 {
+                        global[d] += axis[d] * local[k];
+                    }
+                }
+                global
+            }
+        }
+    }
+
+    /// The prescribed part of `A` at a node [T m].
+    #[inline]
+    pub fn prescribed_at(&self, node: NodeId) -> Option<Point> {
+        if self.prescribed.is_empty() {
+            return None;
+        }
+        let local = self.prescribed.get(&node)?;
+        let axes = self.frame(node).map_or(Frame::COORDINATES.axes, |frame| frame.axes);
+        Some(std::array::from_fn(|d| (0..3).map(|k| axes[k][d] * local[k]).sum()))
+    }
+
+    /// Nodes with a prescribed part of `A`, ascending.
+    pub fn prescribed_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.prescribed.keys().copied()
+    }
+
+    /// Nodes whose directions or prescribed values belong to where they lie: these must not move.
+    pub fn held_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.frames.keys().chain(self.prescribed.keys()).copied()
+    }
+
+    /// Adds `x, y, z` and ψ components at a node into a vector of unknowns; what is fixed is dropped.
+    #[inline]
+    pub fn scatter_add(&self, values: &mut [c64], node: NodeId, components: [c64; 4]) {
+        let local = match self.frame(node) {
+            None => components,
+            Some(frame) => {
+                let along = |k: usize| (0..3).map(|d| frame.axes[k][d] * components[d]).sum();
+                [along(0), along(1), along(2), components[PSI]]
+            }
+        };
+        self.dofs.scatter_add(values, node, local);
+    }
+
+    /// The directions at a node, where they are not the coordinates'.
+    #[inline]
+    pub(crate) fn frame(&self, node: NodeId) -> Option<&Frame> {
+        if self.frames.is_empty() { None } else { self.frames.get(&node) }
+    }
+
+    /// Whether some node has directions of its own.
+    pub(crate) fn has_frames(&self) -> bool {
+        !self.frames.is_empty()
     }
 }
 
-/// The coordinate axis that a boundary triangle is at right angles to.
-fn normal_axis(mesh: &Mesh, triangle: [NodeId; 3], surface: &str) -> Result<usize, SolverError> {
-    let n = area_vector(triangle.map(|v| mesh.point(v)));
-    let length = norm(n);
-    let unit = n.map(|c| c / length);
-    (0..3).find(|&d| 1.0 - unit[d].abs() < AXIS_TOLERANCE).ok_or_else(|| SolverError::BoundaryNormal {
-        surface: surface.to_owned(),
-        normal: unit,
-        expected: "flux-parallel and flux-normal conditions take planes at right angles to x, y or z",
-    })
+/// The faces of conditioned surfaces at every node of the space.
+fn conditions(
+    mesh: &Mesh,
+    space: &Space,
+    boundaries: &[(String, Boundary)],
+) -> Result<BTreeMap<NodeId, AtNode>, SolverError> {
+    let mut at_nodes: BTreeMap<NodeId, AtNode> = BTreeMap::new();
+    for (surface, boundary) in boundaries {
+        let applied = match boundary {
+            Boundary::UniformField(field) => Some((field, boundary::centre(mesh, boundaries, field)?)),
+            _ => None,
+        };
+        let fix = if *boundary == Boundary::FluxNormal { Fix::Normal } else { Fix::Tangential };
+        for &triangle in mesh.topology().surface(surface)? {
+            let area = area_vector(triangle.map(|v| mesh.point(v)));
+            for node in space.triangle(triangle) {
+                let at = at_nodes.entry(node).or_default();
+                at.faces.push((fix, area));
+                at.psi_zero |= fix == Fix::Tangential;
+                match applied {
+                    None => at.own.push((fix, area)),
+                    Some((field, centre)) => {
+                        at.potential = Some(field.vector_potential(centre, space.position(mesh, node)));
+                    }
+                }
+            }
+        }
+    }
+    Ok(at_nodes)
+}
+
+/// Refuses an applied field whose potential is not zero along a direction that another condition fixes to zero.
+fn check_agreement(
+    mesh: &Mesh,
+    space: &Space,
+    node: NodeId,
+    own: &[(Fix, Point)],
+    potential: Point,
+    tolerance: f64,
+) -> Result<(), SolverError> {
+    if own.is_empty() {
+        return Ok(());
+    }
+    let Constraint { frame, fixed } = constraint(own);
+    let conflict = (0..3)
+        .filter(|k| fixed >> k & 1 == 1)
+        .map(|k| dot(frame.axes[k], potential).abs())
+        .fold(0.0, f64::max);
+    if conflict > tolerance {
+        return Err(SolverError::Conflict { place: space.position(mesh, node) });
+    }
+    Ok(())
 }
 
 /// The first node of every connected set of conducting elements in which no node is fixed already.
-fn ground(mesh: &Mesh, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId> {
-    let topology = mesh.topology();
-    let mut root: Vec<u32> = (0..topology.node_count() as u32).collect();
+fn ground(space: &Space, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId> {
+    let mut root: Vec<u32> = (0..space.node_count() as u32).collect();
     fn find(root: &mut [u32], mut i: u32) -> u32 {
         while root[i as usize] != i {
             root[i as usize] = root[root[i as usize] as usize];
@@ -99,17 +230,17 @@ fn ground(mesh: &Mesh, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId
         i
     }
     for &e in conductor {
-        let [first, others @ ..] = topology.tet(e);
+        let [first, others @ ..] = space.nodes_of(e) else { continue };
         for other in others {
             let (a, b) = (find(&mut root, first.0), find(&mut root, other.0));
             // The smaller node stays root: the result does not depend on the order of elements.
             root[a.max(b) as usize] = a.min(b);
         }
     }
-    let mut nodes: Vec<NodeId> = conductor.iter().flat_map(|&e| topology.tet(e)).collect();
+    let mut nodes: Vec<NodeId> = conductor.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
     nodes.sort_unstable();
     nodes.dedup();
-    let mut is_fixed = vec![false; topology.node_count()];
+    let mut is_fixed = vec![false; space.node_count()];
     for n in &nodes {
         if psi_zero[n.index()] {
             is_fixed[find(&mut root, n.0) as usize] = true;

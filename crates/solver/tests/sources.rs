@@ -22,7 +22,7 @@ fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
         impedance_surfaces: Vec::new(),
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1.0, 0.0), shape }],
         boundaries,
-        linear_solver: Default::default(),
+        ..FieldModelSetup::default()
     };
     FieldModel::new(&mesh, setup)
 }

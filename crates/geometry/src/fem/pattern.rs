@@ -292,6 +292,14 @@ pub struct BoundGroup<const N: usize> {
     pub(super) elements: Vec<Vec<ElementId>>,
 }
 
+impl<const N: usize> BoundGroup<N> {
+    /// Nodes of an element of the group.
+    #[inline]
+    pub fn nodes_of(&self, e: ElementId) -> [NodeId; N] {
+        self.connectivity[e.index()]
+    }
+}
+
 /// The blocks of one node, ascending by node.
 fn blocks_of<const C: usize>(
     a: NodeId,

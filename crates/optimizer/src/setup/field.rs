@@ -93,6 +93,7 @@ pub(super) fn field_model(
         coils,
         boundaries,
         linear_solver,
+        ..FieldModelSetup::default()
     };
     Ok(FieldModel::new(mesh, setup)?)
 }

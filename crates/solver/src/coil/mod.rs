@@ -25,14 +25,14 @@ pub struct Coil {
     pub shape: Racetrack,
 }
 
-/// `∫_e T dV` of the elements that meet a coil's `T` [A m²] for one ampere-turn, ascending by element.
-pub fn moments(coil: &Racetrack, mesh: &Mesh) -> Vec<(ElementId, Point)> {
+/// `∫_e T λ_b dV` of the elements that meet a coil's `T` [A m²] for one ampere-turn, ascending by element.
+pub fn moments(coil: &Racetrack, mesh: &Mesh) -> Vec<(ElementId, [Point; 4])> {
     let elements: Vec<ElementId> = mesh.topology().elements().collect();
     elements
         .into_par_iter()
         .filter_map(|e| {
             let moment = coil.moment(mesh.vertices(e));
-            (moment != [0.0; 3]).then_some((e, moment))
+            (moment != [0.0; 3]).then_some((e, [moment.map(|m| 0.25 * m); 4]))
         })
         .collect()
 }

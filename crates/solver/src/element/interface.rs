@@ -2,44 +2,60 @@
 //!
 //! On a region of constant `ν` with outward normal `n`,
 //! `∫ν (curl A·curl w + div A div w − ∇A:∇w) = ν ∮ w_i (n_i ∂_j − n_j ∂_i) A_j`, an integral of tangential
-//! derivatives. For linear shape functions on a triangle with nodes in right-handed order about `n` and the edges
-//! `e_m = x_{m+2} − x_{m+1}` (indices modulo 3), the entry of `(a, i)` against `(b, j)` is
-//! `−ν ε_ijk (e_b − e_a)_k / 12` (made symmetric; the antisymmetric rest cancels over a closed surface). Between two
-//! regions the factor is the jump `ν_inside − ν_outside`. The entry is linear in the coordinates.
+//! derivatives: `(n_i ∂_j − n_j ∂_i) f = ε_ijk (n × ∇f)_k`. On a triangle of area `S` with nodes in right-handed order
+//! about `n` and the edges `e_m = x_{m+2} − x_{m+1}` (indices modulo 3), `n × ∇λ_m = −e_m/(2S)`. So the entry of
+//! `(a, i)` against `(b, j)` is `−ν ε_ijk Σ_m ¼(⟨N_a ∂_m N_b⟩ − ⟨N_b ∂_m N_a⟩) (e_m)_k`, made symmetric; the
+//! antisymmetric rest is a total derivative and cancels over a closed surface. Linear shape functions: `−ν ε_ijk (e_b − e_a)_k/12`.
+//! Between two regions the factor is the jump `ν_inside − ν_outside`. The entry is linear in the coordinates.
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{Point, sub};
 
+use super::lagrange::Lagrange;
 use super::{Complex3, cross3, levi_civita};
 
-/// The coupling matrix of one triangle, shape `(3 × 4, 3 × 4)`; its ψ rows and columns are zero.
+/// The coupling matrix of one triangle with `N` nodes, shape `(N × 4, N × 4)`; its ψ rows and columns are zero.
 #[derive(Clone, Copy, Debug)]
-pub struct InterfaceTriangle {
+pub struct InterfaceTriangle<const N: usize> {
+    shape: &'static Lagrange<N, 3>,
     edges: [Point; 3],
     jump: f64,
 }
 
-impl InterfaceTriangle {
+impl<const N: usize> InterfaceTriangle<N> {
     /// The matrix for three vertices [m] in right-handed order about the normal, and `ν_inside − ν_outside` [m/H].
     #[inline]
-    pub fn new(vertices: [Point; 3], jump: f64) -> Self {
-        Self { edges: std::array::from_fn(|m| sub(vertices[(m + 2) % 3], vertices[(m + 1) % 3])), jump }
+    pub fn new(shape: &'static Lagrange<N, 3>, vertices: [Point; 3], jump: f64) -> Self {
+        let edges = std::array::from_fn(|m| sub(vertices[(m + 2) % 3], vertices[(m + 1) % 3]));
+        Self { shape, edges, jump }
     }
 }
 
-impl LocalMatrix<c64, 3, 4> for InterfaceTriangle {
+/// `¼(⟨N_a ∂_m N_b⟩ − ⟨N_b ∂_m N_a⟩)`.
+#[inline]
+fn weight<const N: usize>(shape: &Lagrange<N, 3>, a: usize, b: usize, m: usize) -> f64 {
+    0.25 * (shape.advection[a][b][m] - shape.advection[b][a][m])
+}
+
+impl<const N: usize> LocalMatrix<c64, N, 4> for InterfaceTriangle<N> {
     #[inline]
     fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
         let mut block = [[c64::default(); 4]; 4];
         if a == b {
             return block;
         }
-        let difference = sub(self.edges[b], self.edges[a]);
+        let mut vector = [0.0; 3];
+        for (m, edge) in self.edges.iter().enumerate() {
+            let factor = -self.jump * weight(self.shape, a, b, m);
+            for k in 0..3 {
+                vector[k] += factor * edge[k];
+            }
+        }
         for i in 0..3 {
             for j in 0..3 {
                 if i != j {
                     let (k, sign) = levi_civita(i, j);
-                    block[i][j] = c64::new(-self.jump / 12.0 * sign * difference[k], 0.0);
+                    block[i][j] = c64::new(sign * vector[k], 0.0);
                 }
             }
         }
@@ -47,22 +63,28 @@ impl LocalMatrix<c64, 3, 4> for InterfaceTriangle {
     }
 }
 
-/// `∂/∂x_k (λᵀ M u)` for the three nodes, shape `(3, 3)`: independent of the coordinates.
-pub fn shape_derivative(jump: f64, adjoint: &[Complex3; 3], state: &[Complex3; 3]) -> [Complex3; 3] {
+/// `∂/∂x_k (λᵀ M u)` for the three vertices, shape `(3, 3)`: independent of the coordinates.
+pub fn shape_derivative<const N: usize>(
+    shape: &Lagrange<N, 3>,
+    jump: f64,
+    adjoint: &[Complex3; N],
+    state: &[Complex3; N],
+) -> [Complex3; 3] {
     let mut derivative = [[c64::default(); 3]; 3];
     for m in 0..3 {
-        // λᵀMu = −jump/12 Σ_ab (λ_a × u_b)·(e_b − e_a): the factor of edge m.
-        let mut weight = [c64::default(); 3];
-        for a in 0..3 {
-            let (from_state, from_adjoint) = (cross3(adjoint[a], state[m]), cross3(adjoint[m], state[a]));
-            for d in 0..3 {
-                weight[d] += from_state[d] - from_adjoint[d];
+        // λᵀMu = Σ_m W_m·e_m with W_m = −jump Σ_ab weight_abm λ_a × u_b.
+        let mut factor = [c64::default(); 3];
+        for a in 0..N {
+            for b in 0..N {
+                let product = cross3(adjoint[a], state[b]);
+                for d in 0..3 {
+                    factor[d] -= jump * weight(shape, a, b, m) * product[d];
+                }
             }
         }
         for d in 0..3 {
-            let term = -jump / 12.0 * weight[d];
-            derivative[(m + 2) % 3][d] += term;
-            derivative[(m + 1) % 3][d] -= term;
+            derivative[(m + 2) % 3][d] += factor[d];
+            derivative[(m + 1) % 3][d] -= factor[d];
         }
     }
     derivative
@@ -70,35 +92,48 @@ pub fn shape_derivative(jump: f64, adjoint: &[Complex3; 3], state: &[Complex3; 3
 
 #[cfg(test)]
 mod tests {
+    use super::super::lagrange::TRIANGLE_EDGES;
     use super::super::volume::tests::{SKEW, noise};
     use super::*;
-    use fluxmorph_geometry::tet4::{FACES, Tet4};
+    use fluxmorph_geometry::tet4::{EDGES, FACES, Tet4};
 
-    #[test]
-    fn over_the_faces_of_one_tet_it_is_the_null_lagrangian() {
-        // curl·curl + div·div − ∇:∇ for N_a e_i against N_b e_j is V (g_a,i g_b,j − g_a,j g_b,i).
+    /// Over the faces of one tet the terms sum to `curl·curl + div·div − ∇:∇` of `N_a e_i` against `N_b e_j`, that is
+    /// `V Σ_mn (⟨∂_m N_a ∂_n N_b⟩ g_m,i g_n,j − ⟨∂_m N_a ∂_n N_b⟩ g_m,j g_n,i)`, up to what is antisymmetric under
+    /// exchange of the two functions.
+    fn check<const N: usize, const F: usize>(
+        tet_shape: &'static Lagrange<N, 4>,
+        face_shape: &'static Lagrange<F, 3>,
+        nodes_of: impl Fn([usize; 3]) -> [usize; F],
+    ) {
         let tet = Tet4::new(SKEW);
-        let mut sum = [[[[c64::default(); 3]; 3]; 4]; 4];
+        let mut sum = vec![[[c64::default(); 3]; 3]; N * N];
         for face in FACES {
-            let triangle = InterfaceTriangle::new(face.map(|v| SKEW[v]), 1.0);
-            for (a, &na) in face.iter().enumerate() {
-                for (b, &nb) in face.iter().enumerate() {
+            let triangle = InterfaceTriangle::new(face_shape, face.map(|v| SKEW[v]), 1.0);
+            for (a, &na) in nodes_of(face).iter().enumerate() {
+                for (b, &nb) in nodes_of(face).iter().enumerate() {
                     let block = triangle.block(a, b);
                     for i in 0..3 {
                         for j in 0..3 {
-                            sum[na][nb][i][j] += block[i][j];
+                            sum[N * na + nb][i][j] += block[i][j];
                         }
                     }
                 }
             }
         }
-        for a in 0..4 {
-            for b in 0..4 {
-                let (ga, gb) = (tet.gradients[a], tet.gradients[b]);
+        for a in 0..N {
+            for b in 0..N {
                 for i in 0..3 {
                     for j in 0..3 {
-                        let exact = tet.volume * (ga[i] * gb[j] - ga[j] * gb[i]);
-                        assert!((sum[a][b][i][j] - exact).norm() < 1e-15, "{a} {b} {i} {j}");
+                        let mut exact = 0.0;
+                        for m in 0..4 {
+                            for n in 0..4 {
+                                let (gm, gn) = (tet.gradients[m], tet.gradients[n]);
+                                exact += tet.volume
+                                    * tet_shape.stiffness[a][b][m][n]
+                                    * (gm[i] * gn[j] - gm[j] * gn[i]);
+                            }
+                        }
+                        assert!((sum[N * a + b][i][j] - exact).norm() < 1e-14, "{a} {b} {i} {j}");
                     }
                 }
             }
@@ -106,16 +141,28 @@ mod tests {
     }
 
     #[test]
-    fn the_shape_derivative_matches_central_differences() {
-        let values = |seed: u32| -> [Complex3; 3] {
+    fn over_the_faces_of_one_tet_it_is_the_null_lagrangian() {
+        check(Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle(), |face| face);
+        check(Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle(), |face| {
+            let middle = |[i, j]: [usize; 2]| {
+                let (i, j) = (face[i].min(face[j]), face[i].max(face[j]));
+                4 + EDGES.iter().position(|e| *e == [i, j]).unwrap()
+            };
+            let [m0, m1, m2] = TRIANGLE_EDGES.map(middle);
+            [face[0], face[1], face[2], m0, m1, m2]
+        });
+    }
+
+    fn check_derivative<const N: usize>(shape: &'static Lagrange<N, 3>) {
+        let values = |seed: u32| -> [Complex3; N] {
             std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (3 * a + c) as u32)))
         };
         let (l, u) = (values(3), values(31));
         let bilinear = |vertices: [Point; 3]| {
-            let triangle = InterfaceTriangle::new(vertices, 1.3);
+            let triangle = InterfaceTriangle::new(shape, vertices, 1.3);
             let mut s = c64::default();
-            for a in 0..3 {
-                for b in 0..3 {
+            for a in 0..N {
+                for b in 0..N {
                     for i in 0..3 {
                         for j in 0..3 {
                             s += l[a][i] * triangle.block(a, b)[i][j] * u[b][j];
@@ -125,7 +172,7 @@ mod tests {
             }
             s
         };
-        let exact = shape_derivative(1.3, &l, &u);
+        let exact = shape_derivative(shape, 1.3, &l, &u);
         let base = [SKEW[0], SKEW[1], SKEW[2]];
         for k in 0..3 {
             for d in 0..3 {
@@ -138,5 +185,11 @@ mod tests {
                 assert!((difference - exact[k][d]).norm() < 1e-13, "linear: exact at any step");
             }
         }
+    }
+
+    #[test]
+    fn the_shape_derivative_matches_central_differences() {
+        check_derivative(Lagrange::<3, 3>::triangle());
+        check_derivative(Lagrange::<6, 3>::triangle());
     }
 }

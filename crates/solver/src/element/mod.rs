@@ -6,11 +6,16 @@
 //!
 //! where the last sum runs over the triangles at which `ν` jumps: on each region of constant `ν` the difference between
 //! `curl·curl + div·div` and `∇:∇` is a null Lagrangian, that is, a surface integral. So for `p = 1` the three
-//! components of `A` couple on those triangles only. [`volume`] holds the tetrahedron, [`interface`] the triangles,
-//! [`impedance`] the Leontovich surface. Each comes with its derivative with respect to the node positions.
+//! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
+//! order, [`interface`] the triangles, [`impedance`] the Leontovich surface; [`lagrange`] and [`quadrature`] what they
+//! are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions.
 
 pub mod impedance;
 pub mod interface;
+pub mod lagrange;
+pub mod point;
+pub mod quadratic;
+pub mod quadrature;
 pub mod volume;
 
 use fluxmorph_geometry::fem::c64;

@@ -1,0 +1,229 @@
+//! The potentials at one point of an element, of any order: what integrands are made of.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::{Point, Tet4, dot};
+
+use super::lagrange::Lagrange;
+use super::quadrature::{self, Node};
+use super::volume::{Coefficients, NodalField};
+use super::{Complex3, dot3};
+
+/// `A`, its gradient, and `∇ψ` at a point.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PointField {
+    /// `A` [T m].
+    pub vector_potential: Complex3,
+    /// `∂_d A_j` [T], index `[d][j]`.
+    pub gradient: [Complex3; 3],
+    /// `∇ψ` [T m].
+    pub scalar_gradient: Complex3,
+}
+
+impl PointField {
+    /// The field at the barycentric coordinates `lambda`.
+    #[inline]
+    pub fn new<const N: usize>(
+        shape: &Lagrange<N, 4>,
+        tet: &Tet4,
+        lambda: &[f64; 4],
+        nodal: &NodalField<N>,
+    ) -> Self {
+        let mut field = Self::default();
+        for a in 0..N {
+            let (value, gradient) = (shape.value(a, lambda), gradient(shape, tet, lambda, a));
+            field.add(value, gradient, nodal.vector_potential[a], nodal.scalar_potential[a]);
+        }
+        field
+    }
+
+    /// Adds one shape function with its nodal potentials.
+    #[inline]
+    pub fn add(&mut self, value: f64, gradient: Point, vector_potential: Complex3, scalar_potential: c64) {
+        for j in 0..3 {
+            self.vector_potential[j] += value * vector_potential[j];
+            self.scalar_gradient[j] += gradient[j] * scalar_potential;
+        }
+        for d in 0..3 {
+            for j in 0..3 {
+                self.gradient[d][j] += gradient[d] * vector_potential[j];
+            }
+        }
+    }
+
+    /// `B = curl A` [T].
+    #[inline]
+    pub fn flux_density(&self) -> Complex3 {
+        super::volume::curl(&self.gradient)
+    }
+
+    /// `A + ∇ψ` [T m]; `E = −jω(A + ∇ψ)`.
+    #[inline]
+    pub fn electric_potential(&self) -> Complex3 {
+        std::array::from_fn(|d| self.vector_potential[d] + self.scalar_gradient[d])
+    }
+}
+
+/// `∇N_a` [1/m] at a point.
+#[inline]
+pub fn gradient<const N: usize>(shape: &Lagrange<N, 4>, tet: &Tet4, lambda: &[f64; 4], a: usize) -> Point {
+    let mut g = [0.0; 3];
+    for m in 0..4 {
+        let slope = shape.slope(a, m, lambda);
+        for d in 0..3 {
+            g[d] += slope * tet.gradients[m][d];
+        }
+    }
+    g
+}
+
+/// `∂/∂x_k (λᵀ K_e u)` for the four vertices, shape `(4, 3)`; the values at the nodes are held.
+///
+/// Every term of the weak form is an integral of gradients and values. Moving vertex `k` of a straight-sided element
+/// changes a gradient at fixed barycentric coordinates by `δ(∂_i N_a) = −∂_i λ_k ∂_d N_a` and the volume by
+/// `V ∂_d λ_k`. So `∂s/∂x_k = V ⟨S⟩ ∇λ_k` with an Eshelby tensor `S_di = L δ_di − (terms with one gradient
+/// replaced)`, `L` the integrand; the quadrature is exact for each order.
+pub fn shape_derivative<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    coefficients: &Coefficients,
+    adjoint: &NodalField<N>,
+    state: &NodalField<N>,
+) -> [Complex3; 4] {
+    let rule: &[Node] = match (N, coefficients.eddy == c64::default()) {
+        (4, true) => &[([0.25; 4], 1.0)],
+        (4, false) | (_, true) => quadrature::degree_2(),
+        (_, false) => quadrature::degree_5(),
+    };
+    let mut tensor = [[c64::default(); 3]; 3];
+    for (lambda, share) in rule {
+        let l = PointField::new(shape, tet, lambda, adjoint);
+        let u = PointField::new(shape, tet, lambda, state);
+        add_tensor(&mut tensor, *share, coefficients, &l, &u);
+    }
+    stretched(tet, &tensor)
+}
+
+/// `V S ∇λ_k` for the four vertices: from an Eshelby tensor to the derivative with respect to the positions.
+pub fn stretched(tet: &Tet4, tensor: &[Complex3; 3]) -> [Complex3; 4] {
+    tet.gradients.map(|g| {
+        std::array::from_fn(|d| {
+            tet.volume * (tensor[d][0] * g[0] + tensor[d][1] * g[1] + tensor[d][2] * g[2])
+        })
+    })
+}
+
+/// Adds `share` times the Eshelby tensor of the weak form's integrand at a point.
+fn add_tensor(
+    tensor: &mut [Complex3; 3],
+    share: f64,
+    coefficients: &Coefficients,
+    l: &PointField,
+    u: &PointField,
+) {
+    let Coefficients { reluctivity, extra_penalty, eddy } = *coefficients;
+    let (gl, gu) = (&l.gradient, &u.gradient);
+    let mut integrand = c64::default();
+    let mut minus = [[c64::default(); 3]; 3];
+    for d in 0..3 {
+        integrand += reluctivity * dot3(gl[d], gu[d]);
+        for i in 0..3 {
+            minus[d][i] += reluctivity * (dot3(gl[d], gu[i]) + dot3(gl[i], gu[d]));
+        }
+    }
+    if extra_penalty != 0.0 {
+        let div_l = gl[0][0] + gl[1][1] + gl[2][2];
+        let div_u = gu[0][0] + gu[1][1] + gu[2][2];
+        integrand += extra_penalty * div_l * div_u;
+        for d in 0..3 {
+            for i in 0..3 {
+                minus[d][i] += extra_penalty * (div_u * gl[d][i] + div_l * gu[d][i]);
+            }
+        }
+    }
+    if eddy != c64::default() {
+        let (al, au) = (l.electric_potential(), u.electric_potential());
+        integrand += eddy * dot3(al, au);
+        for d in 0..3 {
+            for i in 0..3 {
+                minus[d][i] += eddy * (l.scalar_gradient[d] * au[i] + u.scalar_gradient[d] * al[i]);
+            }
+        }
+    }
+    for d in 0..3 {
+        tensor[d][d] += share * integrand;
+        for i in 0..3 {
+            tensor[d][i] -= share * minus[d][i];
+        }
+    }
+}
+
+/// `λ`-weighted source moments `M_b = ∫T λ_b dV` [A m²] to the load `f_a = ∫T·curl(N_a e_i) = (∫T × ∇N_a)_i`.
+#[inline]
+pub fn curl_load<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    moments: &[Complex3; 4],
+) -> [Complex3; N] {
+    std::array::from_fn(|a| {
+        let mut load = [c64::default(); 3];
+        for (m, g) in tet.gradients.iter().enumerate() {
+            let mut weighted = [c64::default(); 3];
+            for (b, moment) in moments.iter().enumerate() {
+                let slope = shape.slope_coefficient(a, m, b);
+                for d in 0..3 {
+                    weighted[d] += slope * moment[d];
+                }
+            }
+            load[0] += weighted[1] * g[2] - weighted[2] * g[1];
+            load[1] += weighted[2] * g[0] - weighted[0] * g[2];
+            load[2] += weighted[0] * g[1] - weighted[1] * g[0];
+        }
+        load
+    })
+}
+
+/// Load `∫J N_a dV` [A m] of a current density that is constant in the element [A/m²].
+#[inline]
+pub fn current_load<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    current_density: &Complex3,
+) -> [Complex3; N] {
+    std::array::from_fn(|a| {
+        let mean: f64 = shape.mass[a].iter().sum();
+        current_density.map(|j| tet.volume * mean * j)
+    })
+}
+
+/// `∂/∂x_k (λᵀ f)` for the load of a source `T` that is constant in the element and moves with it (a magnet: `T = ν
+/// B_r`), shape `(4, 3)`: `s = ∫T·curl λ`, whose mean gradient is all that counts.
+pub fn magnet_shape_derivative<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    source: Point,
+    adjoint: &NodalField<N>,
+) -> [Complex3; 4] {
+    let l = PointField::new(shape, tet, &[0.25; 4], adjoint);
+    let mut tensor = [[c64::default(); 3]; 3];
+    let curl = l.flux_density();
+    let integrand: c64 = (0..3).map(|d| source[d] * curl[d]).sum();
+    for d in 0..3 {
+        // T·curl A = ε_kij T_k ∂_i A_j = Σ_i ∂_i A · (T × e_i): replacing ∂_i by ∂_d.
+        for i in 0..3 {
+            let mut unit = [0.0; 3];
+            unit[i] = 1.0;
+            let across = fluxmorph_geometry::tet4::cross(source, unit);
+            tensor[d][i] -= (0..3).map(|j| across[j] * l.gradient[d][j]).sum::<c64>();
+        }
+        tensor[d][d] += integrand;
+    }
+    stretched(tet, &tensor)
+}
+
+/// The barycentric coordinates of a point [m] in a tet.
+pub fn barycentric(tet: &Tet4, vertices: &[Point; 4], point: Point) -> [f64; 4] {
+    let offset = fluxmorph_geometry::tet4::sub(point, vertices[0]);
+    let mut lambda = tet.gradients.map(|g| dot(g, offset));
+    lambda[0] += 1.0;
+    lambda
+}

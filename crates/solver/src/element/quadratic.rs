@@ -1,0 +1,216 @@
+//! The A–ψ tetrahedron of any Lagrange order, by the exact means of its shape functions' products.
+//!
+//! The weak form is that of [`super::volume`], whose closed form serves linear elements faster; here
+//! `∫∇N_a·∇N_b = V Σ_mn ⟨∂_m N_a ∂_n N_b⟩ g_m·g_n` and so on, with the tables of [`super::lagrange`] and the constant
+//! gradients `g_m = ∇λ_m` of a straight-sided element.
+
+use fluxmorph_geometry::fem::{LocalMatrix, c64};
+use fluxmorph_geometry::tet4::{Tet4, dot};
+
+use super::lagrange::Lagrange;
+use super::volume::Coefficients;
+
+/// The A–ψ matrix of a straight-sided tetrahedron with `N` nodes, shape `(N × 4, N × 4)`.
+#[derive(Clone, Copy, Debug)]
+pub struct LagrangeTet<const N: usize> {
+    shape: &'static Lagrange<N, 4>,
+    tet: Tet4,
+    coefficients: Coefficients,
+    /// `V g_m·g_n`.
+    metric: [[f64; 4]; 4],
+}
+
+impl<const N: usize> LagrangeTet<N> {
+    /// The element matrix for given geometry and coefficients.
+    #[inline]
+    pub fn new(shape: &'static Lagrange<N, 4>, tet: Tet4, coefficients: Coefficients) -> Self {
+        let g = &tet.gradients;
+        let metric = std::array::from_fn(|m| std::array::from_fn(|n| tet.volume * dot(g[m], g[n])));
+        Self { shape, tet, coefficients, metric }
+    }
+}
+
+impl<const N: usize> LocalMatrix<c64, N, 4> for LagrangeTet<N> {
+    #[inline]
+    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
+        let Coefficients { reluctivity, extra_penalty, eddy } = self.coefficients;
+        let (volume, g) = (self.tet.volume, &self.tet.gradients);
+        let stiffness = &self.shape.stiffness[a][b];
+        let mut laplace = 0.0;
+        for m in 0..4 {
+            for n in 0..4 {
+                laplace += stiffness[m][n] * self.metric[m][n];
+            }
+        }
+        let mass = volume * self.shape.mass[a][b];
+        let mut block = [[c64::default(); 4]; 4];
+        for i in 0..3 {
+            block[i][i] = c64::new(reluctivity * laplace, 0.0) + eddy * mass;
+        }
+        if eddy != c64::default() {
+            for i in 0..3 {
+                let (mut of_b, mut of_a) = (0.0, 0.0);
+                for m in 0..4 {
+                    of_b += self.shape.advection[a][b][m] * g[m][i];
+                    of_a += self.shape.advection[b][a][m] * g[m][i];
+                }
+                block[i][3] = eddy * (volume * of_b);
+                block[3][i] = eddy * (volume * of_a);
+            }
+            block[3][3] = eddy * laplace;
+        }
+        if extra_penalty != 0.0 {
+            for i in 0..3 {
+                for j in 0..3 {
+                    let mut sum = 0.0;
+                    for m in 0..4 {
+                        for n in 0..4 {
+                            sum += stiffness[m][n] * g[m][i] * g[n][j];
+                        }
+                    }
+                    block[i][j] += extra_penalty * volume * sum;
+                }
+            }
+        }
+        block
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::point::{self, PointField};
+    use super::super::volume::tests::{SKEW, noise};
+    use super::super::volume::{AphiTet, NodalField};
+    use super::super::{Complex3, dot3, quadrature};
+    use super::*;
+    use fluxmorph_geometry::tet4::Point;
+
+    const LAW: Coefficients = Coefficients { reluctivity: 1.7, extra_penalty: 0.6, eddy: c64::new(0.0, 2.3) };
+
+    fn field<const N: usize>(seed: u32) -> NodalField<N> {
+        NodalField::new(std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (4 * a + c) as u32))))
+    }
+
+    fn bilinear<const N: usize>(
+        shape: &'static Lagrange<N, 4>,
+        vertices: [Point; 4],
+        l: &NodalField<N>,
+        u: &NodalField<N>,
+    ) -> c64 {
+        let matrix = LagrangeTet::new(shape, Tet4::new(vertices), LAW);
+        let all = |f: &NodalField<N>, a: usize| {
+            let v = f.vector_potential[a];
+            [v[0], v[1], v[2], f.scalar_potential[a]]
+        };
+        let mut sum = c64::default();
+        for a in 0..N {
+            for b in 0..N {
+                let block = matrix.block(a, b);
+                for i in 0..4 {
+                    for j in 0..4 {
+                        sum += all(l, a)[i] * block[i][j] * all(u, b)[j];
+                    }
+                }
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn of_first_order_it_is_the_closed_form() {
+        let (closed, general) = (
+            AphiTet::new(Tet4::new(SKEW), LAW),
+            LagrangeTet::new(Lagrange::<4, 4>::tet(), Tet4::new(SKEW), LAW),
+        );
+        for a in 0..4 {
+            for b in 0..4 {
+                let (x, y) = (closed.block(a, b), general.block(a, b));
+                for i in 0..4 {
+                    for j in 0..4 {
+                        assert!((x[i][j] - y[i][j]).norm() < 1e-14, "{a} {b} {i} {j}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// `∫ν∇λ:∇u + extra div λ div u + eddy (λ + ∇ψ_λ)·(u + ∇ψ_u)` by quadrature.
+    #[test]
+    fn the_quadratic_matrix_is_the_weak_form_by_quadrature() {
+        let shape = Lagrange::<10, 4>::tet();
+        let (l, u) = (field::<10>(1), field::<10>(90));
+        let tet = Tet4::new(SKEW);
+        let mut sum = c64::default();
+        for (lambda, weight) in quadrature::degree_5() {
+            let (l, u) = (PointField::new(shape, &tet, lambda, &l), PointField::new(shape, &tet, lambda, &u));
+            let trace = |g: &[Complex3; 3]| g[0][0] + g[1][1] + g[2][2];
+            let laplace: c64 = (0..3).map(|d| dot3(l.gradient[d], u.gradient[d])).sum();
+            sum += weight
+                * tet.volume
+                * (LAW.reluctivity * laplace
+                    + LAW.extra_penalty * trace(&l.gradient) * trace(&u.gradient)
+                    + LAW.eddy * dot3(l.electric_potential(), u.electric_potential()));
+        }
+        let exact = bilinear(shape, SKEW, &l, &u);
+        assert!((sum - exact).norm() < 1e-13 * exact.norm(), "{sum} {exact}");
+    }
+
+    fn check_derivative<const N: usize>(shape: &'static Lagrange<N, 4>) {
+        let (l, u) = (field::<N>(1), field::<N>(140));
+        let exact = point::shape_derivative(shape, &Tet4::new(SKEW), &LAW, &l, &u);
+        let h = 1e-5;
+        for k in 0..4 {
+            for d in 0..3 {
+                let at = |s: f64| {
+                    let mut vertices = SKEW;
+                    vertices[k][d] += s;
+                    bilinear(shape, vertices, &l, &u)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!((difference - exact[k][d]).norm() < 1e-8 * (1.0 + difference.norm()));
+            }
+        }
+    }
+
+    #[test]
+    fn the_shape_derivative_matches_central_differences() {
+        check_derivative(Lagrange::<4, 4>::tet());
+        check_derivative(Lagrange::<10, 4>::tet());
+    }
+
+    #[test]
+    fn the_load_of_a_magnet_and_its_derivative() {
+        let shape = Lagrange::<10, 4>::tet();
+        let l = field::<10>(7);
+        let source = [0.3, -1.2, 0.8];
+        let value = |vertices: [Point; 4]| -> c64 {
+            let tet = Tet4::new(vertices);
+            let moments = [source.map(|t| c64::from(0.25 * tet.volume * t)); 4];
+            let load = point::curl_load(shape, &tet, &moments);
+            load.iter().zip(&l.vector_potential).map(|(f, l)| dot3(*f, *l)).sum()
+        };
+        // Against ∫T·curl λ by quadrature.
+        let tet = Tet4::new(SKEW);
+        let integral: c64 = quadrature::degree_2()
+            .iter()
+            .map(|(lambda, w)| {
+                let curl = PointField::new(shape, &tet, lambda, &l).flux_density();
+                w * tet.volume * dot3(curl, source.map(c64::from))
+            })
+            .sum();
+        assert!((value(SKEW) - integral).norm() < 1e-14);
+        let exact = point::magnet_shape_derivative(shape, &tet, source, &l);
+        let h = 1e-5;
+        for k in 0..4 {
+            for d in 0..3 {
+                let at = |s: f64| {
+                    let mut vertices = SKEW;
+                    vertices[k][d] += s;
+                    value(vertices)
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!((difference - exact[k][d]).norm() < 1e-9);
+            }
+        }
+    }
+}

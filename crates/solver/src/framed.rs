@@ -1,0 +1,41 @@
+//! An element matrix turned into the nodes' own directions: `R_aᵀ K_ab R_b`, with the axes of a node's frame as the
+//! columns of `R`; `ψ` is untouched.
+
+use fluxmorph_geometry::fem::{LocalMatrix, c64};
+
+use crate::constraint::Frame;
+
+/// An element matrix seen from the frames of its nodes; `None` stands for the coordinate axes.
+pub(crate) struct Framed<'a, L, const N: usize> {
+    matrix: L,
+    frames: [Option<&'a Frame>; N],
+}
+
+impl<'a, L, const N: usize> Framed<'a, L, N> {
+    #[inline]
+    pub(crate) fn new(matrix: L, frames: [Option<&'a Frame>; N]) -> Self {
+        Self { matrix, frames }
+    }
+}
+
+impl<L: LocalMatrix<c64, N, 4>, const N: usize> LocalMatrix<c64, N, 4> for Framed<'_, L, N> {
+    #[inline]
+    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
+        let mut block = self.matrix.block(a, b);
+        if let Some(frame) = self.frames[a] {
+            let rows = block;
+            for k in 0..3 {
+                block[k] = std::array::from_fn(|j| (0..3).map(|i| rows[i][j] * frame.axes[k][i]).sum());
+            }
+        }
+        if let Some(frame) = self.frames[b] {
+            for row in &mut block {
+                let columns = *row;
+                for k in 0..3 {
+                    row[k] = (0..3).map(|j| columns[j] * frame.axes[k][j]).sum();
+                }
+            }
+        }
+        block
+    }
+}
