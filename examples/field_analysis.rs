@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), SolverError> {
         .map(|name| if name == "plate" { steel } else { Material::AIR })
         .collect();
     let shape = Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred)?;
-    let coil = Coil { name: "coil".to_owned(), ampere_turns: c64::new(40e3, 0.0), shape };
+    let coil = Coil { name: "coil".to_owned(), ampere_turns: c64::new(40e3, 0.0), shape: shape.into() };
     let model = FieldModel::new(
         &mesh,
         FieldModelSetup {

@@ -80,7 +80,11 @@ fn model(mesh: &Mesh, corner: Corner) -> FieldModel {
         penalty: 1.0,
         materials: vec![Material::AIR],
         impedance_surfaces: Vec::new(),
-        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::from(AMPERE_TURNS), shape }],
+        coils: vec![Coil {
+            name: "coil".to_owned(),
+            ampere_turns: c64::from(AMPERE_TURNS),
+            shape: shape.into(),
+        }],
         boundaries: boundaries.map(|(name, kind)| (name.to_owned(), kind)).collect(),
         ..FieldModelSetup::default()
     };

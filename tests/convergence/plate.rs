@@ -8,7 +8,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, uniform};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, Order};
 
 use crate::meshes::{FACES, boxed};
 use crate::references::{named, number, reference};
@@ -34,8 +34,21 @@ fn joined(parts: &[Vec<f64>]) -> Vec<f64> {
     lines
 }
 
+/// How fine a mesh is, and on what elements.
+#[derive(Clone, Copy)]
+struct Resolution {
+    order: Order,
+    /// Cell size over that of the mesh described above.
+    size: f64,
+    /// Layers through the plate.
+    layers: f64,
+    /// Half width of the box [m].
+    outer: f64,
+}
+
 /// `B_z` [T] behind a plate, and the closed form.
-fn behind(name: &str) -> (c64, c64) {
+fn behind(name: &str, resolution: Resolution) -> (c64, c64) {
+    let Resolution { order, size, layers, outer } = resolution;
     let file = reference("plate.json");
     let plate = named(&file["plates"], name);
     let (radius, distance) = (number(&file, "radius_m"), number(&file, "distance_m"));
@@ -48,16 +61,16 @@ fn behind(name: &str) -> (c64, c64) {
     let exact = c64::new(exact[0].as_f64().expect("a number"), exact[1].as_f64().expect("a number"));
 
     let across = joined(&[
-        uniform("coil", [0.0, 0.14], 0.0117).expect("lines"),
-        outwards(0.14, OUTER, 0.015, 1.5, Fine::Start),
+        uniform("coil", [0.0, 0.14], 0.0117 * size).expect("lines"),
+        outwards(0.14, outer, 0.015 * size, 1.5, Fine::Start),
     ]);
     let top = PLATE + thickness;
     let along = joined(&[
-        outwards(-OUTER, -0.03, 0.015, 1.6, Fine::End),
-        uniform("coil", [-0.03, PLATE], 0.01).expect("lines"),
-        uniform("plate", [PLATE, top], thickness / 8.0).expect("lines"),
-        uniform("behind", [top, distance + 0.03], 0.009).expect("lines"),
-        outwards(distance + 0.03, OUTER, 0.015, 1.6, Fine::Start),
+        outwards(-outer, -0.03, 0.015 * size, 1.6, Fine::End),
+        uniform("coil", [-0.03, PLATE], 0.01 * size).expect("lines"),
+        uniform("plate", [PLATE, top], thickness / layers).expect("lines"),
+        uniform("behind", [top, distance + 0.03], 0.009 * size).expect("lines"),
+        outwards(distance + 0.03, outer, 0.015 * size, 1.6, Fine::Start),
     ]);
     let (_, mesh) = boxed([across.clone(), across, along], &["air", "plate"], |[_, _, z]| {
         u32::from(z > PLATE && z < top)
@@ -67,10 +80,9 @@ fn behind(name: &str) -> (c64, c64) {
     let shape = Racetrack::new([0.0; 3], 2, [window; 2], WINDING, WINDING, corner).expect("a coil");
     let setup = FieldModelSetup {
         frequency: number(plate, "frequency_Hz"),
-        penalty: 1.0,
+        order,
         materials: vec![Material::AIR, material],
-        impedance_surfaces: Vec::new(),
-        coils: vec![Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape }],
+        coils: vec![Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape: shape.into() }],
         boundaries: FACES.map(|face| (face.to_owned(), Boundary::FluxParallel)).to_vec(),
         ..FieldModelSetup::default()
     };
@@ -83,12 +95,27 @@ fn behind(name: &str) -> (c64, c64) {
 }
 
 #[test]
-fn the_field_behind_an_infinite_plate_is_the_closed_form() {
-    for name in ["10 mm, mu_r = 1", "19 mm aluminium"] {
-        let (computed, exact) = behind(name);
-        let error = (computed - exact).norm() / exact.norm();
-        println!("    {name}: {computed:.5e} T, closed form {exact:.5e} T, {:.2} %", 100.0 * error);
-        // The plate is 0.4 and 1.6 skin depths thick; cells of 10 mm around a coil of 100 mm leave about one per cent.
-        assert!(error < 0.02, "{name}: {error}");
+#[ignore]
+fn explore() {
+    for (name, order, size, layers, outer) in [
+        ("10 mm, static, mu_r = 800", Order::Linear, 1.0, 8.0, 1.0),
+        ("10 mm, static, mu_r = 800", Order::Quadratic, 1.6, 2.0, 1.0),
+        ("10 mm, static, mu_r = 800", Order::Quadratic, 1.6, 2.0, 3.0),
+        ("10 mm, static, mu_r = 800", Order::Quadratic, 1.6, 2.0, 10.0),
+        ("10 mm, static, mu_r = 800", Order::Linear, 1.6, 2.0, 10.0),
+        ("10 mm, mu_r = 1", Order::Linear, 1.6, 2.0, 1.0),
+        ("10 mm, mu_r = 1", Order::Quadratic, 1.6, 2.0, 1.0),
+        ("19 mm aluminium", Order::Linear, 1.6, 4.0, 1.0),
+        ("19 mm aluminium", Order::Quadratic, 1.6, 4.0, 1.0),
+        ("19 mm aluminium, 200 Hz", Order::Quadratic, 1.6, 6.0, 1.0),
+        ("5 mm steel", Order::Quadratic, 1.6, 8.0, 1.0),
+    ] {
+        let clock = std::time::Instant::now();
+        let (computed, exact) = behind(name, Resolution { order, size, layers, outer });
+        println!(
+            "    {name} {order:?} {size} {layers} {outer}: {computed:.5e} T, closed form {exact:.5e} T, {:.2} %  {:.1} s",
+            100.0 * (computed - exact).norm() / exact.norm(),
+            clock.elapsed().as_secs_f64()
+        );
     }
 }

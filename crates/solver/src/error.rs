@@ -2,6 +2,8 @@
 
 use fluxmorph_geometry::MeshError;
 
+use crate::coil::{PlaneFault, RegionFault};
+
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -38,9 +40,7 @@ pub enum SolverError {
     },
     /// A coil's window or winding meets a face on which its source would be wrong.
     #[error(
-        "the coil `{coil}` or its window meets {surface} at ({:.3}, {:.3}, {:.3}) mm, where H is prescribed and not B: \
-         the source T of the coil has a tangential part there, which would act as a surface current; name the face in \
-         boundaries.flux_parallel, or move the coil away",
+        "the coil `{coil}` or its window meets {surface} at ({:.3}, {:.3}, {:.3}) mm: {reason}",
         place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
     )]
     SourceOnBoundary {
@@ -48,8 +48,18 @@ pub enum SolverError {
         coil: String,
         /// Which face.
         surface: String,
-        /// Centroid of the offending triangle [m].
+        /// Where [m].
         place: [f64; 3],
+        /// Why, and what to do.
+        reason: PlaneFault,
+    },
+    /// No current can be made in a coil's region.
+    #[error("the region of the coil `{coil}`: {fault}")]
+    CoilRegion {
+        /// Name of the coil.
+        coil: String,
+        /// Why, and what to do.
+        fault: RegionFault,
     },
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]

@@ -6,9 +6,9 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
-use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh};
 
-use crate::coil::{self, Coil};
+use crate::coil::{Coil, SourceTerms};
 use crate::element::lagrange::Lagrange;
 use crate::element::volume::NodalField;
 use crate::element::{Complex3, point};
@@ -17,12 +17,9 @@ use crate::space::Space;
 use crate::unknowns::Unknowns;
 
 /// All sources of a model, per element.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Sources {
-    /// `∫_e T λ_b dV` of all coils with their currents [A m²], ascending by element.
-    moments: Vec<(ElementId, [Complex3; 4])>,
-    /// `J` of coils that are regions of the mesh [A/m²], ascending by element.
-    currents: Vec<(ElementId, Complex3)>,
+    coils: SourceTerms,
     /// `ν B_r` [A/m] of every magnet's elements, ascending.
     magnets: Vec<(ElementId, Point)>,
 }
@@ -31,45 +28,25 @@ impl Sources {
     /// Integrates the coils over the mesh; `magnetisation` is `ν B_r` [A/m] by region.
     ///
     /// # Errors
-    /// [`SolverError::NoSource`] for a coil outside the mesh.
+    /// As [`SourceTerms::new`].
     pub(crate) fn new(mesh: &Mesh, coils: &[Coil], magnetisation: &[Point]) -> Result<Self, SolverError> {
-        let mut moments = Vec::new();
-        for coil in coils {
-            let of_coil = coil::moments(&coil.shape, mesh);
-            if of_coil.is_empty() {
-                return Err(SolverError::NoSource {
-                    cause: format!(
-                        "the coil `{}` lies outside the mesh; check its centre and the mesh unit",
-                        coil.name
-                    ),
-                });
-            }
-            moments
-                .extend(of_coil.into_iter().map(|(e, m)| (e, m.map(|m| m.map(|m| coil.ampere_turns * m)))));
-        }
         let topology = mesh.topology();
         let magnets = topology
             .elements()
-            .map(|e| (e, topology.region_of()[e.index()]))
-            .filter_map(|(e, RegionId(r))| Some((e, *magnetisation.get(r as usize)?)))
+            .filter_map(|e| Some((e, *magnetisation.get(topology.region_of()[e.index()].index())?)))
             .filter(|(_, source)| *source != [0.0; 3])
             .collect();
-        let moments = merged(moments, |sum, more| {
-            for (sum, more) in sum.iter_mut().flatten().zip(more.iter().flatten()) {
-                *sum += more;
-            }
-        });
-        Ok(Self { moments, currents: Vec::new(), magnets })
+        Ok(Self { coils: SourceTerms::new(mesh, coils)?, magnets })
     }
 
-    /// Elements that a coil meets, ascending in each list: these must not move.
+    /// Elements that a coil meets: these must not move.
     pub(crate) fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.moments.iter().map(|m| m.0).chain(self.currents.iter().map(|c| c.0))
+        self.coils.elements().into_iter()
     }
 
     /// Whether nothing is excited.
     pub(crate) fn is_empty(&self) -> bool {
-        self.moments.is_empty() && self.currents.is_empty() && self.magnets.is_empty()
+        self.coils.moments.is_empty() && self.coils.currents.is_empty() && self.magnets.is_empty()
     }
 
     /// The load [A m], added to `load`.
@@ -88,14 +65,14 @@ impl Sources {
                 add(e, &point::curl_load(Lagrange::<10, 4>::tet(), &tet(e), moments));
             }
         };
-        for (e, moments) in &self.moments {
+        for (e, moments) in &self.coils.moments {
             add_curl(*e, moments);
         }
         for (e, source) in &self.magnets {
             let share = 0.25 * tet(*e).volume;
             add_curl(*e, &[source.map(|t| c64::from(share * t)); 4]);
         }
-        for (e, current) in &self.currents {
+        for (e, current) in &self.coils.currents {
             if linear {
                 add(*e, &point::current_load(Lagrange::<4, 4>::tet(), &tet(*e), current));
             } else {
@@ -117,17 +94,4 @@ impl Sources {
             (e, point::magnet_shape_derivative(shape, &tet, source, &adjoint(e)))
         })
     }
-}
-
-/// Sorted by element, with the values of each element joined by `add`.
-fn merged<T>(mut all: Vec<(ElementId, T)>, add: impl Fn(&mut T, T)) -> Vec<(ElementId, T)> {
-    all.sort_by_key(|entry| entry.0);
-    let mut merged: Vec<(ElementId, T)> = Vec::with_capacity(all.len());
-    for (e, value) in all {
-        match merged.last_mut() {
-            Some((last, sum)) if *last == e => add(sum, value),
-            _ => merged.push((e, value)),
-        }
-    }
-    merged
 }

@@ -9,11 +9,11 @@ use std::sync::Arc;
 use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, ElementGroup, LocalMatrix, c64,
 };
-use fluxmorph_geometry::tet4::{self, Point, Tet4};
+use fluxmorph_geometry::tet4::{Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::boundary::Boundary;
-use crate::coil::{Coil, Racetrack};
+use crate::coil::{Coil, Condition, ConditionedSurface, planes};
 use crate::element::lagrange::Lagrange;
 use crate::element::quadratic::LagrangeTet;
 use crate::element::volume::{AphiTet, Coefficients};
@@ -25,11 +25,8 @@ use crate::load::Sources;
 use crate::material::Material;
 use crate::solution::FieldSolution;
 use crate::space::{Order, Space};
-use crate::surface::{Conductor, SurfaceMatrix, SurfaceTerm, Surfaces, sorted};
+use crate::surface::{Conductor, SurfaceMatrix, SurfaceTerm, Surfaces};
 use crate::unknowns::{PSI, Unknowns};
-
-/// Sine of the angle between a face's normal and a coil's axis up to which `T` counts as normal to the face: rounding.
-const NORMAL_TOLERANCE: f64 = 1e-6;
 
 /// Everything that defines a field problem beside the mesh.
 #[derive(Clone, Debug)]
@@ -426,54 +423,18 @@ fn lifted(
     (elements, triangles)
 }
 
-/// Refuses a coil whose `T` has a tangential part on a face that is not flux-parallel.
-///
-/// The load `∫T·curl w` holds the surface term `∮(T × n)·w`: it vanishes where the tangential `w` does (flux-parallel
-/// planes) or where `T` is normal to the face; elsewhere it would make the natural condition `n × (H − T) = 0`.
+/// Refuses coils that meet the outside of the mesh where their source would be wrong.
 fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let topology = mesh.topology();
-    let mut flux_parallel = std::collections::HashSet::new();
-    for (name, _) in setup.boundaries.iter().filter(|(_, b)| *b == Boundary::FluxParallel) {
-        flux_parallel.extend(topology.surface(name)?.iter().map(sorted));
+    let mut surfaces = Vec::new();
+    for (name, boundary) in &setup.boundaries {
+        let condition = match boundary {
+            Boundary::FluxParallel => Condition::FluxParallel,
+            Boundary::FluxNormal => Condition::FluxNormal,
+            Boundary::UniformField(_) => Condition::Prescribed,
+        };
+        surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
     }
-    let open = topology.facets().iter().filter(|f| f.outside.is_none());
-    for facet in open.filter(|f| !flux_parallel.contains(&sorted(&f.nodes))) {
-        let vertices = facet.nodes.map(|n| mesh.point(n));
-        let place = tet4::centroid(vertices);
-        let normal = tet4::area_vector(vertices);
-        let area = tet4::norm(normal);
-        for coil in &setup.coils {
-            let across = (1.0 - (normal[coil.shape.axis()] / area).powi(2)).max(0.0).sqrt();
-            if across > NORMAL_TOLERANCE && meets(&coil.shape, vertices) {
-                let surface = setup
-                    .boundaries
-                    .iter()
-                    .find(|(name, _)| {
-                        topology
-                            .surface(name)
-                            .is_ok_and(|s| s.iter().any(|t| sorted(t) == sorted(&facet.nodes)))
-                    })
-                    .map_or_else(
-                        || "an outer face without a condition, or an impedance surface,".to_owned(),
-                        |(name, _)| format!("the flux-normal surface `{name}`"),
-                    );
-                return Err(SolverError::SourceOnBoundary { coil: coil.name.clone(), surface, place });
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Whether a coil's `T` is felt on a triangle, looked at on a fine grid of its points.
-fn meets(coil: &Racetrack, vertices: [Point; 3]) -> bool {
-    const STEPS: usize = 12;
-    (0..=STEPS).flat_map(|i| (0..=STEPS - i).map(move |j| (i, j))).any(|(i, j)| {
-        let (s, t) = (i as f64 / STEPS as f64, j as f64 / STEPS as f64);
-        let x: Point = std::array::from_fn(|d| {
-            vertices[0][d] + s * (vertices[1][d] - vertices[0][d]) + t * (vertices[2][d] - vertices[0][d])
-        });
-        coil.potential(x) != 0.0
-    })
+    planes::check(mesh, &setup.coils, &surfaces)
 }
 
 /// ψ with itself and with every component of `A`.

@@ -110,5 +110,5 @@ fn coil(coil: &config::Coil) -> Result<coil::Coil, Error> {
         config::Axis::Z => 2,
     };
     let shape = Racetrack::new(coil.center, axis, coil.half_window, coil.width, coil.height, corner)?;
-    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
+    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape: shape.into() })
 }

@@ -1,13 +1,31 @@
-//! Coils as `J = curl T`: the source of the A–ψ system is `∫T·curl w`.
+//! Coils: the sources of the A–ψ system, `∫T·curl w` for an analytic coil, `∫J·w` for a coil of the mesh.
 //!
-//! Writing `T` and not `J` on the right makes the discrete current exactly free of divergence, whether or not the mesh
-//! follows the coil. Lives here: the coil's shape, its `T` ([`racetrack`]) and the exact integral of `T` over a
-//! tetrahedron that the coil's edges cut ([`cut`]). `T` is fixed in space: elements that meet it must not move.
+//! Writing `J = curl T` and `T` on the right makes the discrete current exactly free of divergence, whether or not the
+//! mesh follows the coil. Lives here: the coil's place ([`frame`]), its shape and `T` ([`racetrack`]), the integral of
+//! `T` over a tetrahedron that the coil's edges cut ([`moment`], [`cut`]), the current of a coil that is a region of the
+//! mesh ([`region`], on the helpers [`patch`], [`potential`] and [`divergence`]), all of it summed over coils
+//! ([`terms`]), and where a coil may meet the outside of the mesh ([`planes`]). `T` and `J` are fixed in space: elements
+//! that meet them must not move.
 
 pub mod cut;
+pub mod divergence;
+pub mod fault;
+pub mod frame;
+pub mod moment;
+mod patch;
+pub mod planes;
+mod potential;
 pub mod racetrack;
+pub mod region;
+pub mod terms;
 
+pub use divergence::CurrentReport;
+pub use fault::{PlaneFault, RegionFault};
+pub use frame::Frame;
+pub use planes::{Condition, ConditionedSurface};
 pub use racetrack::{Corner, Racetrack};
+pub use region::{Path, RegionCurrent, Terminal};
+pub use terms::SourceTerms;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
@@ -22,17 +40,44 @@ pub struct Coil {
     /// Ampere-turns, peak phasor [A].
     pub ampere_turns: c64,
     /// Where the current flows.
-    pub shape: Racetrack,
+    pub shape: CoilShape,
 }
 
-/// `∫_e T λ_b dV` of the elements that meet a coil's `T` [A m²] for one ampere-turn, ascending by element.
+/// Where a coil's current flows.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CoilShape {
+    /// An analytic coil; the mesh need not follow it.
+    Racetrack(Racetrack),
+    /// A region of the mesh.
+    Region(RegionCurrent),
+}
+
+impl From<Racetrack> for CoilShape {
+    fn from(shape: Racetrack) -> Self {
+        Self::Racetrack(shape)
+    }
+}
+
+impl From<RegionCurrent> for CoilShape {
+    fn from(current: RegionCurrent) -> Self {
+        Self::Region(current)
+    }
+}
+
+/// `∫_e T λ_b dV` of the elements that meet a coil's `T` for the four barycentric coordinates [A m²], for one
+/// ampere-turn, ascending by element.
 pub fn moments(coil: &Racetrack, mesh: &Mesh) -> Vec<(ElementId, [Point; 4])> {
     let elements: Vec<ElementId> = mesh.topology().elements().collect();
     elements
         .into_par_iter()
         .filter_map(|e| {
             let moment = coil.moment(mesh.vertices(e));
-            (moment != [0.0; 3]).then_some((e, [moment.map(|m| 0.25 * m); 4]))
+            (moment != [[0.0; 3]; 4]).then_some((e, moment))
         })
         .collect()
+}
+
+/// `∫_e T dV` of the four weighted integrals of an element [A m²]: all that a linear element needs.
+pub fn total(moment: [Point; 4]) -> Point {
+    std::array::from_fn(|d| moment.iter().map(|m| m[d]).sum())
 }

@@ -1,13 +1,15 @@
-//! The flat racetrack (rectangular) coil with mitred or round corners.
+//! The flat racetrack coil with mitred or round corners: its `T` and its current density, at a point.
 //!
 //! About the axis direction `e`, `T = T_e e` inside the coil's height: `J0 W` inside the window, falling linearly to
 //! zero across the winding of width `W`, with `J0 = N I/(W · height)`. So `J = curl T` has the constant magnitude `J0`
 //! and runs anticlockwise about `e` for positive ampere-turns. With `ρ` the distance from the window's rectangle
 //! (mitred: in the maximum norm of the two directions, round: Euclidean from the rounded rectangle), `T = J0 (W − ρ)`.
+//! A rectangular coil is one with mitred corners, a circular one has corners as round as its window. The integral of
+//! `T` over an element is in [`super::moment`].
 
-use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_geometry::tet4::Point;
 
-use super::cut::{Plane, for_each_piece};
+use super::frame::Frame;
 use crate::error::SolverError;
 
 /// How the straight sides of the winding meet.
@@ -25,16 +27,17 @@ pub enum Corner {
 /// A flat racetrack coil.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Racetrack {
-    centre: Point,
-    axis: usize,
-    half_window: [f64; 2],
-    width: f64,
-    height: f64,
-    corner: Corner,
+    pub(super) frame: Frame,
+    /// Half sizes of the window along the frame's two directions [m].
+    pub(super) half_window: [f64; 2],
+    pub(super) width: f64,
+    pub(super) height: f64,
+    pub(super) corner: Corner,
 }
 
-/// Subdivisions of the pieces in round corners, where `T` is smooth but not linear.
-const CORNER_LEVELS: usize = 2;
+/// Share of the winding's width and height that counts as its skin: a face of the mesh that lies on the winding's
+/// surface does not cut it, whatever the rounding of its nodes.
+const SKIN: f64 = 1e-6;
 
 impl Racetrack {
     /// A coil about the coordinate axis `axis` (0, 1, 2) through `centre` [m].
@@ -42,7 +45,7 @@ impl Racetrack {
     /// `half_window` [m]: half sizes of the window in the two directions that follow the axis cyclically (x, y for z).
     ///
     /// # Errors
-    /// [`SolverError::Parameter`] for a size that is not positive or an inner radius larger than the window.
+    /// As [`Racetrack::in_frame`].
     pub fn new(
         centre: Point,
         axis: usize,
@@ -51,50 +54,52 @@ impl Racetrack {
         height: f64,
         corner: Corner,
     ) -> Result<Self, SolverError> {
-        let refuse = |what: &str, value: f64, expected: &str| SolverError::Parameter {
-            what: what.to_owned(),
-            value: format!("{value} m"),
-            expected: expected.to_owned(),
-        };
-        for (what, value) in [
+        Self::in_frame(Frame::coordinate(centre, axis)?, half_window, width, height, corner)
+    }
+
+    /// A coil in a frame; `half_window` [m] along its two directions.
+    ///
+    /// # Errors
+    /// [`SolverError::Parameter`] for a size that is not positive or an inner radius larger than the window.
+    pub fn in_frame(
+        frame: Frame,
+        half_window: [f64; 2],
+        width: f64,
+        height: f64,
+        corner: Corner,
+    ) -> Result<Self, SolverError> {
+        check_sizes(&[
             ("half_window", half_window[0]),
             ("half_window", half_window[1]),
             ("width", width),
             ("height", height),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(refuse(what, value, "a coil needs a positive size"));
-            }
-        }
+        ])?;
         if let Corner::Round { inner_radius } = corner
             && !(inner_radius > 0.0 && inner_radius <= half_window[0].min(half_window[1]))
         {
-            return Err(refuse(
-                "inner_radius",
-                inner_radius,
-                "it must be positive and at most the smaller half of the window; use corner = \"mitred\" for sharp ones",
-            ));
-        }
-        if axis > 2 {
             return Err(SolverError::Parameter {
-                what: "axis".to_owned(),
-                value: axis.to_string(),
-                expected: "0, 1 or 2 for x, y or z".to_owned(),
+                what: "inner_radius".to_owned(),
+                value: format!("{inner_radius} m"),
+                expected:
+                    "it must be positive and at most the smaller half of the window; use corner = \"mitred\" \
+                           for sharp ones"
+                        .to_owned(),
             });
         }
-        Ok(Self { centre, axis, half_window, width, height, corner })
+        Ok(Self { frame, half_window, width, height, corner })
     }
 
-    /// Coordinates relative to the coil: the two directions of the window, then along the axis.
-    fn local(&self, x: Point) -> Point {
-        std::array::from_fn(|i| {
-            let d = (self.axis + 1 + i) % 3;
-            x[d] - self.centre[d]
-        })
+    /// A circular coil of the inner radius `radius` [m].
+    ///
+    /// # Errors
+    /// [`SolverError::Parameter`] for a size that is not positive.
+    pub fn circular(frame: Frame, radius: f64, width: f64, height: f64) -> Result<Self, SolverError> {
+        check_sizes(&[("radius", radius)])?;
+        Self::in_frame(frame, [radius; 2], width, height, Corner::Round { inner_radius: radius })
     }
 
     /// Distance outwards from the window's contour (negative inside), in the norm of the corner.
-    fn distance(&self, local: Point) -> f64 {
+    pub(super) fn distance(&self, local: Point) -> f64 {
         let [a, b] = self.half_window;
         let (x, y) = (local[0].abs(), local[1].abs());
         match self.corner {
@@ -106,191 +111,97 @@ impl Racetrack {
         }
     }
 
-    /// The coordinate axis that `T` points along.
-    pub fn axis(&self) -> usize {
-        self.axis
+    /// `∇ρ` in the winding, in local coordinates; the mitred corner's diagonal counts to its first side.
+    fn outwards(&self, local: Point) -> [f64; 2] {
+        let [a, b] = self.half_window;
+        let sign = [local[0].signum(), local[1].signum()];
+        let (x, y) = (local[0].abs(), local[1].abs());
+        let [p, q] = match self.corner {
+            Corner::Mitred if x - a >= y - b => [1.0, 0.0],
+            Corner::Mitred => [0.0, 1.0],
+            Corner::Round { inner_radius: r } => {
+                let (dx, dy) = ((x - (a - r)).max(0.0), (y - (b - r)).max(0.0));
+                let length = dx.hypot(dy);
+                // Inside the window's core, where ρ < 0 and nothing flows.
+                if length == 0.0 { [0.0, 0.0] } else { [dx / length, dy / length] }
+            }
+        };
+        [sign[0] * p, sign[1] * q]
+    }
+
+    /// Unit vector that `T` points along.
+    pub fn axis(&self) -> Point {
+        self.frame.axis()
+    }
+
+    /// Where the coil sits and how it is turned.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
     }
 
     /// `T_e` [A/m] at a point for one ampere-turn.
     pub fn potential(&self, x: Point) -> f64 {
-        let local = self.local(x);
+        let local = self.frame.local(x);
         if 2.0 * local[2].abs() > self.height {
             return 0.0;
         }
         (self.width - self.distance(local)).clamp(0.0, self.width) / (self.width * self.height)
     }
 
-    /// Planes between which `T` is linear (apart from round corners), in local coordinates.
-    fn kinks(&self) -> Vec<Plane> {
-        let [a, b] = self.half_window;
-        let w = self.width;
-        let axis_planes = |d: usize, distances: &[f64]| -> Vec<Plane> {
-            let mut normal = [0.0; 3];
-            normal[d] = 1.0;
-            distances
-                .iter()
-                .flat_map(|&offset| [Plane { normal, offset }, Plane { normal, offset: -offset }])
-                .collect()
-        };
-        let mut planes = axis_planes(2, &[0.5 * self.height]);
-        planes.extend(axis_planes(0, &[a + w, a]));
-        planes.extend(axis_planes(1, &[b + w, b]));
-        match self.corner {
-            Corner::Mitred => {
-                for normal in [[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]] {
-                    planes.extend([a - b, b - a].map(|offset| Plane { normal, offset }));
-                }
-            }
-            Corner::Round { inner_radius: r } => {
-                planes.extend(axis_planes(0, &[a - r]));
-                planes.extend(axis_planes(1, &[b - r]));
-            }
-        }
-        planes
+    /// Greatest `T_e` [A/m] for one ampere-turn: that of the window.
+    pub fn plateau(&self) -> f64 {
+        1.0 / self.height
     }
 
-    /// Whether `T` is curved somewhere on a piece that no kink crosses.
-    fn in_round_corner(&self, local: Point) -> bool {
-        match self.corner {
-            Corner::Mitred => false,
-            Corner::Round { inner_radius: r } => {
-                local[0].abs() > self.half_window[0] - r && local[1].abs() > self.half_window[1] - r
-            }
-        }
-    }
-
-    /// `∫T dV` over a tetrahedron [A m²] for one ampere-turn: exact where `T` is piecewise linear, by subdivision in
-    /// round corners.
-    pub fn moment(&self, vertices: [Point; 4]) -> Point {
-        let local = vertices.map(|x| self.local(x));
-        let extent = [self.half_window[0] + self.width, self.half_window[1] + self.width, 0.5 * self.height];
-        let misses =
-            |d: usize| local.iter().all(|x| x[d] >= extent[d]) || local.iter().all(|x| x[d] <= -extent[d]);
-        if (0..3).any(misses) {
+    /// `J = curl T = ∇T_e × e` [A/m²] at a point for one ampere-turn; zero outside the winding and on its surface.
+    pub fn current_density(&self, x: Point) -> Point {
+        let local = self.frame.local(x);
+        let rho = self.distance(local);
+        let skin = SKIN * self.width;
+        let inside =
+            rho > skin && rho < self.width - skin && 2.0 * local[2].abs() < (1.0 - SKIN) * self.height;
+        if !inside {
             return [0.0; 3];
         }
-        let tolerance = 1e-9 * self.width.min(self.height);
-        let scale = 1.0 / (self.width * self.height);
-        let linear = |piece: [Point; 4]| {
-            let c = centroid(piece);
-            if 2.0 * c[2].abs() > self.height {
-                return 0.0;
-            }
-            volume(piece).abs() * (self.width - self.distance(c)).clamp(0.0, self.width) * scale
-        };
-        let mut integral = 0.0;
-        for_each_piece(local, &self.kinks(), tolerance, &mut |piece| {
-            integral += if self.in_round_corner(centroid(piece)) {
-                refined(piece, CORNER_LEVELS, &|p| self.smooth(p) * scale)
-            } else {
-                linear(piece)
-            };
-        });
-        let mut moment = [0.0; 3];
-        moment[self.axis] = integral;
-        moment
+        let [p, q] = self.outwards(local);
+        let magnitude = 1.0 / (self.width * self.height);
+        self.frame.vector([-q * magnitude, p * magnitude, 0.0])
     }
 
-    /// `T` times the winding's cross-section in a round corner at the points of a four-point rule, exact for
-    /// quadratics.
-    fn smooth(&self, piece: [Point; 4]) -> f64 {
-        const NEAR: f64 = 0.585_410_196_624_968_5;
-        const FAR: f64 = 0.138_196_601_125_010_5;
-        let value = |near: usize| {
-            let x: Point = std::array::from_fn(|d| {
-                (0..4).map(|a| if a == near { NEAR } else { FAR } * piece[a][d]).sum()
-            });
-            if 2.0 * x[2].abs() > self.height {
-                return 0.0;
-            }
-            (self.width - self.distance(x)).clamp(0.0, self.width)
-        };
-        0.25 * volume(piece).abs() * (0..4).map(value).sum::<f64>()
+    /// Half sizes of the box that holds the coil, along the frame's directions [m].
+    pub(super) fn extent(&self) -> Point {
+        [self.half_window[0] + self.width, self.half_window[1] + self.width, 0.5 * self.height]
+    }
+
+    /// The smaller of width and height [m]: the size of the winding's detail.
+    pub(super) fn detail(&self) -> f64 {
+        self.width.min(self.height)
     }
 }
 
-/// A quadrature refined by splitting the tet into eight, `levels` times.
-fn refined(tet: [Point; 4], levels: usize, rule: &impl Fn([Point; 4]) -> f64) -> f64 {
-    if levels == 0 {
-        return rule(tet);
+fn check_sizes(sizes: &[(&str, f64)]) -> Result<(), SolverError> {
+    match sizes.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+        Some((what, value)) => Err(SolverError::Parameter {
+            what: (*what).to_owned(),
+            value: format!("{value} m"),
+            expected: "a coil needs a positive size".to_owned(),
+        }),
+        None => Ok(()),
     }
-    let mid = |a: usize, b: usize| -> Point { std::array::from_fn(|d| 0.5 * (tet[a][d] + tet[b][d])) };
-    let (m01, m02, m03) = (mid(0, 1), mid(0, 2), mid(0, 3));
-    let (m12, m13, m23) = (mid(1, 2), mid(1, 3), mid(2, 3));
-    let [x0, x1, x2, x3] = tet;
-    [
-        [x0, m01, m02, m03],
-        [m01, x1, m12, m13],
-        [m02, m12, x2, m23],
-        [m03, m13, m23, x3],
-        [m01, m02, m03, m13],
-        [m01, m02, m13, m12],
-        [m02, m03, m13, m23],
-        [m02, m12, m23, m13],
-    ]
-    .into_iter()
-    .map(|child| refined(child, levels - 1, rule))
-    .sum()
 }
 
 #[cfg(test)]
 mod tests {
+    use fluxmorph_geometry::tet4::{cross, dot, norm, sub};
+
     use super::*;
 
     fn paper_coil(corner: Corner) -> Racetrack {
         Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, corner).unwrap()
     }
 
-    /// A box around the coil, cut into tets that ignore the coil.
-    fn integral_over_box(coil: &Racetrack, n: usize) -> f64 {
-        let corner = |i: [usize; 3]| -> Point {
-            let size = [0.2, 0.4, 0.1];
-            let origin = [-0.1, -0.2, 0.01];
-            std::array::from_fn(|d| origin[d] + size[d] * i[d] as f64 / n as f64)
-        };
-        let mut sum = 0.0;
-        for cell in 0..n * n * n {
-            let base = [cell / n / n, cell / n % n, cell % n];
-            for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
-                let mut at = base;
-                let mut tet = [corner(at); 4];
-                for (step, d) in order.into_iter().enumerate() {
-                    at[d] += 1;
-                    tet[step + 1] = corner(at);
-                }
-                if volume(tet) < 0.0 {
-                    tet.swap(0, 1);
-                }
-                sum += coil.moment(tet)[2];
-            }
-        }
-        sum
-    }
-
-    #[test]
-    fn the_mitred_integral_is_exact_on_any_mesh() {
-        // ∫T dV per ampere-turn = (1/W) ∫ area of the contour at distance s, s from 0 to W.
-        let coil = paper_coil(Corner::Mitred);
-        let (a, b, w) = (0.06, 0.16, 0.02);
-        let exact = 4.0 * (a * b + (a + b) * w / 2.0 + w * w / 3.0);
-        for n in [3, 4] {
-            let sum = integral_over_box(&coil, n);
-            assert!((sum / exact - 1.0).abs() < 1e-12, "{sum} {exact}");
-        }
-    }
-
-    #[test]
-    fn the_round_integral_is_accurate_on_a_coarse_mesh() {
-        let r = 0.022;
-        let coil = paper_coil(Corner::Round { inner_radius: r });
-        let (a, b, w) = (0.06, 0.16, 0.02);
-        let pi = std::f64::consts::PI;
-        // Contour at distance s: 4ab − (4 − π) r² + (4(a+b) − (8 − 2π) r) s + π s².
-        let exact = 4.0 * a * b - (4.0 - pi) * r * r
-            + (4.0 * (a + b) - (8.0 - 2.0 * pi) * r) * w / 2.0
-            + pi * w * w / 3.0;
-        let sum = integral_over_box(&coil, 5);
-        assert!((sum / exact - 1.0).abs() < 1e-4, "{sum} {exact}");
+    fn tilted() -> Frame {
+        Frame::new([0.01, 0.02, -0.03], [1.0, 2.0, -0.5], Some([0.0, 1.0, 1.0])).unwrap()
     }
 
     #[test]
@@ -306,10 +217,79 @@ mod tests {
     }
 
     #[test]
+    fn the_current_density_is_the_curl_of_the_potential() {
+        let round = Corner::Round { inner_radius: 0.02 };
+        let coils = [
+            Racetrack::in_frame(tilted(), [0.06, 0.16], 0.02, 0.04, Corner::Mitred).unwrap(),
+            Racetrack::in_frame(tilted(), [0.06, 0.16], 0.02, 0.04, round).unwrap(),
+            Racetrack::circular(tilted(), 0.05, 0.02, 0.04).unwrap(),
+        ];
+        let h = 1e-6;
+        for coil in coils {
+            let mut met = 0;
+            for i in 0..1000 {
+                let s = |k: f64| (f64::from(i) * k).sin();
+                let local = [0.09 * s(1.7), 0.19 * s(2.3), 0.019 * s(3.1)];
+                let x: Point = std::array::from_fn(|d| coil.frame.centre()[d] + coil.frame.vector(local)[d]);
+                // Away from kinks of T, where the difference quotient means nothing.
+                let rho = coil.distance(local);
+                let kink = (local[0].abs() - local[1].abs() + 0.1).abs() < 1e-3;
+                if [rho, rho - 0.02].iter().any(|d| d.abs() < 1e-4) || kink {
+                    continue;
+                }
+                let gradient: Point = std::array::from_fn(|d| {
+                    let at = |s: f64| {
+                        let mut y = x;
+                        y[d] += s;
+                        coil.potential(y)
+                    };
+                    (at(h) - at(-h)) / (2.0 * h)
+                });
+                let curl = cross(gradient, coil.axis());
+                let current = coil.current_density(x);
+                let scale = 1.0 / (0.02 * 0.04);
+                assert!(norm(sub(curl, current)) < 1e-4 * scale, "{local:?}: {curl:?} {current:?}");
+                met += usize::from(norm(current) > 0.0);
+            }
+            assert!(met > 20, "{met} points in the winding");
+        }
+    }
+
+    #[test]
+    fn the_current_through_a_half_plane_is_the_line_integral_of_the_potential() {
+        // Stokes: ∫J·n dS over a cross-section of the winding = ∮T·dl around it = T_window × height = NI.
+        let n = 200;
+        for (coil, angle) in [
+            (Racetrack::in_frame(tilted(), [0.03, 0.05], 0.02, 0.04, Corner::Mitred).unwrap(), 0.0),
+            (Racetrack::in_frame(tilted(), [0.03, 0.05], 0.02, 0.04, Corner::Mitred).unwrap(), 0.4),
+            (Racetrack::circular(tilted(), 0.04, 0.02, 0.04).unwrap(), 1.1),
+        ] {
+            let (s, c) = f64::sin_cos(angle);
+            let normal = coil.frame.vector([-s, c, 0.0]);
+            let (reach, height) = (0.1, 0.05);
+            let mut current = 0.0;
+            for i in 0..n {
+                for k in 0..n {
+                    let r = reach * (f64::from(i) + 0.5) / f64::from(n);
+                    let z = height * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
+                    let offset = coil.frame.vector([r * c, r * s, z]);
+                    let x = std::array::from_fn(|d| coil.frame.centre()[d] + offset[d]);
+                    current += dot(coil.current_density(x), normal) * reach * height / f64::from(n * n);
+                }
+            }
+            // One cell more or less at each end of the winding: 2 % of it.
+            assert!((current - 1.0).abs() < 0.03, "{current}");
+            assert!((coil.potential(coil.frame.centre()) * 0.04 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
     fn a_coil_of_zero_size_is_refused() {
         let err = Racetrack::new([0.0; 3], 2, [0.06, 0.16], 0.0, 0.04, Corner::Mitred).unwrap_err();
         assert!(err.to_string().starts_with("width = 0 m"), "{err}");
         let corner = Corner::Round { inner_radius: 0.07 };
         assert!(Racetrack::new([0.0; 3], 2, [0.06, 0.16], 0.02, 0.04, corner).is_err());
+        let err = Racetrack::circular(tilted(), -0.1, 0.02, 0.04).unwrap_err();
+        assert!(err.to_string().starts_with("radius = -0.1 m"), "{err}");
     }
 }

@@ -1,0 +1,118 @@
+//! What can be wrong with a coil's path or with where it meets the outside of the mesh.
+//!
+//! These say why and what to do; which coil and which surface is said by the variant of
+//! [`SolverError`](crate::SolverError) that holds them.
+
+use fluxmorph_geometry::tet4::Point;
+
+/// Why a coil may not meet a surface as it does.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlaneFault {
+    /// Current crosses a flux-parallel surface at a slant.
+    #[error(
+        "the current runs there at {angle:.1}° to the surface's normal, but it must cross a flux-parallel surface at \
+         right angles, for the mirrored coil to carry it on; let the surface cut straight sides squarely, or move the \
+         coil away"
+    )]
+    Slanting {
+        /// Between current and normal, 0 to 90 [degrees].
+        angle: f64,
+    },
+    /// Current crosses a surface with H × n = 0.
+    #[error(
+        "the current crosses it at {angle:.1}° to its normal, but no current may cross a surface at which H is normal: \
+         the mirrored coil would carry it back; name the surface in boundaries.flux_parallel, or move the coil away"
+    )]
+    Crossing {
+        /// Between current and normal, 0 to 90 [degrees].
+        angle: f64,
+    },
+    /// `T` has a tangential part on a surface on which H is prescribed.
+    #[error(
+        "H is prescribed there and not B, and the source T of the coil or of its window has a tangential part, which \
+         would act as a surface current; name the face in boundaries.flux_parallel, or move the coil away"
+    )]
+    TangentialSource,
+    /// Current on a surface on which A is prescribed.
+    #[error(
+        "the field of a uniform_field surface is given and holds no coil's current; move the coil inside, away from the \
+         surface"
+    )]
+    OnPrescribedField,
+    /// A terminal that no mirrored coil goes on from.
+    #[error(
+        "this terminal does not lie on a flux-parallel outer surface, so the current would end there; name the surface \
+         in boundaries.flux_parallel, or let the coil close on itself with center and axis instead of terminals"
+    )]
+    EndsAtTerminal,
+}
+
+/// Why no current can be made in a region of the mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RegionFault {
+    /// There is nothing to flow in.
+    #[error("it has no elements; check the name of the region")]
+    NoElements,
+    /// A terminal that is somewhere else.
+    #[error(
+        "no triangle of the terminal `{terminal}` is a face of it; name a surface on which the winding is cut"
+    )]
+    TerminalElsewhere {
+        /// Name of the surface.
+        terminal: String,
+    },
+    /// Both terminals in one place.
+    #[error(
+        "its terminals `{from}` and `{to}` touch at ({:.3}, {:.3}, {:.3}) mm: the current would have no way to go; \
+         name two surfaces that are apart",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    TerminalsTouch {
+        /// Name of the surface the current comes from.
+        from: String,
+        /// Name of the surface it goes to.
+        to: String,
+        /// The node they share [m].
+        place: Point,
+    },
+    /// A part of the region that carries nothing.
+    #[error(
+        "it has {parts} separate parts, and the terminal `{terminal}` does not touch the one at \
+         ({:.3}, {:.3}, {:.3}) mm; both terminals must touch every part, or make that part a coil of its own",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    PartWithoutTerminal {
+        /// Separate parts.
+        parts: usize,
+        /// Name of the terminal that is missing.
+        terminal: String,
+        /// A node of the part [m].
+        place: Point,
+    },
+    /// More than one ring.
+    #[error(
+        "it has {parts} separate parts, but a closed coil is one ring; give each part its own region and coil"
+    )]
+    SeveralRings {
+        /// Separate parts.
+        parts: usize,
+    },
+    /// The line lies in the conductor.
+    #[error(
+        "the line given by center and axis passes through it at ({:.3}, {:.3}, {:.3}) mm; give any line through the \
+         hole of the ring",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    AxisInside {
+        /// A place of the conductor next to the line [m].
+        place: Point,
+    },
+    /// Nothing goes round.
+    #[error(
+        "no closed way in it goes round the line given by center and axis; give a line through the hole of the ring, \
+         or terminals = [..] where the ring is cut by symmetry planes"
+    )]
+    NoRing,
+}

@@ -1,0 +1,177 @@
+//! The elements of a coil region on their own: local node numbers, faces and separate parts.
+
+use std::collections::HashMap;
+
+use fluxmorph_geometry::tet4::{FACES, Point, Tet4, area_vector, dot, norm};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+
+/// A face of the region's elements.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PatchFace {
+    /// Nodes of the mesh, ascending.
+    pub(super) key: [NodeId; 3],
+    /// Area vector out of `inside` [m²].
+    pub(super) area: Point,
+    /// Position of the element the area vector points out of.
+    pub(super) inside: usize,
+    /// Position of the element behind it; `None` on the region's wall.
+    pub(super) outside: Option<usize>,
+}
+
+/// A set of elements with what a nodal problem on it needs.
+#[derive(Debug)]
+pub(super) struct Patch {
+    /// The elements, ascending.
+    pub(super) elements: Vec<ElementId>,
+    /// Geometry of each element.
+    pub(super) tets: Vec<Tet4>,
+    /// Local nodes of each element.
+    pub(super) connectivity: Vec<[NodeId; 4]>,
+    /// Position of every local node [m].
+    pub(super) points: Vec<Point>,
+    /// All faces, by their nodes.
+    pub(super) faces: Vec<PatchFace>,
+    /// The part of every local node, numbered from 0 in the order of their first nodes.
+    pub(super) part_of: Vec<usize>,
+    /// Separate parts.
+    pub(super) parts: usize,
+    local_of: HashMap<NodeId, NodeId>,
+}
+
+impl Patch {
+    pub(super) fn new(mesh: &Mesh, elements: &[ElementId]) -> Self {
+        let topology = mesh.topology();
+        let mut elements = elements.to_vec();
+        elements.sort_unstable();
+        elements.dedup();
+        let mut nodes: Vec<NodeId> = elements.iter().flat_map(|&e| topology.tet(e)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let local_of: HashMap<NodeId, NodeId> =
+            nodes.iter().enumerate().map(|(i, &n)| (n, NodeId::new(i))).collect();
+        let connectivity: Vec<[NodeId; 4]> =
+            elements.iter().map(|&e| topology.tet(e).map(|n| local_of[&n])).collect();
+        let (part_of, parts) = parts(nodes.len(), &connectivity);
+        Self {
+            tets: elements.iter().map(|&e| Tet4::new(mesh.vertices(e))).collect(),
+            faces: faces(mesh, &elements),
+            points: nodes.iter().map(|&n| mesh.point(n)).collect(),
+            elements,
+            connectivity,
+            part_of,
+            parts,
+            local_of,
+        }
+    }
+
+    /// The local node of a node of the mesh.
+    pub(super) fn local(&self, node: NodeId) -> Option<NodeId> {
+        self.local_of.get(&node).copied()
+    }
+
+    /// The part of an element, by position.
+    pub(super) fn part_of_element(&self, e: usize) -> usize {
+        self.part_of[self.connectivity[e][0].index()]
+    }
+
+    /// The four vertices of an element, by position [m].
+    pub(super) fn vertices(&self, e: usize) -> [Point; 4] {
+        self.connectivity[e].map(|n| self.points[n.index()])
+    }
+
+    /// The gradient of a nodal field on every element.
+    pub(super) fn gradient(&self, nodal: &[f64]) -> Vec<Point> {
+        self.connectivity
+            .iter()
+            .zip(&self.tets)
+            .map(|(nodes, tet)| {
+                std::array::from_fn(|d| {
+                    nodes.iter().zip(&tet.gradients).map(|(n, g)| nodal[n.index()] * g[d]).sum()
+                })
+            })
+            .collect()
+    }
+
+    /// `∫u·v dV` of two fields constant on each element.
+    pub(super) fn inner(&self, u: &[Point], v: &[Point]) -> f64 {
+        self.tets.iter().zip(u).zip(v).map(|((tet, u), v)| tet.volume * dot(*u, *v)).sum()
+    }
+
+    /// `(∫|u|² dV)^½`.
+    pub(super) fn norm(&self, u: &[Point]) -> f64 {
+        self.inner(u, u).sqrt()
+    }
+
+    /// `(∫|u|² dV / V)^½`.
+    pub(super) fn rms(&self, u: &[Point]) -> f64 {
+        self.norm(u) / self.tets.iter().map(|t| t.volume).sum::<f64>().sqrt()
+    }
+}
+
+/// Faces of elements, ascending by nodes.
+fn faces(mesh: &Mesh, elements: &[ElementId]) -> Vec<PatchFace> {
+    let mut all: Vec<PatchFace> = elements
+        .iter()
+        .enumerate()
+        .flat_map(|(position, &e)| {
+            let tet = mesh.topology().tet(e);
+            FACES.map(|face| {
+                let nodes = face.map(|v| tet[v]);
+                PatchFace {
+                    key: sorted(&nodes),
+                    area: area_vector(nodes.map(|n| mesh.point(n))),
+                    inside: position,
+                    outside: None,
+                }
+            })
+        })
+        .collect();
+    all.sort_by_key(|f| (f.key, f.inside));
+    all.chunk_by(|a, b| a.key == b.key)
+        .map(|same| PatchFace { outside: same.get(1).map(|f| f.inside), ..same[0] })
+        .collect()
+}
+
+/// The nodes of a triangle, ascending: the same for both orientations.
+pub(super) fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
+    let mut key = *triangle;
+    key.sort_unstable();
+    key
+}
+
+/// Which nodes hang together through elements.
+fn parts(node_count: usize, connectivity: &[[NodeId; 4]]) -> (Vec<usize>, usize) {
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    let mut parent: Vec<usize> = (0..node_count).collect();
+    for [first, others @ ..] in connectivity {
+        for other in others {
+            let (a, b) = (root(&mut parent, first.index()), root(&mut parent, other.index()));
+            // The smaller node stays root: the numbers do not depend on the order of elements.
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut number = vec![0; node_count];
+    let mut count = 0;
+    for i in 0..node_count {
+        let r = root(&mut parent, i);
+        if r == i {
+            number[i] = count;
+            count += 1;
+        } else {
+            number[i] = number[r];
+        }
+    }
+    (number, count)
+}
+
+/// `u/|u|`, zero where `u` is below `least`.
+pub(super) fn direction(u: Point, least: f64) -> Point {
+    let length = norm(u);
+    if length > least { u.map(|c| c / length) } else { [0.0; 3] }
+}

@@ -1,0 +1,69 @@
+//! ψ of several conductors: one grounded node for each that no plane fixes.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::unknowns::PSI;
+use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
+
+const COPPER: Material = Material { relative_permeability: 1.0, conductivity: 6e7 };
+const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
+
+/// Seven layers along x, the region of each by `paint`; `regions` materials in order.
+fn model(paint: [u32; 7], materials: Vec<Material>, boundaries: &[(&str, Boundary)]) -> FieldModel {
+    let line = |n: usize| (0..=n).map(|i| 0.01 * i as f64).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(7), line(2), line(2)]).expect("a grid");
+    let names = ["air", "one", "two", "three"];
+    let topology = grid
+        .topology(&names[..materials.len()], |x| RegionId(paint[(100.0 * x[0]) as usize]))
+        .expect("a topology");
+    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let setup = FieldModelSetup {
+        frequency: 50.0,
+        penalty: 1.0,
+        materials,
+        impedance_surfaces: Vec::new(),
+        coils: Vec::new(),
+        boundaries: boundaries.iter().map(|(name, b)| ((*name).to_owned(), *b)).collect(),
+        ..FieldModelSetup::default()
+    };
+    FieldModel::new(&mesh, setup).expect("a model")
+}
+
+fn grounded(model: &FieldModel) -> usize {
+    let unknowns = model.unknowns();
+    assert!(unknowns.grounded.iter().all(|n| unknowns.dofs.equation(*n, PSI).is_none()));
+    unknowns.grounded.len()
+}
+
+#[test]
+fn conductors_apart_are_grounded_each() {
+    let model = model([0, 1, 0, 2, 0, 3, 0], vec![Material::AIR, COPPER, STEEL, COPPER], &[]);
+    assert_eq!(grounded(&model), 3);
+}
+
+#[test]
+fn two_parts_of_one_region_are_grounded_each() {
+    let model = model([0, 1, 0, 0, 1, 1, 0], vec![Material::AIR, COPPER], &[]);
+    assert_eq!(grounded(&model), 2);
+}
+
+#[test]
+fn conductors_that_touch_share_one_ground() {
+    let model = model([0, 1, 2, 3, 0, 0, 0], vec![Material::AIR, COPPER, STEEL, COPPER], &[]);
+    assert_eq!(grounded(&model), 1);
+    let psi = model.topology().nodes().filter(|n| model.unknowns().dofs.equation(*n, PSI).is_some()).count();
+    assert_eq!(psi, 4 * 9 - 1, "ψ on the four layers of nodes of the conductors, less the grounded one");
+}
+
+#[test]
+fn a_conductor_that_a_flux_parallel_plane_cuts_needs_no_ground() {
+    let materials = vec![Material::AIR, COPPER, STEEL];
+    let one = model([1, 0, 0, 2, 0, 0, 0], materials.clone(), &[("x_min", Boundary::FluxParallel)]);
+    assert_eq!(grounded(&one), 1);
+    let both = model([1, 0, 0, 2, 0, 0, 0], materials.clone(), &[("y_min", Boundary::FluxParallel)]);
+    assert_eq!(grounded(&both), 0);
+    let neither = model([1, 0, 0, 2, 0, 0, 0], materials, &[("y_min", Boundary::FluxNormal)]);
+    assert_eq!(grounded(&neither), 2);
+}
