@@ -57,16 +57,17 @@ fn phases(name: &str) {
     let (cpu, wall, state) = least(|| model.solve_prepared(&system, &load).expect("it converges"));
     show(&format!("state, {} iterations", state.report().iterations), cpu, wall);
     let objective = problem.objective.as_ref().expect("it has an objective");
-    let value = objective.evaluate(model, &mesh, &state).expect("it is finite");
-    let (cpu, wall, lambda) = least(|| adjoint::solve(&system, &value).expect("it converges"));
+    let value = objective.terms[0].functional.evaluate(model, &mesh, &state).expect("it is finite");
+    let (cpu, wall, lambda) = least(|| adjoint::solve(&system, &value.derivative).expect("it converges"));
     show(&format!("adjoint, {} iterations", lambda.report().iterations), cpu, wall);
     let (cpu, wall, nodal) =
         least(|| adjoint::node_gradient(model, &mesh, &state, &lambda, shape.map.elements()));
     show("gradient at nodes", cpu, wall);
     let (cpu, wall, _) = least(|| shape.surface.gradient(&shape.map.gradient(&nodal)));
     show("remesh, transposed", cpu, wall);
-    let (cpu, wall, analysis) =
-        least(|| problem.analyse(mesh.clone(), displacement.clone(), Want::Gradient).expect("it converges"));
+    let (cpu, wall, analysis) = least(|| {
+        problem.analyse(&p, mesh.clone(), displacement.clone(), Want::Gradient).expect("it converges")
+    });
     show("one evaluation, all", cpu, wall);
     let (cpu, wall, bytes) = least(|| fields::vtu(&problem, &analysis).expect("it is finite"));
     show(&format!("VTU, {:.1} MB", bytes.len() as f64 * 1e-6), cpu, wall);

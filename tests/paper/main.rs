@@ -54,7 +54,10 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
         let analysis = value(problem, p);
         let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
         let objective = problem.objective.as_ref().expect("an objective");
-        cells[case] = relative_l2(&objective.cell_flux_densities(model, &analysis.mesh, solution), b);
+        cells[case] = relative_l2(
+            &objective.terms[0].functional.cell_flux_densities(model, &analysis.mesh, solution),
+            b,
+        );
         let recovered = recovery::probe(solution, model, &analysis.mesh, "cells", &reference.points)
             .unwrap_or_else(|e| panic!("{e}"));
         probes[case] = relative_l2(&recovered, b);

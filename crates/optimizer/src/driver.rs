@@ -1,7 +1,9 @@
 //! The optimisation loop: NLopt asks, the problem answers, observer and recorder are told.
 //!
-//! * An *evaluation* is one computation of objective and gradient; an *iteration* is an evaluation that improves on the
-//!   best so far (the first counts as none).
+//! * An *evaluation* is one computation of objective, constraints and gradients; an *iteration* is an evaluation that
+//!   improves on the best so far (the first counts as none). Of two designs that keep all constraints the one with the
+//!   better objective is better; otherwise the one that violates them less.
+//! * The method sees `±F/|F0|`, which it makes small; everything told or kept is `F` itself.
 //! * **A mesh that would break is never shown to the method** as NaN, infinity or a penalty: the method is stopped and
 //!   started afresh at the best design, in a box shrunk by [`SHRINK`] towards it. After [`MAX_RESTARTS`] such restarts
 //!   the run ends with [`StopReason::MeshLimit`] and the best design.
@@ -14,11 +16,13 @@ use std::time::Instant;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_remesh::RemeshError;
 
-use crate::algorithm::{self, Ending, Minimisation};
+use crate::algorithm::{self, CONSTRAINT_TOLERANCE, Ending, Minimisation, Sample};
 use crate::cli::ExitCode;
 use crate::config::Optimizer;
+use crate::constraint::Bound;
 use crate::error::Error;
-use crate::observer::{Evaluation, Observer};
+use crate::objective::Goal;
+use crate::observer::{Evaluation, Observer, column};
 use crate::output::StopReason;
 use crate::problem::{Analysis, Problem, Shape, Timings, Want};
 
@@ -65,6 +69,8 @@ pub struct Best {
     pub values: Vec<f64>,
     /// Its objective.
     pub objective: f64,
+    /// Largest excess of a constraint over its bound, relative to it; zero where all are kept.
+    pub violation: f64,
     /// Its field.
     pub analysis: Analysis,
 }
@@ -80,6 +86,8 @@ pub struct Optimised {
     pub iterations: usize,
     /// The objective at the start.
     pub initial: f64,
+    /// Bounds of the constraints, in their order.
+    pub bounds: Vec<Bound>,
     /// The best design.
     pub best: Best,
     /// Worst quality of the initial mesh.
@@ -116,9 +124,11 @@ pub fn optimise(
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
     let shape = problem.shape.as_ref().expect("an optimisation has a shape");
+    let goal = problem.objective.as_ref().expect("an optimisation has an objective").goal;
     let mut run = Run {
         problem,
         shape,
+        goal,
         settings,
         observer,
         recorder,
@@ -137,12 +147,13 @@ pub fn optimise(
         algorithm: settings.algorithm,
         lower: shape.lower.clone(),
         upper: shape.upper.clone(),
+        constraints: problem.constraints.len(),
         ftol_rel: settings.ftol_rel,
         xtol_rel: settings.xtol_rel,
     };
     let stop_reason = loop {
         let start = run.best.as_ref().map_or_else(|| shape.initial.clone(), |best| best.values.clone());
-        let outcome = algorithm::minimise(&minimisation, &start, |p, gradient| run.evaluate(p, gradient));
+        let outcome = algorithm::minimise(&minimisation, &start, |p| run.evaluate(p));
         match outcome {
             algorithm::Outcome::Ended(Ending::Objective) => break StopReason::ObjectiveConverged,
             algorithm::Outcome::Ended(Ending::Step) => break StopReason::StepConverged,
@@ -187,10 +198,19 @@ pub fn optimise(
     run.finish(stop_reason)
 }
 
+/// What the first evaluation fixes for the rest of the run.
+#[derive(Clone, Debug)]
+struct Initial {
+    objective: f64,
+    quality: f64,
+    bounds: Vec<Bound>,
+}
+
 /// The state of one optimisation.
 struct Run<'a> {
     problem: &'a Problem,
     shape: &'a Shape,
+    goal: Goal,
     settings: &'a Optimizer,
     observer: &'a mut dyn Observer,
     recorder: &'a mut dyn Recorder,
@@ -199,7 +219,7 @@ struct Run<'a> {
     round: usize,
     evaluations: usize,
     iterations: usize,
-    initial: Option<(f64, f64)>,
+    initial: Option<Initial>,
     last: Vec<f64>,
     best: Option<Best>,
     worst_residual: f64,
@@ -207,8 +227,8 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// F/F0 of a design; fills its gradient.
-    fn evaluate(&mut self, p: &[f64], gradient: &mut [f64]) -> Result<f64, Stop> {
+    /// ±F/|F0| and the constraints of a design, with their gradients.
+    fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         self.check_limits()?;
         let clock = Instant::now();
         let (mesh, displacement) = self.problem.mesh_of(p).map_err(|error| match error {
@@ -217,25 +237,39 @@ impl Run<'_> {
         })?;
         self.check_quality(&mesh)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self
-            .problem
-            .analyse(mesh, displacement, Want::Gradient)
-            .map_err(|error| Stop::Error(Box::new(error)))?;
+        let mut analysis = self.problem.analyse(p, mesh, displacement, Want::Gradient)?;
         analysis.timings.remesh += remesh;
         let value = analysis.objective.expect("an optimisation has an objective");
+        let initial = match &self.initial {
+            Some(initial) => initial.clone(),
+            None => self.initial.insert(self.first(value, &analysis)?).clone(),
+        };
+        let scale = self.goal.sign() / initial.objective.abs();
         let derivative = analysis.gradient.as_ref().expect("a gradient was asked for");
-        let initial = *self.initial.get_or_insert((value, analysis.quality.worst));
-        if initial.0 <= 0.0 {
-            return Err(Stop::Error(Box::new(Error::Optimisation {
-                cause: "the objective of the initial design is zero: there is no field to reduce; check coils and regions",
-            })));
+        let constraints = initial.bounds.iter().zip(&analysis.constraints).map(|(bound, measured)| {
+            let gradient = measured.gradient.as_ref().expect("a gradient was asked for");
+            (bound.excess(measured.value), bound.gradient(gradient))
+        });
+        let sample = Sample {
+            value: scale * value,
+            gradient: derivative.iter().map(|d| scale * d).collect(),
+            constraints: constraints.collect(),
+        };
+        self.keep(p, &initial, &sample, analysis, clock.elapsed().as_secs_f64())?;
+        Ok(sample)
+    }
+
+    /// Scale of the objective and bounds of the constraints, from the initial design.
+    fn first(&self, objective: f64, analysis: &Analysis) -> Result<Initial, Error> {
+        if objective == 0.0 {
+            return Err(Error::Optimisation {
+                cause: "the objective of the initial design is zero: there is no field to change, or its terms cancel; \
+                        check coils, regions, frequencies and weights",
+            });
         }
-        for (g, d) in gradient.iter_mut().zip(derivative) {
-            *g = d / initial.0;
-        }
-        self.keep(p, value, initial.0, analysis, clock.elapsed().as_secs_f64())
-            .map_err(|error| Stop::Error(Box::new(error)))?;
-        Ok(value / initial.0)
+        let measured = self.problem.constraints.iter().zip(&analysis.constraints);
+        let bounds = measured.map(|(constraint, initial)| constraint.bound(initial.value));
+        Ok(Initial { objective, quality: analysis.quality.worst, bounds: bounds.collect::<Result<_, _>>()? })
     }
 
     fn check_limits(&self) -> Result<(), Stop> {
@@ -273,23 +307,30 @@ impl Run<'_> {
     fn keep(
         &mut self,
         p: &[f64],
-        value: f64,
-        initial: f64,
+        initial: &Initial,
+        sample: &Sample,
         analysis: Analysis,
         seconds: f64,
     ) -> Result<(), Error> {
-        let improved = self.best.as_ref().is_none_or(|best| value < best.objective);
+        let value = analysis.objective.expect("an optimisation has an objective");
+        let violation = violation(sample);
+        let improved = self.best.as_ref().is_none_or(|best| {
+            let sign = self.goal.sign();
+            let order = violation.total_cmp(&best.violation);
+            order.then((sign * value).total_cmp(&(sign * best.objective))).is_lt()
+        });
         if improved && self.best.is_some() {
             self.iterations += 1;
         }
         let thickness =
             self.shape.thickness.as_ref().map(|thickness| thickness.range(&self.shape.surface.heights(p)));
         let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
+        let excess = self.problem.constraints.iter().zip(&sample.constraints);
         let row = Evaluation {
             evaluation: self.evaluations,
             iteration: self.iterations,
             objective: value,
-            ratio: value / initial,
+            ratio: value / initial.objective,
             gradient_norm: euclidean(analysis.gradient.as_deref().unwrap_or_default()),
             step_norm: euclidean(&difference),
             worst_quality: analysis.quality.worst,
@@ -298,6 +339,7 @@ impl Run<'_> {
             linear_iterations: analysis.linear_iterations,
             seconds,
             round: self.round,
+            constraints: excess.map(|(constraint, (c, _))| (column(&constraint.name), *c)).collect(),
         };
         self.evaluations += 1;
         self.last = p.to_vec();
@@ -306,27 +348,47 @@ impl Run<'_> {
         self.recorder.record(&row, &analysis, self.problem, improved)?;
         self.observer.evaluation(&row);
         if improved {
-            self.best =
-                Some(Best { evaluation: row.evaluation, values: p.to_vec(), objective: value, analysis });
+            let (evaluation, values) = (row.evaluation, p.to_vec());
+            self.best = Some(Best { evaluation, values, objective: value, violation, analysis });
         }
         Ok(())
     }
 
     fn finish(self, stop_reason: StopReason) -> Result<Optimised, Error> {
-        let (Some(best), Some((initial, initial_quality))) = (self.best, self.initial) else {
+        let (Some(best), Some(initial)) = (self.best, self.initial) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
+        if best.violation > 0.0 {
+            self.observer.warning(&format!(
+                "no design keeps all constraints: the best one is beyond a bound by {:.1e} of it; loosen the constraint, \
+                 widen the design's bounds, or allow more evaluations",
+                best.violation
+            ));
+        }
         Ok(Optimised {
             stop_reason,
             evaluations: self.evaluations,
             iterations: self.iterations,
-            initial,
+            initial: initial.objective,
+            bounds: initial.bounds,
             best,
-            initial_quality,
+            initial_quality: initial.quality,
             worst_residual: self.worst_residual,
             timings: self.timings,
         })
     }
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::Error(Box::new(error))
+    }
+}
+
+/// Largest excess of a constraint; zero where all are kept but for rounding.
+fn violation(sample: &Sample) -> f64 {
+    let worst = sample.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);
+    if worst <= CONSTRAINT_TOLERANCE { 0.0 } else { worst }
 }
 
 fn euclidean(values: &[f64]) -> f64 {

@@ -36,6 +36,16 @@ pub enum Error {
         /// What it said.
         cause: &'static str,
     },
+    /// A constraint that cannot be what the configuration says.
+    #[error("the constraint `{name}` has the value {value:e} at the initial design: expected {expected}")]
+    Constraint {
+        /// Its name.
+        name: String,
+        /// Its value, in SI.
+        value: f64,
+        /// What is needed, and what to do.
+        expected: &'static str,
+    },
     /// The gradient does not match the objective.
     #[error("the gradient certificate does not hold: {cause}")]
     Certificate {
@@ -70,7 +80,11 @@ impl Error {
             Self::Solver(SolverError::NotConverged { .. } | SolverError::NotFinite { .. })
             | Self::Optimisation { .. }
             | Self::Certificate { .. } => ExitCode::Numerical,
-            Self::Config(_) | Self::Solver(_) | Self::Remesh(_) | Self::Design(_) => ExitCode::Configuration,
+            Self::Constraint { .. }
+            | Self::Config(_)
+            | Self::Solver(_)
+            | Self::Remesh(_)
+            | Self::Design(_) => ExitCode::Configuration,
             Self::Threads { .. } => ExitCode::Usage,
         }
     }

@@ -3,11 +3,14 @@
 pub mod algorithm;
 pub mod cli;
 pub mod config;
+pub mod constraint;
 pub mod design;
 pub mod diagnostics;
 pub mod driver;
 mod error;
 pub mod fields;
+pub mod geometric;
+pub mod objective;
 pub mod observer;
 pub mod output;
 pub mod problem;

@@ -1,20 +1,21 @@
 //! Who watches a run: the driver tells what happens, an observer shows it.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::output::RunResult;
+use crate::output::{ConstraintResult, RunResult};
 
-/// One evaluation of objective and gradient; a row of the history.
+/// One evaluation of objective, constraints and gradients; a row of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub evaluation: usize,
     /// Evaluations so far that improved on the best before them; the first counts as 0.
     pub iteration: usize,
-    /// The objective, unscaled.
+    /// The objective itself, whether it is minimised or maximised.
     pub objective: f64,
     /// The objective over that of evaluation 0.
     pub ratio: f64,
@@ -34,10 +35,18 @@ pub struct Evaluation {
     pub seconds: f64,
     /// Restarts of the method so far, each in a smaller box (see [`crate::driver`]).
     pub round: usize,
+    /// Relative distance of every constraint from its bound, satisfied where ≤ 0, by column (see [`column`]).
+    #[serde(flatten)]
+    pub constraints: BTreeMap<String, f64>,
+}
+
+/// The column of the history that holds a constraint.
+pub fn column(constraint: &str) -> String {
+    format!("c_{constraint}")
 }
 
 impl Evaluation {
-    /// The columns of `history.csv`.
+    /// The columns of `history.csv` before those of the constraints.
     pub const COLUMNS: [&'static str; 12] = [
         "evaluation",
         "iteration",
@@ -126,6 +135,11 @@ fn show(writer: &mut impl Write, text: &str) {
     let _ = writeln!(writer, "{text}").and_then(|()| writer.flush());
 }
 
+/// The last column of the table, of a width that common names of constraints fit into.
+fn worst_of(text: &str) -> String {
+    format!("  {text:<24.40}")
+}
+
 /// Shows one plain line for each evaluation, and a summary.
 #[derive(Debug)]
 pub struct Console<W> {
@@ -171,17 +185,25 @@ impl<W: Write> Observer for Console<W> {
     fn evaluation(&mut self, row: &Evaluation) {
         if !self.header_is_shown {
             self.header_is_shown = true;
+            let constraint =
+                if row.constraints.is_empty() { String::new() } else { worst_of("worst constraint") };
             self.line(&format!(
-                "{:>4} {:>4} {:>13} {:>8} {:>9} {:>9} {:>8} {:>15} {:>6} {:>7}",
+                "{:>4} {:>4} {:>13} {:>8} {:>9} {:>9} {:>8} {:>15} {:>6} {:>7}{constraint}",
                 "eval", "iter", "F", "F/F0", "|dF/dp|", "step mm", "quality", "thickness mm", "linear", "s"
             ));
         }
+        let constraint = row
+            .constraints
+            .iter()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map(|(column, c)| worst_of(&format!("{c:+.1e} {}", column.trim_start_matches("c_"))))
+            .unwrap_or_default();
         let thickness = match (row.min_thickness_m, row.max_thickness_m) {
             (Some(least), Some(most)) => format!("{:.2} .. {:.2}", least * 1e3, most * 1e3),
             _ => "-".to_owned(),
         };
         self.line(&format!(
-            "{:>4} {:>4} {:>13.6e} {:>8.5} {:>9.2e} {:>9.3} {:>8.4} {:>15} {:>6} {:>7.2}",
+            "{:>4} {:>4} {:>13.6e} {:>8.5} {:>9.2e} {:>9.3} {:>8.4} {:>15} {:>6} {:>7.2}{constraint}",
             row.evaluation,
             row.iteration,
             row.objective,
@@ -208,6 +230,11 @@ impl<W: Write> Observer for Console<W> {
             row("objective, initial", format!("{:.6e}", objective.initial));
             row("objective, best", format!("{:.6e} {evaluation}", objective.best));
             row("F/F0", format!("{:.5}", objective.ratio));
+        }
+        for constraint in &result.constraints {
+            let ConstraintResult { name, value, bound, satisfied } = constraint;
+            let verdict = if *satisfied { "kept" } else { "NOT KEPT" };
+            row("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"));
         }
         row("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations));
         let mesh = &result.mesh;
@@ -244,6 +271,7 @@ mod tests {
             linear_iterations: 40,
             seconds: 1.0,
             round: 0,
+            constraints: BTreeMap::new(),
         }
     }
 
@@ -259,6 +287,18 @@ mod tests {
         assert_eq!(lines.len(), 4, "{text}");
         assert!(lines.iter().all(|line| line.len() == lines[0].len()), "{text}");
         assert!(lines[1].contains("5.00 .. 30.00") && lines[1].contains("0.51000"), "{text}");
+    }
+
+    #[test]
+    fn the_console_names_the_worst_constraint_of_a_row() {
+        let mut bytes = Vec::new();
+        let constraints = [("c_volume_plate", -1e-3), ("c_loss", 0.25)].map(|(name, c)| (name.to_owned(), c));
+        let row = Evaluation { constraints: constraints.into(), ..evaluation(1) };
+        Console::new(&mut bytes).evaluation(&row);
+        let text = String::from_utf8(bytes).expect("text");
+        let lines: Vec<_> = text.lines().collect();
+        assert!(lines[0].contains("worst constraint") && lines[1].contains("+2.5e-1 loss"), "{text}");
+        assert_eq!(lines[0].len(), lines[1].len(), "{text}");
     }
 
     #[test]

@@ -1,20 +1,24 @@
-//! The optimisation problem as a function: design variables in, objective and exact gradient out.
+//! The optimisation problem as a function: design variables in, objective, constraints and exact gradients out.
 //!
 //! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. The reference mesh and
-//! the elastic factor are fixed, so `F(p)` is one function and not a path. A problem owns a list of states (one for
-//! now); nothing here knows an optimiser, a file or a terminal.
+//! the elastic factor are fixed, so `F(p)` is one function and not a path. A problem owns one state a frequency; the
+//! objective costs one adjoint solve a state whatever the number of its terms, each constraint of the field another.
+//! Nothing here knows an optimiser, a file or a terminal.
 
 use std::time::Instant;
 
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{ElasticMap, RemeshError, check_step};
-use fluxmorph_solver::objective::ObjectiveValue;
-use fluxmorph_solver::{FieldModel, FieldSolution, Objective, SolverError, adjoint};
+use fluxmorph_solver::linear::PreparedSystem;
+use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, SolverError, adjoint};
 
+use crate::constraint::{Bound, Constraint, Limit, Quantity};
 use crate::design::DesignSurface;
 use crate::error::Error;
+use crate::objective::{Term, WeightedSum};
 use crate::thickness::Thickness;
 
 /// Connectivity, its places in the patterns, element derivatives and output arrays, per element.
@@ -40,15 +44,17 @@ pub struct Shape {
     pub initial: Vec<f64>,
 }
 
-/// Objective, states and shape on a reference mesh.
+/// Objective, constraints, states and shape on a reference mesh.
 #[derive(Debug)]
 pub struct Problem {
     /// The undeformed mesh.
     pub reference: Mesh,
-    /// One field problem per state.
+    /// One field problem per state, in the order of the analysis' frequencies; at least one.
     pub states: Vec<FieldModel>,
-    /// What is minimised, on the first state; `None` for a field analysis without objective.
-    pub objective: Option<Objective>,
+    /// What is optimised; `None` for a field analysis without objective.
+    pub objective: Option<WeightedSum>,
+    /// What must keep within bounds; empty without a shape.
+    pub constraints: Vec<Constraint>,
     /// What moves; `None` for a field analysis without design.
     pub shape: Option<Shape>,
 }
@@ -92,6 +98,10 @@ pub struct Analysis {
     pub solutions: Vec<FieldSolution>,
     /// The objective, if the problem has one.
     pub objective: Option<f64>,
+    /// The terms of the objective without their weights, each summed over its states.
+    pub terms: Vec<f64>,
+    /// What the constraints measure, in their order.
+    pub constraints: Vec<Measured>,
     /// dF/dp [unit of F per m], if asked for.
     pub gradient: Option<Vec<f64>>,
     /// dF/dx at the nodes that may move [unit of F per m], if asked for; shape `(n_nodes, 3)`.
@@ -106,12 +116,21 @@ pub struct Analysis {
     pub timings: Timings,
 }
 
-/// Whether the adjoint problem is solved too.
+/// The value of what a constraint measures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// The value, in SI.
+    pub value: f64,
+    /// Its derivative by the design variables [unit per m], if asked for.
+    pub gradient: Option<Vec<f64>>,
+}
+
+/// Whether the adjoint problems are solved too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Want {
     /// The objective alone.
     Value,
-    /// Objective and gradient.
+    /// Objective and constraints with their gradients.
     Gradient,
 }
 
@@ -155,7 +174,7 @@ impl Problem {
         .expect("a mesh and a remesh region have elements")
     }
 
-    /// Field, objective and, if wanted, gradient of a design.
+    /// Field, objective, constraints and, if wanted, gradients of a design.
     ///
     /// # Errors
     /// [`Error::Remesh`] when the mesh would break, [`Error::Solver`] when the field cannot be computed.
@@ -163,57 +182,66 @@ impl Problem {
         let clock = Instant::now();
         let (mesh, displacement) = self.mesh_of(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.analyse(mesh, displacement, want)?;
+        let mut analysis = self.analyse(p, mesh, displacement, want)?;
         analysis.timings.remesh += remesh;
         Ok(analysis)
     }
 
-    /// As [`Problem::evaluate`] on a mesh made before.
+    /// As [`Problem::evaluate`] on a mesh made before for the variables `p`.
     ///
     /// # Errors
     /// [`Error::Solver`] when the field cannot be computed.
-    pub fn analyse(&self, mesh: Mesh, displacement: Vec<Point>, want: Want) -> Result<Analysis, Error> {
-        let mut timings = Timings::default();
-        let mut report = Worst::default();
+    pub fn analyse(
+        &self,
+        p: &[f64],
+        mesh: Mesh,
+        displacement: Vec<Point>,
+        want: Want,
+    ) -> Result<Analysis, Error> {
+        let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default() };
+        let shape = self.shape.as_ref().filter(|_| want == Want::Gradient);
         let mut solutions = Vec::with_capacity(self.states.len());
-        let mut objective = None;
-        let mut gradient = None;
-        let mut sensitivity = None;
+        let terms: &[Term] = self.objective.as_ref().map_or(&[], |sum| &sum.terms);
+        let all: Vec<(usize, &Term)> = terms.iter().enumerate().collect();
+        let mut objective = Gathered::new(terms.len(), mesh.points().len());
+        let fields: Vec<(usize, &Term)> = self.field_constraints().collect();
+        let mut constrained: Vec<Gathered> =
+            fields.iter().map(|_| Gathered::new(1, mesh.points().len())).collect();
         for (index, model) in self.states.iter().enumerate() {
             let mut clock = Lap::start();
             let (matrix, load) = (model.assemble(&mesh), model.load(&mesh));
-            timings.assembly += clock.lap();
+            work.timings.assembly += clock.lap();
             let system = model.prepare(matrix)?;
-            timings.factor += clock.lap();
+            work.timings.factor += clock.lap();
             let state = model.solve_prepared(&system, &load)?;
-            report.include(&state);
-            timings.state += clock.lap();
-            if let Some(observed) = self.objective.as_ref().filter(|_| index == 0) {
-                let value: ObjectiveValue = observed.evaluate(model, &mesh, &state)?;
-                objective = Some(value.value);
-                timings.gradient += clock.lap();
-                if let (Want::Gradient, Some(shape)) = (want, &self.shape) {
-                    let lambda = adjoint::solve(&system, &value)?;
-                    report.include(&lambda);
-                    timings.adjoint += clock.lap();
-                    let nodal = adjoint::node_gradient(model, &mesh, &state, &lambda, shape.map.elements());
-                    timings.gradient += clock.lap();
-                    gradient = Some(shape.surface.gradient(&shape.map.gradient(&nodal)));
-                    timings.remesh += clock.lap();
-                    sensitivity = Some(moved_only(shape, nodal));
-                }
+            work.report.include(&state);
+            work.timings.state += clock.lap();
+            let solved = Solved { index, model, system, state };
+            objective.add(&mut work, &solved, &all, shape)?;
+            for (gathered, (_, term)) in constrained.iter_mut().zip(&fields) {
+                gathered.add(&mut work, &solved, &[(0, *term)], shape)?;
             }
-            solutions.push(state);
+            solutions.push(solved.state);
         }
-        if let Some(value) = gradient.iter().flatten().copied().find(|g| !g.is_finite()) {
+        let Work { mut timings, report, .. } = work;
+        let mut clock = Lap::start();
+        let value = terms.iter().zip(&objective.values).map(|(term, value)| term.weight * value).sum();
+        let gradient = shape.filter(|_| !terms.is_empty()).map(|shape| shape.pull_back(&objective.nodal));
+        let constraints = self.measure_constraints(p, &mesh, shape, &fields, &constrained);
+        timings.remesh += clock.lap();
+        let all_gradients = gradient.iter().chain(constraints.iter().filter_map(|c| c.gradient.as_ref()));
+        if let Some(value) = all_gradients.flatten().copied().find(|g| !g.is_finite()) {
             return Err(SolverError::NotFinite { what: "gradient", value }.into());
         }
+        let sensitivity = shape.filter(|_| !terms.is_empty()).map(|shape| moved_only(shape, objective.nodal));
         let quality = self.quality(&mesh);
         Ok(Analysis {
             mesh,
             displacement,
             solutions,
-            objective,
+            objective: (!terms.is_empty()).then_some(value),
+            terms: objective.values,
+            constraints,
             gradient,
             sensitivity,
             quality,
@@ -221,6 +249,144 @@ impl Problem {
             worst_residual: report.residual,
             timings,
         })
+    }
+
+    /// Bounds of the constraints; a share of the initial design's value costs its analysis, unless that is `p`.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`], and [`Error::Constraint`].
+    pub fn bounds(&self, p: &[f64], analysis: &Analysis) -> Result<Vec<Bound>, Error> {
+        let Some(shape) = self.shape.as_ref().filter(|_| !self.constraints.is_empty()) else {
+            return Ok(Vec::new());
+        };
+        let share = |constraint: &Constraint| matches!(constraint.limit, Limit::AtMostRatio(_));
+        let initial;
+        let measured = if p != shape.initial && self.constraints.iter().any(share) {
+            initial = self.evaluate(&shape.initial, Want::Value)?;
+            &initial.constraints
+        } else {
+            &analysis.constraints
+        };
+        self.constraints.iter().zip(measured).map(|(constraint, m)| constraint.bound(m.value)).collect()
+    }
+
+    /// Constraints on functionals of the field, with their numbers.
+    fn field_constraints(&self) -> impl Iterator<Item = (usize, &Term)> {
+        self.constraints.iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
+            Quantity::Field(term) => Some((k, term)),
+            _ => None,
+        })
+    }
+
+    /// All constraints in their order, from what was gathered of the field, from the mesh and from the variables.
+    fn measure_constraints(
+        &self,
+        p: &[f64],
+        mesh: &Mesh,
+        wanted: Option<&Shape>,
+        fields: &[(usize, &Term)],
+        gathered: &[Gathered],
+    ) -> Vec<Measured> {
+        let Some(shape) = &self.shape else { return Vec::new() };
+        let of = |(k, constraint): (usize, &Constraint)| match &constraint.quantity {
+            Quantity::Field(_) => {
+                let position = fields.iter().position(|(number, _)| *number == k);
+                let own = &gathered[position.expect("every constraint of the field was gathered")];
+                Measured { value: own.values[0], gradient: wanted.map(|shape| shape.pull_back(&own.nodal)) }
+            }
+            Quantity::Volume { body, density } => {
+                let (volume, gradient) = body.evaluate(mesh, shape);
+                let gradient = wanted.map(|_| gradient.iter().map(|g| density * g).collect());
+                Measured { value: density * volume, gradient }
+            }
+            Quantity::Thickness { measure, bound } => {
+                // Beyond a minimum is below it, beyond a maximum above.
+                let sign = if matches!(constraint.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
+                let (beyond, gradient) = measure.evaluate(shape, p);
+                let gradient = wanted.map(|_| gradient.iter().map(|g| sign * g).collect());
+                Measured { value: bound + sign * beyond, gradient }
+            }
+        };
+        self.constraints.iter().enumerate().map(of).collect()
+    }
+}
+
+impl Shape {
+    /// dF/dp from dF/dx at the nodes, shape `(n_nodes, 3)`.
+    fn pull_back(&self, nodal: &[Point]) -> Vec<f64> {
+        self.surface.gradient(&self.map.gradient(nodal))
+    }
+}
+
+/// What all states of an evaluation share.
+struct Work<'a> {
+    mesh: &'a Mesh,
+    timings: Timings,
+    report: Worst,
+}
+
+/// One state with its factor.
+struct Solved<'a> {
+    index: usize,
+    model: &'a FieldModel,
+    system: PreparedSystem,
+    state: FieldSolution,
+}
+
+/// A sum of terms over the states.
+struct Gathered {
+    /// Value of every term without its weight.
+    values: Vec<f64>,
+    /// dF/dx of the weighted sum, shape `(n_nodes, 3)`.
+    nodal: Vec<Point>,
+}
+
+impl Gathered {
+    fn new(terms: usize, nodes: usize) -> Self {
+        Self { values: vec![0.0; terms], nodal: vec![[0.0; 3]; nodes] }
+    }
+
+    /// Adds what the terms `(number, term)` have on one state; derivatives where a shape is given, by one adjoint.
+    fn add(
+        &mut self,
+        work: &mut Work<'_>,
+        solved: &Solved<'_>,
+        terms: &[(usize, &Term)],
+        shape: Option<&Shape>,
+    ) -> Result<(), SolverError> {
+        let Solved { index, model, system, state } = solved;
+        let mut clock = Lap::start();
+        let mut right_side: Option<Vec<c64>> = None;
+        for (number, term) in terms.iter().filter(|(_, term)| term.states.contains(index)) {
+            let FunctionalValue { value, derivative, explicit } =
+                term.functional.evaluate(model, work.mesh, state)?;
+            self.values[*number] += value;
+            if shape.is_none() {
+                continue;
+            }
+            let sum = right_side.get_or_insert_with(|| vec![c64::default(); derivative.len()]);
+            for (sum, d) in sum.iter_mut().zip(derivative) {
+                *sum += term.weight * d;
+            }
+            self.add_nodal(term.weight, explicit.as_deref().unwrap_or_default());
+        }
+        work.timings.gradient += clock.lap();
+        let (Some(right_side), Some(shape)) = (right_side, shape) else { return Ok(()) };
+        let lambda = adjoint::solve(system, &right_side)?;
+        work.report.include(&lambda);
+        work.timings.adjoint += clock.lap();
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.map.elements());
+        self.add_nodal(1.0, &nodal);
+        work.timings.gradient += clock.lap();
+        Ok(())
+    }
+
+    fn add_nodal(&mut self, weight: f64, nodal: &[Point]) {
+        for (sum, own) in self.nodal.iter_mut().zip(nodal) {
+            for d in 0..3 {
+                sum[d] += weight * own[d];
+            }
+        }
     }
 }
 

@@ -11,16 +11,18 @@ use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::{SolverError, recovery};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
+use crate::constraint::{Bound, Constraint};
 use crate::driver::{self, Recorder};
 use crate::error::Error;
 use crate::fields;
+use crate::objective::Term;
 use crate::observer::{Evaluation, Observer, Started};
 use crate::output::{
-    DesignResult, FileHash, History, LinearSolverResult, Manifest, MeshHash, MeshResult, ObjectiveResult,
-    OlderRun, ProbeResult, RunDirectory, RunResult, RunStatus, StopReason, blake3_hex, peak_memory_bytes,
-    write_atomic,
+    ConstraintResult, DesignResult, FileHash, History, LinearSolverResult, Manifest, MeshHash, MeshResult,
+    ObjectiveResult, OlderRun, ProbeResult, RunDirectory, RunResult, RunStatus, StateResult, StopReason,
+    TermResult, blake3_hex, peak_memory_bytes, write_atomic,
 };
-use crate::problem::{Analysis, Problem, Timings, Want};
+use crate::problem::{Analysis, Measured, Problem, Timings, Want};
 use crate::setup::{Purpose, Setup, set_up};
 
 /// What a session is told beside the configuration.
@@ -51,7 +53,7 @@ pub fn run(
     session.conclude(observer, |session, observer| {
         let mut recorder = DirectoryRecorder {
             directory: &session.directory,
-            history: History::create(&session.directory)?,
+            history: History::create(&session.directory, &constraint_names(&session.setup.problem))?,
             kept: config.output.fields,
             written: Vec::new(),
         };
@@ -70,7 +72,9 @@ pub fn run(
                 best: best.objective,
                 ratio: best.objective / optimised.initial,
                 best_evaluation: best.evaluation,
+                terms: terms(problem, &best.analysis),
             }),
+            constraints: constraints(problem, &best.analysis, &optimised.bounds),
             linear_solver: LinearSolverResult { worst_residual: optimised.worst_residual },
             ..session.result(
                 optimised.stop_reason,
@@ -118,7 +122,9 @@ pub fn solve(
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
         observer.phase("solving the field");
-        let analysis = problem.analyse(mesh, displacement, Want::Gradient)?;
+        let p = values.as_deref().unwrap_or_default();
+        let analysis = problem.analyse(p, mesh, displacement, Want::Gradient)?;
+        let bounds = problem.bounds(p, &analysis)?;
         if config.output.fields != FieldsKept::Nothing {
             write_field(&session.directory, 0, problem, &analysis)?;
             write_collection(&session.directory, &[0])?;
@@ -132,7 +138,9 @@ pub fn solve(
                 best: value,
                 ratio: 1.0,
                 best_evaluation: 0,
+                terms: terms(problem, &analysis),
             }),
+            constraints: constraints(problem, &analysis, &bounds),
             ..session.result(
                 StopReason::Done,
                 &analysis,
@@ -228,30 +236,11 @@ impl<'a> Session<'a> {
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
-        let (model, solution, mesh) = (&problem.states[0], &analysis.solutions[0], &analysis.mesh);
-        let probes = self
-            .config
-            .probes
-            .iter()
-            .map(|probe| {
-                let at = |&point| match recovery::probe(solution, model, mesh, &probe.name, &[point]) {
-                    Ok(b) => Ok(b.first().copied()),
-                    // It was inside before the mesh moved: the result of a whole run is worth more than this point.
-                    Err(error @ SolverError::ProbeOutside { .. }) => {
-                        observer.warning(&format!("{error}: its field is left out"));
-                        Ok(None)
-                    }
-                    Err(error) => Err(error.into()),
-                };
-                let b = probe.points.iter().map(at).collect::<Result<Vec<_>, Error>>()?;
-                Ok(ProbeResult {
-                    name: probe.name.clone(),
-                    points_m: probe.points.clone(),
-                    b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
-                    b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
-                })
-            })
-            .collect::<Result<_, Error>>()?;
+        let mesh = &analysis.mesh;
+        let states = (0..problem.states.len())
+            .map(|index| self.state_result(index, analysis, observer))
+            .collect::<Result<Vec<_>, Error>>()?;
+        let StateResult { probes, losses_w, .. } = states[0].clone();
         let design = match (&problem.shape, values) {
             (Some(shape), Some(values)) => Some(DesignResult {
                 values_m: values.to_vec(),
@@ -270,6 +259,7 @@ impl<'a> Session<'a> {
             evaluations: 0,
             iterations: 0,
             objective: None,
+            constraints: Vec::new(),
             design,
             mesh: MeshResult {
                 nodes: topology.node_count(),
@@ -278,8 +268,10 @@ impl<'a> Session<'a> {
                 worst_quality_initial: initial_quality,
                 worst_quality_final: analysis.quality.worst,
             },
+            frequencies_hz: self.config.analysis.frequencies().to_vec(),
             probes,
-            losses_w: solution.losses(model, mesh).into_iter().collect(),
+            losses_w,
+            states: if states.len() > 1 { states } else { Vec::new() },
             linear_solver: LinearSolverResult { worst_residual: analysis.worst_residual },
             timings_s: BTreeMap::from([
                 ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
@@ -294,6 +286,76 @@ impl<'a> Session<'a> {
             peak_memory_bytes: peak_memory_bytes(),
         })
     }
+
+    /// Losses and probes of one state.
+    fn state_result(
+        &self,
+        index: usize,
+        analysis: &Analysis,
+        observer: &mut dyn Observer,
+    ) -> Result<StateResult, Error> {
+        let (model, solution) = (&self.setup.problem.states[index], &analysis.solutions[index]);
+        let mesh = &analysis.mesh;
+        let probes = self
+            .config
+            .probes
+            .iter()
+            .map(|probe| {
+                let at = |&point| match recovery::probe(solution, model, mesh, &probe.name, &[point]) {
+                    Ok(b) => Ok(b.first().copied()),
+                    // It was inside before the mesh moved: the result of a whole run is worth more than this point.
+                    Err(error @ SolverError::ProbeOutside { .. }) => {
+                        if index == 0 {
+                            observer.warning(&format!("{error}: its field is left out"));
+                        }
+                        Ok(None)
+                    }
+                    Err(error) => Err(error.into()),
+                };
+                let b = probe.points.iter().map(at).collect::<Result<Vec<_>, Error>>()?;
+                Ok(ProbeResult {
+                    name: probe.name.clone(),
+                    points_m: probe.points.clone(),
+                    b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
+                    b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
+                })
+            })
+            .collect::<Result<_, Error>>()?;
+        Ok(StateResult {
+            frequency_hz: self.config.analysis.frequencies()[index],
+            losses_w: solution.losses(model, mesh).into_iter().collect(),
+            probes,
+        })
+    }
+}
+
+/// Names of the constraints in their order.
+fn constraint_names(problem: &Problem) -> Vec<&str> {
+    problem.constraints.iter().map(|constraint| constraint.name.as_str()).collect()
+}
+
+/// The terms of the objective at a design.
+fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
+    let terms = problem.objective.iter().flat_map(|objective| &objective.terms);
+    let of = |(term, &value): (&Term, &f64)| TermResult {
+        kind: term.label.kind.to_owned(),
+        region: term.label.region.clone(),
+        frequency: term.label.frequency,
+        weight: term.weight,
+        value,
+    };
+    terms.zip(&analysis.terms).map(of).collect()
+}
+
+/// The constraints at a design.
+fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Bound]) -> Vec<ConstraintResult> {
+    let of = |((constraint, measured), bound): ((&Constraint, &Measured), &Bound)| ConstraintResult {
+        name: constraint.name.clone(),
+        value: measured.value,
+        bound: bound.value,
+        satisfied: bound.is_satisfied(measured.value),
+    };
+    problem.constraints.iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
 }
 
 /// Writes history and fields into the run directory.

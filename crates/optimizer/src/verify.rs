@@ -4,11 +4,19 @@
 //! * the Taylor remainder `|F(p + h s d) − F(p) − h s g·d|` falls with order 2 as `h` is halved. Of `d` and `−d` the one
 //!   with the larger remainder at the first step is taken: there the terms of second and third order add. On the other
 //!   side they may cancel at some `h`, and the slope between two steps says nothing. With a wrong gradient the larger
-//!   remainder is the one in which first and second order add, and its slope is 1;
+//!   remainder is the one in which first and second order add, and its slope is 1. Of a function that is linear, such as
+//!   the volume of a plate with one moving face, nothing remains but rounding, and there is no slope to ask for;
 //! * the central difference `(F(p + h s d) − F(p − h s d)) / (2 h s)` equals `g·d`.
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+
 use crate::error::Error;
-use crate::problem::{Problem, Want};
+use crate::problem::{Analysis, Problem, Want};
+
+/// Remainders over F(p) that count as rounding: above the solver's tolerance, and a thousand times below what a first
+/// step of 2 % of the span leaves of any function that bends.
+const ROUNDING: f64 = 1e-9;
 
 /// Steps of the certificate, and what it asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,13 +59,13 @@ pub struct Direction {
     pub steps: Vec<f64>,
     /// Taylor remainders over F(p).
     pub remainders: Vec<f64>,
-    /// Least-squares slope of log remainder over log step.
+    /// Least-squares slope of log remainder over log step; 2 where the remainder is rounding alone.
     pub slope: f64,
     /// `g·d` times the span, over F(p).
     pub adjoint: f64,
     /// The same by central difference.
     pub difference: f64,
-    /// `|difference − adjoint| / |adjoint|`.
+    /// `|difference − adjoint| / |adjoint|`; zero where both are rounding.
     pub error: f64,
 }
 
@@ -76,7 +84,27 @@ pub struct Certificate {
     pub holds: bool,
 }
 
-/// Measures the certificate of a problem at the design `p`; `progress` is told after each direction.
+/// The outcome for objective and constraints of a problem.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Certificates {
+    /// Of the objective.
+    #[serde(flatten)]
+    pub objective: Certificate,
+    /// Of every constraint, in the order of the problem.
+    pub constraints: Vec<Named>,
+}
+
+/// The certificate of a constraint.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Named {
+    /// Name of the constraint.
+    pub name: String,
+    /// What was measured, of the value itself and not of its distance from the bound.
+    #[serde(flatten)]
+    pub certificate: Certificate,
+}
+
+/// Measures the certificate of a problem's objective at the design `p`; `progress` is told after each direction.
 ///
 /// # Errors
 /// When an evaluation fails.
@@ -89,15 +117,75 @@ pub fn certify(
     settings: &Settings,
     progress: impl FnMut(usize, &Direction),
 ) -> Result<Certificate, Error> {
-    let shape = problem.shape.as_ref().expect("a certificate needs a shape");
     let base = problem.evaluate(p, Want::Gradient)?;
+    let value = |p: &[f64]| Ok(numbers(&problem.evaluate(p, Want::Value)?)[0]);
     let objective = base.objective.expect("a certificate needs an objective");
-    let gradient = base.gradient.expect("the gradient was asked for");
-    let span: Vec<f64> = shape.upper.iter().zip(&shape.lower).map(|(high, low)| high - low).collect();
-    let value = |p: &[f64]| -> Result<f64, Error> {
-        Ok(problem.evaluate(p, Want::Value)?.objective.expect("a certificate needs an objective"))
+    let gradient = base.gradient.as_ref().expect("the gradient was asked for");
+    measure(&value, p, objective, gradient, &span(problem), settings, progress)
+}
+
+/// Measures the certificates of a problem's objective and constraints at the design `p`; `progress` is told the name of
+/// the constraint, if it is one, after each direction.
+///
+/// The directions are the same for all, and each design is evaluated once.
+///
+/// # Errors
+/// When an evaluation fails.
+///
+/// # Panics
+/// If the problem has no shape or no objective.
+pub fn certify_all(
+    problem: &Problem,
+    p: &[f64],
+    settings: &Settings,
+    mut progress: impl FnMut(Option<&str>, usize, &Direction),
+) -> Result<Certificates, Error> {
+    let base = problem.evaluate(p, Want::Gradient)?;
+    let span = span(problem);
+    let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
+    let value = |p: &[f64], index: usize| -> Result<f64, Error> {
+        let key: Vec<u64> = p.iter().map(|x| x.to_bits()).collect();
+        if let Some(values) = known.borrow().get(&key) {
+            return Ok(values[index]);
+        }
+        let values = numbers(&problem.evaluate(p, Want::Value)?);
+        let value = values[index];
+        known.borrow_mut().insert(key, values);
+        Ok(value)
     };
-    measure(&value, p, objective, &gradient, &span, settings, progress)
+    let objective = base.objective.expect("a certificate needs an objective");
+    let gradient = base.gradient.as_ref().expect("the gradient was asked for");
+    let function = |p: &[f64]| value(p, 0);
+    let tell = |index: usize, direction: &Direction| progress(None, index, direction);
+    let objective = measure(&function, p, objective, gradient, &span, settings, tell)?;
+    let mut constraints = Vec::with_capacity(problem.constraints.len());
+    for (k, (constraint, measured)) in problem.constraints.iter().zip(&base.constraints).enumerate() {
+        let function = |p: &[f64]| value(p, k + 1);
+        let gradient = measured.gradient.as_ref().expect("the gradient was asked for");
+        let tell = |index: usize, direction: &Direction| progress(Some(&constraint.name), index, direction);
+        let certificate = measure(&function, p, measured.value, gradient, &span, settings, tell)?;
+        constraints.push(Named { name: constraint.name.clone(), certificate });
+    }
+    Ok(Certificates { objective, constraints })
+}
+
+impl Certificates {
+    /// Whether all hold.
+    pub fn hold(&self) -> bool {
+        self.objective.holds && self.constraints.iter().all(|named| named.certificate.holds)
+    }
+}
+
+/// Objective and constraints of a design.
+fn numbers(analysis: &Analysis) -> Vec<f64> {
+    let objective = analysis.objective.expect("a certificate needs an objective");
+    std::iter::once(objective).chain(analysis.constraints.iter().map(|c| c.value)).collect()
+}
+
+/// Distance of the bounds of every variable.
+fn span(problem: &Problem) -> Vec<f64> {
+    let shape = problem.shape.as_ref().expect("a certificate needs a shape");
+    shape.upper.iter().zip(&shape.lower).map(|(high, low)| high - low).collect()
 }
 
 /// Measures the certificate of any function with the value `objective` and what is said to be its gradient at `p`; `span` scales the directions.
@@ -114,7 +202,7 @@ pub fn measure(
     mut progress: impl FnMut(usize, &Direction),
 ) -> Result<Certificate, Error> {
     if objective == 0.0 {
-        let cause = "the objective is zero: there is no field to differentiate; check coils and regions";
+        let cause = "the objective or a constraint is zero: there is no field to differentiate; check coils and regions";
         return Err(Error::Optimisation { cause });
     }
     let value = |direction: &[f64], h: f64| -> Result<f64, Error> {
@@ -141,13 +229,15 @@ pub fn measure(
         let adjoint = slope_along(&direction);
         let h = settings.difference_step;
         let difference = (value(&direction, h)? - value(&direction, -h)?) / (2.0 * h);
+        let linear = remainders.iter().all(|&r| r <= ROUNDING);
+        let unchanged = difference.abs() <= ROUNDING && adjoint.abs() <= ROUNDING;
         let measured = Direction {
-            slope: fitted_slope(&steps, &remainders),
+            slope: if linear { 2.0 } else { fitted_slope(&steps, &remainders) },
             steps,
             remainders,
             adjoint,
             difference,
-            error: ((difference - adjoint) / adjoint).abs(),
+            error: if unchanged { 0.0 } else { ((difference - adjoint) / adjoint).abs() },
         };
         progress(index, &measured);
         directions.push(measured);
@@ -195,6 +285,17 @@ mod tests {
         let mut missing = right;
         missing[2] = f64::NAN;
         assert!(!certify(&missing).holds);
+    }
+
+    #[test]
+    fn a_linear_function_is_certified_and_its_wrong_gradient_is_not() {
+        let linear = |p: &[f64]| Ok(2.0 + 3.0 * p[0] - p[1]);
+        let certify = |gradient: &[f64]| {
+            measure(&linear, &[0.1, 0.2], 2.1, gradient, &[1.0; 2], &Settings::default(), |_, _| {}).unwrap()
+        };
+        assert!(certify(&[3.0, -1.0]).holds);
+        assert!(!certify(&[3.001, -1.0]).holds);
+        assert!(!certify(&[f64::NAN, -1.0]).holds);
     }
 
     #[test]

@@ -4,8 +4,8 @@
 //!
 //! `dF/dx = −2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )`;
 //!
-//! `∂f/∂x` is that of magnets alone: elements that meet a coil do not move. `∂F/∂x` vanishes because the observation
-//! cells do not move.
+//! `∂f/∂x` is that of magnets alone: elements that meet a coil do not move. The part of `dF/dx` at fixed potentials
+//! comes with the functional itself.
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
@@ -17,17 +17,16 @@ use crate::element::{Complex3, impedance, interface, point};
 use crate::error::SolverError;
 use crate::linear::{LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
-use crate::objective::ObjectiveValue;
 use crate::solution::FieldSolution;
 use crate::space::Order;
 use crate::surface::SurfaceTerm;
 
-/// Solves the adjoint problem with the state's prepared system.
+/// Solves the adjoint problem with the state's prepared system for `∂F/∂u` ([`crate::functional`]).
 ///
 /// # Errors
 /// As [`PreparedSystem::solve`].
-pub fn solve(system: &PreparedSystem, objective: &ObjectiveValue) -> Result<FieldSolution, SolverError> {
-    let (values, report): (Vec<c64>, LinearSolverReport) = system.solve(&objective.derivative)?;
+pub fn solve(system: &PreparedSystem, derivative: &[c64]) -> Result<FieldSolution, SolverError> {
+    let (values, report): (Vec<c64>, LinearSolverReport) = system.solve(derivative)?;
     Ok(FieldSolution::adjoint(values, report))
 }
 

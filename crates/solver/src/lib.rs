@@ -2,7 +2,7 @@
 //!
 //! SI units; phasors are peak values with the time factor `exp(+jωt)`; `B = curl A`, `E = −jω(A + ∇ψ)`. A
 //! [`FieldModel`] is what does not change while the mesh moves (materials, coils, boundary conditions, equation
-//! numbers, sparsity pattern); [`FieldModel::solve`] gives a [`FieldSolution`] on a mesh; [`objective`] values it and
+//! numbers, sparsity pattern); [`FieldModel::solve`] gives a [`FieldSolution`] on a mesh; [`functional`] values it and
 //! [`adjoint`] differentiates that value with respect to every node position. Element kernels are pure functions in
 //! [`element`]; the linear solver is chosen in [`linear`] and nowhere else. Optimisation and mesh motion are other
 //! crates' business.
@@ -15,11 +15,11 @@ mod constraint;
 pub mod element;
 pub mod error;
 mod framed;
+pub mod functional;
 pub mod linear;
 mod load;
 pub mod material;
 pub mod model;
-pub mod objective;
 pub mod recovery;
 pub mod solution;
 pub mod space;
@@ -28,10 +28,10 @@ pub mod unknowns;
 
 pub use boundary::{Boundary, UniformField};
 pub use error::SolverError;
+pub use functional::{Functional, FunctionalValue};
 pub use linear::{LinearSolver, LinearSolverReport};
 pub use material::Material;
 pub use model::{FieldModel, FieldModelSetup};
-pub use objective::Objective;
 pub use solution::FieldSolution;
 pub use space::{Order, Space};
 pub use surface::Conductor;

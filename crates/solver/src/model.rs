@@ -2,7 +2,7 @@
 //!
 //! Lives here: the choice of coefficients from materials, of surface terms from interfaces, equation numbers, pattern
 //! and assembly of matrix and load. Does not live here: element formulas ([`crate::element`]), what is done with a
-//! solution ([`crate::solution`], [`crate::objective`]).
+//! solution ([`crate::solution`], [`crate::functional`]).
 
 use std::sync::Arc;
 

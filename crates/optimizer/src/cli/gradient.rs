@@ -6,7 +6,7 @@ use super::{observer, stdout, with_threads};
 use crate::error::Error;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up};
-use crate::verify::{Certificate, Settings, certify};
+use crate::verify::{Certificate, Settings, certify_all};
 
 /// Do what the command line says.
 ///
@@ -27,26 +27,34 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             None => shape.initial.clone(),
         };
         let settings = Settings::default();
-        let certificate = certify(&setup.problem, &p, &settings, |index, direction| {
+        let certificates = certify_all(&setup.problem, &p, &settings, |constraint, index, direction| {
             observer.phase(&format!(
-                "direction {} of {}: slope {:.4}, difference {:.1e}",
+                "{}direction {} of {}: slope {:.4}, difference {:.1e}",
+                constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),
                 index + 1,
                 settings.directions,
                 direction.slope,
                 direction.error
             ));
         })?;
+        let constraints =
+            certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
+        let all: Vec<(&Certificate, &str)> =
+            std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
         if args.common.json {
-            stdout::print_json(&certificate)?;
+            stdout::print_json(&certificates)?;
         } else {
-            stdout::print(&table(&certificate, &settings))?;
+            let tables: Vec<String> =
+                all.iter().map(|(certificate, name)| table(certificate, name, &settings)).collect();
+            stdout::print(&tables.join("\n"))?;
         }
-        if certificate.holds {
+        let Some((certificate, name)) = all.into_iter().find(|(certificate, _)| !certificate.holds) else {
             return Ok(ExitCode::Success);
-        }
+        };
         Err(Error::Certificate {
             cause: format!(
-                "least slope {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} allowed)",
+                "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} \
+                 allowed)",
                 certificate.least_slope,
                 settings.least_slope,
                 certificate.largest_error,
@@ -57,9 +65,9 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
 }
 
 /// The certificate as a table.
-fn table(certificate: &Certificate, settings: &Settings) -> String {
+fn table(certificate: &Certificate, name: &str, settings: &Settings) -> String {
     let mut text = format!(
-        "F = {:.10e}\n\nTaylor remainders |F(p + h d) - F(p) - h g.d| / F(p)\n",
+        "{name} = {:.10e}\n\nTaylor remainders |F(p + h d) - F(p) - h g.d| / F(p)\n",
         certificate.objective
     );
     text += &format!("{:>10}", "h / span");

@@ -1,4 +1,4 @@
-//! `[analysis]`: which field problem is solved, and how exactly.
+//! `[analysis]`: which field problems are solved, and how exactly.
 
 use serde::Serialize;
 
@@ -9,13 +9,25 @@ use super::section::Section;
 /// The field analysis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Analysis {
-    /// Frequency [Hz]; 0: magnetostatic. Required: no value fits most devices.
-    pub frequency: f64,
+    /// Required: no value fits most devices.
+    #[serde(flatten)]
+    pub frequencies: Frequencies,
     /// Penalty reluctivity over reluctivity, ν_p / ν. Default 1: the penalised operator then is the Laplacian in
     /// uniform material, which is what iterative solvers like best.
     pub penalty: f64,
     /// How the linear systems are solved.
     pub linear_solver: LinearSolver,
+}
+
+/// One frequency or several [Hz]; 0: magnetostatic. Each is a field problem of its own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Frequencies {
+    /// One.
+    #[serde(rename = "frequency")]
+    One(f64),
+    /// Several, each once.
+    #[serde(rename = "frequencies")]
+    Several(Vec<f64>),
 }
 
 /// Options of the linear solver.
@@ -34,15 +46,52 @@ impl Default for LinearSolver {
 
 impl Analysis {
     pub(super) fn read(section: &Section<'_>) -> Self {
-        let frequency = section.quantity("frequency", Dimension::Frequency, Range::NOT_NEGATIVE);
+        let frequencies = Frequencies::read(section);
         let penalty = section.number("penalty", Range::POSITIVE).unwrap_or(1.0);
         let linear_solver = section.table("linear_solver").map(LinearSolver::read).unwrap_or_default();
-        Self { frequency: section.need("frequency", frequency, "\"60 Hz\""), penalty, linear_solver }
+        Self { frequencies, penalty, linear_solver }
     }
 
-    /// `2 π f` [rad/s].
-    pub fn angular_frequency(&self) -> f64 {
-        2.0 * std::f64::consts::PI * self.frequency
+    /// All frequencies [Hz], at least one.
+    pub fn frequencies(&self) -> &[f64] {
+        match &self.frequencies {
+            Frequencies::One(frequency) => std::slice::from_ref(frequency),
+            Frequencies::Several(frequencies) => frequencies,
+        }
+    }
+
+    /// The first frequency [Hz].
+    pub fn frequency(&self) -> f64 {
+        self.frequencies()[0]
+    }
+}
+
+impl Frequencies {
+    fn read(section: &Section<'_>) -> Self {
+        let one = section.quantity("frequency", Dimension::Frequency, Range::NOT_NEGATIVE);
+        let several = section.quantity_list("frequencies", Dimension::Frequency, Range::NOT_NEGATIVE);
+        if section.has("frequencies") {
+            if section.has("frequency") {
+                let message = format!("`{}` has both `frequency` and `frequencies`", section.path());
+                section.wrong("frequencies", message, "one of them");
+            }
+            // A list with a fault is not handed out.
+            let several = several.unwrap_or_else(|| vec![f64::NAN]);
+            if several.is_empty() {
+                section.wrong(
+                    "frequencies",
+                    "`analysis.frequencies` is an empty list",
+                    "at least one frequency",
+                );
+                return Self::One(f64::NAN);
+            }
+            if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {
+                let message = format!("`analysis.frequencies` has {} Hz twice", several[twice]);
+                section.wrong("frequencies", message, "each frequency once");
+            }
+            return Self::Several(several);
+        }
+        Self::One(section.need("frequency", one, "\"60 Hz\""))
     }
 }
 

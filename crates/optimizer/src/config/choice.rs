@@ -8,10 +8,10 @@ pub(super) trait Choice: Copy + 'static {
 
 /// Declares such an enum: the word, the variant, and its form in `resolved.toml` stay together.
 macro_rules! choice {
-    ($(#[$meta:meta])* pub enum $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+ }) => {
+    ($(#[$meta:meta])* $vis:vis enum $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-        pub enum $name {
+        $vis enum $name {
             $($(#[$variant_meta])* #[serde(rename = $word)] $variant,)+
         }
 
@@ -21,7 +21,7 @@ macro_rules! choice {
 
         impl $name {
             /// The word of the configuration.
-            pub fn name(self) -> &'static str {
+            $vis fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $word,)+
                 }

@@ -78,13 +78,14 @@ fn check_bounds(section: &Section<'_>, lower: f64, upper: f64, initial: Option<f
     }
 }
 
-fn read_direction(section: &Section<'_>) -> Option<[f64; 3]> {
+/// The vector `direction` of a table, scaled to length one.
+pub(super) fn read_direction(section: &Section<'_>) -> Option<[f64; 3]> {
     let vector = section.numbers::<3>("direction", Range::closed(-1e100, 1e100))?;
     let largest = vector.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
     if largest < 1e-100 {
         section.wrong(
             "direction",
-            "design.direction has no length",
+            format!("{}.direction has no length", section.path()),
             "a vector that is not zero, such as [0.0, 0.0, -1.0]",
         );
         return None;

@@ -18,6 +18,8 @@ pub struct Material {
     pub relative_permeability: f64,
     /// Conductivity [S/m]. Default 0: a material conducts only when it is told to.
     pub conductivity: f64,
+    /// Mass density [kg/m³]; needed where a mass is limited.
+    pub density: Option<f64>,
 }
 
 choice! {
@@ -48,8 +50,9 @@ pub(super) fn read_materials(root: &Section<'_>) -> BTreeMap<String, Material> {
         let conductivity = section
             .quantity("conductivity", Dimension::Conductivity, Range::NOT_NEGATIVE)
             .unwrap_or(left_out);
+        let density = section.quantity("density", Dimension::MassDensity, Range::POSITIVE);
         section.finish();
-        (name, Material { relative_permeability, conductivity })
+        (name, Material { relative_permeability, conductivity, density })
     };
     root.named_tables("materials").into_iter().map(read).collect()
 }

@@ -8,8 +8,10 @@ mod analysis;
 mod boundary;
 mod choice;
 mod coil;
+mod constraint;
 mod design;
 mod fault;
+mod functional;
 mod material;
 mod mesh;
 mod objective;
@@ -30,14 +32,16 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use analysis::{Analysis, LinearSolver};
+pub use analysis::{Analysis, Frequencies, LinearSolver};
 pub use boundary::Boundaries;
 pub use coil::{Axis, Coil, CoilShape, Corner, CornerWord};
+pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::Design;
 pub use fault::{Fault, Place, nearest};
+pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use material::{Material, Region, RegionModel};
 pub use mesh::{BlockMesh, Generator, LengthUnit, MeshConfig, ShieldMesh};
-pub use objective::{Objective, ObjectiveKind, Probe, Weighting};
+pub use objective::{Goal, Objective, Probe, Sum, Term};
 pub use optimizer::{Algorithm, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use quantity::{Dimension, QuantityError, parse_quantity};
@@ -67,8 +71,10 @@ pub struct Config {
     pub coils: Vec<Coil>,
     /// The boundary conditions.
     pub boundaries: Boundaries,
-    /// What is minimised; needed by `run` and `gradient`.
+    /// What is optimised; needed by `run` and `gradient`.
     pub objective: Option<Objective>,
+    /// What must keep within bounds meanwhile.
+    pub constraints: Vec<Constraint>,
     /// What moves; needed by `run`, `gradient` and `morph`.
     pub design: Option<Design>,
     /// How the mesh follows; given when `design` is.
@@ -84,7 +90,7 @@ pub struct Config {
 /// The tables an optimisation needs.
 #[derive(Debug, Clone, Copy)]
 pub struct Optimisation<'a> {
-    /// What is minimised.
+    /// What is optimised.
     pub objective: &'a Objective,
     /// What moves.
     pub design: &'a Design,
@@ -203,7 +209,10 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let title = root.text("title").unwrap_or_else(|| source.stem.clone());
     let mesh = required(&root, "mesh", |section| MeshConfig::read(section, &source.directory));
     let analysis = required(&root, "analysis", Analysis::read);
-    let frequency = analysis.as_ref().map_or(f64::NAN, |analysis| analysis.frequency);
+    // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
+    let frequencies = analysis.as_ref().map_or(&[][..], Analysis::frequencies);
+    let frequencies = if frequencies.iter().any(|f| f.is_nan()) { &[] } else { frequencies };
+    let frequency = frequencies.iter().copied().fold(f64::NAN, f64::min);
     let materials = material::read_materials(&root);
     let regions = material::read_regions(&root, &materials, frequency);
     let coils = coil::read_coils(&root);
@@ -215,13 +224,15 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
         }
         None => Boundaries::default(),
     };
-    let objective = root.table("objective").map(Objective::read);
+    let objective = root.table("objective").map(|section| Objective::read(section, frequencies));
+    let constraints = constraint::read_constraints(&root, frequencies);
     let design = root.table("design").map(Design::read);
     let remesh = root.table("remesh").map(Remesh::read);
     if root.has("design") && !root.has("remesh") {
         root.missing("remesh", "[remesh] with region = \"remesh\": the mesh must follow the design");
     }
-    let optimizer = root.table("optimizer").map(Optimizer::read).unwrap_or_default();
+    let optimizer =
+        root.table("optimizer").map(|s| Optimizer::read(s, constraints.len())).unwrap_or_default();
     let probes = objective::read_probes(&root);
     let output = match root.table("output") {
         Some(section) => Output::read(section, &source.directory, &source.stem),
@@ -237,6 +248,7 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
         coils,
         boundaries,
         objective,
+        constraints,
         design,
         remesh,
         optimizer,

@@ -58,8 +58,16 @@ impl Default for Optimizer {
     }
 }
 
+impl Algorithm {
+    /// Whether the method keeps inequality constraints.
+    pub fn takes_constraints(self) -> bool {
+        matches!(self, Self::Mma | Self::Ccsaq | Self::Slsqp)
+    }
+}
+
 impl Optimizer {
-    pub(super) fn read(section: Section<'_>) -> Self {
+    /// Reads the table of a configuration with so many constraints.
+    pub(super) fn read(section: Section<'_>, constraints: usize) -> Self {
         let default = Self::default();
         let tolerance = |key| section.number(key, Range::half_open(0.0, 1.0));
         let optimizer = Self {
@@ -72,6 +80,10 @@ impl Optimizer {
             xtol_rel: tolerance("xtol_rel").unwrap_or(default.xtol_rel),
             minimum_quality: tolerance("minimum_quality").unwrap_or(default.minimum_quality),
         };
+        if constraints > 0 && !optimizer.algorithm.takes_constraints() {
+            let message = format!("`{}` cannot keep constraints", optimizer.algorithm.name());
+            section.wrong("algorithm", message, "mma, ccsaq or slsqp, or no [[constraints]]");
+        }
         section.finish();
         optimizer
     }

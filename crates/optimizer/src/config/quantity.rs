@@ -22,6 +22,20 @@ pub enum Dimension {
     Angle,
     /// A duration [s].
     Duration,
+    /// A squared magnetic flux density [T²].
+    FluxDensitySquared,
+    /// A squared magnetic flux density, integrated over a volume [T² m³].
+    FluxDensityIntegral,
+    /// A power [W].
+    Power,
+    /// An energy [J].
+    Energy,
+    /// A volume [m³].
+    Volume,
+    /// A mass [kg].
+    Mass,
+    /// A mass density [kg/m³].
+    MassDensity,
 }
 
 /// A unit: `value [SI] = number · factor · 10^exponent`.
@@ -40,7 +54,10 @@ const fn scaled(name: &'static str, dimension: Dimension, factor: f64) -> Unit {
     Unit { name, dimension, factor, exponent: 0 }
 }
 
-use Dimension::{Angle, Conductivity, Current, Duration, FluxDensity, Frequency, Length};
+use Dimension::{
+    Angle, Conductivity, Current, Duration, Energy, FluxDensity, FluxDensityIntegral, FluxDensitySquared,
+    Frequency, Length, Mass, MassDensity, Power, Volume,
+};
 
 /// Every unit that is understood. A unit that may be written in two ways stands twice.
 const UNITS: &[Unit] = &[
@@ -69,6 +86,32 @@ const UNITS: &[Unit] = &[
     decimal("ms", Duration, -3),
     scaled("min", Duration, 60.0),
     scaled("h", Duration, 3600.0),
+    decimal("T2", FluxDensitySquared, 0),
+    decimal("T\u{b2}", FluxDensitySquared, 0),
+    decimal("mT2", FluxDensitySquared, -6),
+    decimal("mT\u{b2}", FluxDensitySquared, -6),
+    decimal("T2 m3", FluxDensityIntegral, 0),
+    decimal("T\u{b2} m\u{b3}", FluxDensityIntegral, 0),
+    decimal("W", Power, 0),
+    decimal("mW", Power, -3),
+    decimal("kW", Power, 3),
+    decimal("J", Energy, 0),
+    decimal("mJ", Energy, -3),
+    decimal("kJ", Energy, 3),
+    decimal("m3", Volume, 0),
+    decimal("m\u{b3}", Volume, 0),
+    decimal("l", Volume, -3),
+    decimal("cm3", Volume, -6),
+    decimal("cm\u{b3}", Volume, -6),
+    decimal("mm3", Volume, -9),
+    decimal("mm\u{b3}", Volume, -9),
+    decimal("kg", Mass, 0),
+    decimal("g", Mass, -3),
+    decimal("t", Mass, 3),
+    decimal("kg/m3", MassDensity, 0),
+    decimal("kg/m\u{b3}", MassDensity, 0),
+    decimal("g/cm3", MassDensity, 3),
+    decimal("g/cm\u{b3}", MassDensity, 3),
 ];
 
 /// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
@@ -96,6 +139,13 @@ impl Dimension {
             FluxDensity => "a flux density",
             Angle => "an angle",
             Duration => "a duration",
+            FluxDensitySquared => "a squared flux density",
+            FluxDensityIntegral => "an integral of a squared flux density",
+            Power => "a power",
+            Energy => "an energy",
+            Volume => "a volume",
+            Mass => "a mass",
+            MassDensity => "a mass density",
         }
     }
 
@@ -109,6 +159,13 @@ impl Dimension {
             FluxDensity => "T",
             Angle => "rad",
             Duration => "s",
+            FluxDensitySquared => "T\u{b2}",
+            FluxDensityIntegral => "T\u{b2} m\u{b3}",
+            Power => "W",
+            Energy => "J",
+            Volume => "m\u{b3}",
+            Mass => "kg",
+            MassDensity => "kg/m\u{b3}",
         }
     }
 
@@ -122,6 +179,13 @@ impl Dimension {
             FluxDensity => "5 mT",
             Angle => "30 deg",
             Duration => "10 min",
+            FluxDensitySquared => "4 mT2",
+            FluxDensityIntegral => "1e-9 T2 m3",
+            Power => "20 W",
+            Energy => "1.5 J",
+            Volume => "400 cm3",
+            Mass => "2.5 kg",
+            MassDensity => "7850 kg/m3",
         }
     }
 
@@ -271,6 +335,14 @@ mod tests {
             ("2 min", Duration, 120.0),
             ("180 deg", Angle, std::f64::consts::PI),
             ("1 in", Length, 0.0254),
+            ("3 mT\u{b2}", FluxDensitySquared, 3e-6),
+            ("2e-9 T2 m3", FluxDensityIntegral, 2e-9),
+            ("20 mW", Power, 0.02),
+            ("1.5 kJ", Energy, 1500.0),
+            ("22 cm\u{b3}", Volume, 22e-6),
+            ("2 l", Volume, 2e-3),
+            ("300 g", Mass, 0.3),
+            ("7.85 g/cm3", MassDensity, 7850.0),
         ];
         for (text, dimension, expected) in cases {
             assert_eq!(parse_quantity(text, dimension), Ok(expected), "{text}");
@@ -310,7 +382,7 @@ mod tests {
     proptest! {
         #[test]
         fn any_text_is_read_or_refused_without_a_panic(text in "\\PC*") {
-            for dimension in [Length, Frequency, Conductivity, Current, FluxDensity, Angle, Duration] {
+            for dimension in [Length, Frequency, Conductivity, Current, FluxDensity, Angle, Duration, Power, Volume] {
                 if let Ok(value) = parse_quantity(&text, dimension) {
                     prop_assert!(value.is_finite());
                 }

@@ -71,6 +71,11 @@ impl<'a> Section<'a> {
         self.table.contains_key(key)
     }
 
+    /// Whether a key is written that is known but not read here.
+    pub(super) fn skip(&self, key: &'static str) -> bool {
+        self.get(key).is_some()
+    }
+
     fn get(&self, key: &'static str) -> Option<&'a Node> {
         self.asked.borrow_mut().push(key);
         self.table.get(key)
@@ -304,6 +309,29 @@ impl<'a> Section<'a> {
         let node = self.get(key)?;
         self.array_of(node, &join(&self.path, key), "whole numbers", |item, path| {
             self.integer_of(item, path, least, most)
+        })
+    }
+
+    /// Any number of quantities, in SI.
+    pub(super) fn quantity_list(
+        &self,
+        key: &'static str,
+        dimension: Dimension,
+        range: Range,
+    ) -> Option<Vec<f64>> {
+        self.list(key, "quantities", |item, path| self.quantity_of(item, path, dimension, range))
+    }
+
+    /// `N` quantities, in SI.
+    pub(super) fn quantities<const N: usize>(
+        &self,
+        key: &'static str,
+        dimension: Dimension,
+        range: Range,
+    ) -> Option<[f64; N]> {
+        let node = self.get(key)?;
+        self.array_of(node, &join(&self.path, key), "quantities", |item, path| {
+            self.quantity_of(item, path, dimension, range)
         })
     }
 

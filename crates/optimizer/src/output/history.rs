@@ -3,34 +3,37 @@
 use serde_json::Value;
 
 use super::{OutputError, RunDirectory, SyncedLog};
-use crate::observer::Evaluation;
+use crate::observer::{Evaluation, column};
 
 /// Both history files of a run.
 #[derive(Debug)]
 pub struct History {
     csv: SyncedLog,
     jsonl: SyncedLog,
+    columns: Vec<String>,
 }
 
 impl History {
-    /// Start both files, the table with its header.
+    /// Start both files, the table with its header; `constraints` are the names of the constraints in their order.
     ///
     /// # Errors
     /// When the operating system refuses.
-    pub fn create(directory: &RunDirectory) -> Result<Self, OutputError> {
+    pub fn create(directory: &RunDirectory, constraints: &[&str]) -> Result<Self, OutputError> {
+        let columns = columns(constraints);
         let mut csv = SyncedLog::create(&directory.history_csv())?;
-        csv.append(&Evaluation::COLUMNS.join(","))?;
-        Ok(Self { csv, jsonl: SyncedLog::create(&directory.history_jsonl())? })
+        csv.append(&columns.join(","))?;
+        Ok(Self { csv, jsonl: SyncedLog::create(&directory.history_jsonl())?, columns })
     }
 
-    /// Go on with the files of an earlier run.
+    /// Go on with the files of an earlier run of the same configuration.
     ///
     /// # Errors
     /// When the operating system refuses.
-    pub fn reopen(directory: &RunDirectory) -> Result<Self, OutputError> {
+    pub fn reopen(directory: &RunDirectory, constraints: &[&str]) -> Result<Self, OutputError> {
         Ok(Self {
             csv: SyncedLog::reopen(&directory.history_csv())?,
             jsonl: SyncedLog::reopen(&directory.history_jsonl())?,
+            columns: columns(constraints),
         })
     }
 
@@ -39,21 +42,27 @@ impl History {
     /// # Errors
     /// When the operating system refuses.
     pub fn append(&mut self, evaluation: &Evaluation) -> Result<(), OutputError> {
-        self.csv.append(&csv_line(evaluation))?;
+        self.csv.append(&csv_line(evaluation, &self.columns))?;
         let line = serde_json::to_string(evaluation).expect("numbers and text have a JSON form");
         self.jsonl.append(&line)
     }
 }
 
+/// The columns of `history.csv`: those of every run, then one for each constraint.
+fn columns(constraints: &[&str]) -> Vec<String> {
+    let fixed = Evaluation::COLUMNS.iter().map(|&name| name.to_owned());
+    fixed.chain(constraints.iter().map(|name| column(name))).collect()
+}
+
 /// The row of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
 /// the device does not have.
-pub fn csv_line(evaluation: &Evaluation) -> String {
+fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
     let value = serde_json::to_value(evaluation).expect("numbers and text have a JSON form");
-    let cell = |column: &&str| match &value[*column] {
+    let cell = |column: &String| match &value[column] {
         Value::Null => String::new(),
         other => other.to_string(),
     };
-    Evaluation::COLUMNS.iter().map(cell).collect::<Vec<_>>().join(",")
+    columns.iter().map(cell).collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]
@@ -75,6 +84,7 @@ mod tests {
             linear_iterations: 57,
             seconds: 4.2,
             round: 0,
+            constraints: [("c_volume".to_owned(), -0.5)].into(),
         }
     }
 
@@ -82,14 +92,16 @@ mod tests {
     fn rows_have_the_documented_columns_and_exact_numbers() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = RunDirectory::create(folder.path(), OlderRun::Keep).expect("a run directory");
-        let mut history = History::create(&run).expect("created");
+        let mut history = History::create(&run, &["volume"]).expect("created");
         history.append(&evaluation()).expect("appended");
         drop(history);
-        History::reopen(&run).and_then(|mut history| history.append(&evaluation())).expect("appended");
+        History::reopen(&run, &["volume"])
+            .and_then(|mut history| history.append(&evaluation()))
+            .expect("appended");
 
-        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,0\n";
+        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,0,-0.5\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
-                      min_thickness_m,max_thickness_m,linear_iterations,seconds,round\n";
+                      min_thickness_m,max_thickness_m,linear_iterations,seconds,round,c_volume\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));
 
@@ -104,6 +116,6 @@ mod tests {
     fn every_column_is_a_field_and_every_field_a_column() {
         let value = serde_json::to_value(evaluation()).expect("an object");
         let keys: Vec<_> = value.as_object().expect("an object").keys().cloned().collect();
-        assert_eq!(keys, Evaluation::COLUMNS);
+        assert_eq!(keys, columns(&["volume"]));
     }
 }

@@ -12,11 +12,12 @@ use std::path::PathBuf;
 
 pub use design_file::{DesignFileError, read_design};
 pub use files::{SyncedLog, write_atomic, write_atomic_with};
-pub use history::{History, csv_line};
+pub use history::History;
 pub use manifest::{FileHash, Host, Manifest, MeshHash, RunStatus, blake3_hex};
 pub use process::{hostname, peak_memory_bytes, utc_timestamp};
 pub use result::{
-    DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult, StopReason,
+    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
+    StateResult, StopReason, TermResult,
 };
 pub use run_directory::{OlderRun, RunDirectory};
 

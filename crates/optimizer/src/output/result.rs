@@ -25,14 +25,23 @@ pub struct RunResult {
     pub iterations: usize,
     /// The objective; `None` when the configuration has none.
     pub objective: Option<ObjectiveResult>,
+    /// The constraints at the best design, in the order of the configuration.
+    #[serde(default)]
+    pub constraints: Vec<ConstraintResult>,
     /// The best design; `None` when the configuration has none.
     pub design: Option<DesignResult>,
     /// The mesh.
     pub mesh: MeshResult,
-    /// The field at the probes.
+    /// The frequencies [Hz] in the order of the configuration.
+    #[serde(default)]
+    pub frequencies_hz: Vec<f64>,
+    /// The field at the probes, at the first frequency.
     pub probes: Vec<ProbeResult>,
-    /// Eddy-current loss by region, of the meshed part [W].
+    /// Eddy-current loss by region, of the meshed part, at the first frequency [W].
     pub losses_w: BTreeMap<String, f64>,
+    /// Losses and probes at every frequency; only where there are several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<StateResult>,
     /// The linear systems.
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
@@ -117,6 +126,48 @@ pub struct ObjectiveResult {
     pub ratio: f64,
     /// The evaluation of the best design.
     pub best_evaluation: usize,
+    /// The terms at the best design.
+    #[serde(default)]
+    pub terms: Vec<TermResult>,
+}
+
+/// One term of an objective.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TermResult {
+    /// What it measures, in the words of the configuration.
+    pub kind: String,
+    /// Its region; `null` for everything that is meshed.
+    pub region: Option<String>,
+    /// Its frequency [Hz]; `null` for the sum over all.
+    pub frequency: Option<f64>,
+    /// Its factor in the objective.
+    pub weight: f64,
+    /// Its value without the factor, in SI.
+    pub value: f64,
+}
+
+/// One constraint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstraintResult {
+    /// Its name.
+    pub name: String,
+    /// Its value, in SI.
+    pub value: f64,
+    /// Its bound, in SI.
+    pub bound: f64,
+    /// Whether the value keeps within the bound.
+    pub satisfied: bool,
+}
+
+/// What depends on the frequency.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StateResult {
+    /// The frequency [Hz].
+    pub frequency_hz: f64,
+    /// Eddy-current loss by region, of the meshed part [W].
+    pub losses_w: BTreeMap<String, f64>,
+    /// The field at the probes.
+    pub probes: Vec<ProbeResult>,
 }
 
 /// The best design.
@@ -201,7 +252,25 @@ pub(crate) mod tests {
             stop_reason: StopReason::ObjectiveConverged,
             evaluations: 8,
             iterations: 7,
-            objective: Some(ObjectiveResult { initial: 2.0, best: 1.0, ratio: 0.5, best_evaluation: 7 }),
+            objective: Some(ObjectiveResult {
+                initial: 2.0,
+                best: 1.0,
+                ratio: 0.5,
+                best_evaluation: 7,
+                terms: vec![TermResult {
+                    kind: "loss".to_owned(),
+                    region: Some("plate".to_owned()),
+                    frequency: None,
+                    weight: 1.0,
+                    value: 1.0,
+                }],
+            }),
+            constraints: vec![ConstraintResult {
+                name: "volume_plate".to_owned(),
+                value: 1e-3,
+                bound: 1e-3,
+                satisfied: true,
+            }],
             design: Some(DesignResult {
                 values_m: vec![0.02],
                 lower_m: vec![-0.005],
@@ -215,8 +284,10 @@ pub(crate) mod tests {
                 worst_quality_initial: 0.48,
                 worst_quality_final: 0.1,
             },
+            frequencies_hz: vec![60.0],
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
+            states: vec![],
             linear_solver: LinearSolverResult { worst_residual: 1e-11 },
             timings_s: [("total".to_owned(), 12.0)].into(),
             peak_memory_bytes: 1 << 20,

@@ -1,4 +1,4 @@
-//! The field problem of a configuration.
+//! The field problems of a configuration.
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_solver::coil::{self, Racetrack};
@@ -68,10 +68,20 @@ fn exposed_surface(
         .collect())
 }
 
-/// The field model of a configuration on its mesh.
-pub(super) fn field_model(
+/// The field models of a configuration on its mesh, one a frequency.
+pub(super) fn field_models(
     config: &Config,
     mesh: &Mesh,
+    impedance_surfaces: &[Conductor],
+) -> Result<Vec<FieldModel>, Error> {
+    let at = |&frequency: &f64| field_model(config, mesh, frequency, impedance_surfaces.to_vec());
+    config.analysis.frequencies().iter().map(at).collect()
+}
+
+fn field_model(
+    config: &Config,
+    mesh: &Mesh,
+    frequency: f64,
     impedance_surfaces: Vec<Conductor>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
@@ -86,7 +96,7 @@ pub(super) fn field_model(
         ..LinearSolverSettings::default()
     };
     let setup = FieldModelSetup {
-        frequency: config.analysis.frequency,
+        frequency,
         penalty: config.analysis.penalty,
         materials,
         impedance_surfaces,

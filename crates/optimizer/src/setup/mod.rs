@@ -1,18 +1,18 @@
 //! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
-//! keys. `field` makes the field problem, `shape` the design surface and the elastic map.
+//! keys. `field` makes the field problems, `functional` objective and constraints, `shape` the design surface and the elastic map.
 
 mod field;
+mod functional;
 mod shape;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{block, shield};
 use fluxmorph_geometry::{Mesh, MeshError, RegionId, Topology};
+use fluxmorph_solver::Material;
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
-use fluxmorph_solver::objective::Weighting;
 use fluxmorph_solver::recovery::locate;
-use fluxmorph_solver::{Material, Objective};
 
 use crate::config::{self, Config, Fault, MeshConfig, RegionModel, Source};
 use crate::error::Error;
@@ -107,19 +107,17 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     }
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
     source.check(probe_faults(config, source, &full_mesh, &mesh))?;
-    let model = field::field_model(config, &mesh, conductors)?;
-    let objective = match &config.objective {
-        Some(objective) => Some(self::objective(objective, &mesh)?),
-        None => None,
-    };
-    let shape = match (&config.design, &config.remesh) {
-        (Some(design), Some(remesh)) => {
-            let inputs = shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh };
-            Some(shape::shape(&inputs, config, &model, objective.as_ref(), &mut warnings)?)
-        }
-        _ => None,
-    };
-    let problem = Problem { reference: mesh, states: vec![model], objective, shape };
+    let states = field::field_models(config, &mesh, &conductors)?;
+    let objective = functional::objective(config, &mesh, &states)?;
+    let (mut shape, mut constraints) = (None, Vec::new());
+    if let (Some(design), Some(remesh)) = (&config.design, &config.remesh) {
+        let inputs = shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh };
+        let observed = functional::observed(config, &mesh, &states)?;
+        let made = shape::shape(&inputs, config, &states[0], &observed, &mut warnings)?;
+        constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
+        shape = Some(made);
+    }
+    let problem = Problem { reference: mesh, states, objective, constraints, shape };
     Ok(Setup { problem, audits, warnings, full_mesh })
 }
 
@@ -141,27 +139,18 @@ pub fn variable_count(config: &Config, source: &Source) -> Result<usize, Error> 
     Ok(triangles.iter().flatten().collect::<std::collections::BTreeSet<_>>().len())
 }
 
-/// The objective on a mesh.
-fn objective(objective: &config::Objective, mesh: &Mesh) -> Result<Objective, Error> {
-    let weighting = match objective.weighting {
-        config::Weighting::Point => Weighting::Point,
-        config::Weighting::Volume => Weighting::Volume,
-    };
-    Ok(Objective::new(mesh, mesh.topology().region(&objective.region)?, weighting)?)
-}
-
-/// Skin-depth audits of all conductors on the mesh with all regions.
+/// Skin-depth audits of all conductors at all frequencies, on the mesh with all regions.
 fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
-    config
-        .regions
-        .iter()
-        .filter_map(|(name, region)| {
-            let id = mesh.topology().region(name).ok()?;
-            let material = material(config, name);
-            let audit = skin_audit(mesh, id, &material, config.analysis.frequency)?;
+    let of = |(name, region): (&String, &config::Region)| {
+        let id = mesh.topology().region(name).ok()?;
+        let material = material(config, name);
+        let at = |&frequency: &f64| {
+            let audit = skin_audit(mesh, id, &material, frequency)?;
             Some(Audited { audit, model: region.model })
-        })
-        .collect()
+        };
+        Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
+    };
+    config.regions.iter().filter_map(of).flatten().collect()
 }
 
 /// The material of a region; air where the configuration says nothing.
@@ -193,8 +182,8 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
     for name in config.regions.keys() {
         region(format!("regions.{name}"), name);
     }
-    if let Some(objective) = &config.objective {
-        region("objective.region".to_owned(), &objective.region);
+    for (path, name) in functional::regions(config) {
+        region(path, name);
     }
     if let Some(remesh) = &config.remesh {
         if let config::RemeshExtent::Regions(names) = &remesh.extent {
@@ -223,18 +212,7 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
     {
         faults.push(source.unknown_name("design.surface", "surface", &design.surface, &surfaces));
     }
-    let impedance =
-        |name: &str| config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);
-    if let Some(objective) = config.objective.as_ref().filter(|o| impedance(&o.region)) {
-        faults.push(
-            source
-                .fault(
-                    "objective.region",
-                    format!("`{}` is replaced by its impedance surface", objective.region),
-                )
-                .expected("a region that is meshed, such as air"),
-        );
-    }
+    faults.extend(functional::faults(config, source, topology));
     faults
 }
 

@@ -9,7 +9,7 @@ use fluxmorph_remesh::check_step;
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
 };
-use fluxmorph_solver::{FieldModel, Objective};
+use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
 use crate::config::{Config, Design, Fault, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
@@ -33,7 +33,7 @@ pub(super) fn shape(
     inputs: &Inputs<'_>,
     config: &Config,
     model: &FieldModel,
-    objective: Option<&Objective>,
+    observed: &[(String, Vec<ElementId>)],
     warnings: &mut Vec<String>,
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
@@ -78,7 +78,7 @@ pub(super) fn shape(
         ));
     }
     let setup = remesh_setup(inputs, &surface, warnings)?;
-    overlap_faults(inputs, &setup, model, objective)?;
+    overlap_faults(inputs, &setup, model, observed)?;
     let map = ElasticMap::new(mesh, setup)?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
@@ -253,19 +253,16 @@ fn overlap_faults(
     inputs: &Inputs<'_>,
     setup: &RemeshSetup,
     model: &FieldModel,
-    objective: Option<&Objective>,
+    observed: &[(String, Vec<ElementId>)],
 ) -> Result<(), Error> {
     let Inputs { source, mesh, .. } = *inputs;
     let moving: BTreeSet<ElementId> =
         setup.subregions.iter().flat_map(|s| s.elements.iter().copied()).collect();
     let mut faults = Vec::new();
-    if objective.is_some_and(|o| o.elements().any(|e| moving.contains(&e))) {
+    for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(|e| moving.contains(e))) {
         faults.push(
             source
-                .fault(
-                    "objective.region",
-                    "the observation region lies inside the remesh region and would move",
-                )
+                .fault(path, "the observation region lies inside the remesh region and would move")
                 .expected("an observation region that no remesh region holds")
                 .help("take the region out of remesh.region, or shrink remesh.box"),
         );

@@ -8,8 +8,10 @@
 //! `curl·curl + div·div` and `∇:∇` is a null Lagrangian, that is, a surface integral. So for `p = 1` the three
 //! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
 //! order, [`interface`] the triangles, [`impedance`] the Leontovich surface; [`lagrange`] and [`quadrature`] what they
-//! are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions.
+//! are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
+//! [`density`] integrals of energy and loss with their derivatives.
 
+pub mod density;
 pub mod impedance;
 pub mod interface;
 pub mod lagrange;

@@ -79,10 +79,116 @@ const CASES: &[Case] = &[
     ("\"y_min\"]", "\"y_min\"]\nuniform_field = {}", "boundaries.uniform_field", "not supported", 23),
     (
         "region = \"observation\"",
-        "region = \"observation\"\nkind = \"loss\"",
+        "region = \"observation\"\nkind = \"lost\"",
         "objective.kind",
         "cannot be",
         25,
+    ),
+    ("\"60 Hz\"", "60\nfrequencies = [60]", "analysis.frequencies", "both", 7),
+    ("frequency = \"60 Hz\"", "frequencies = []", "analysis.frequencies", "is an empty list", 6),
+    ("frequency = \"60 Hz\"", "frequencies = [50, 200, 50]", "analysis.frequencies", "has 50 Hz twice", 6),
+    ("frequency = \"60 Hz\"", "frequencies = [50, \"1 m\"]", "analysis.frequencies[1]", "is a length", 6),
+    (
+        "region = \"observation\"",
+        "region = \"observation\"\ngoal = \"min\"",
+        "objective.goal",
+        "cannot be",
+        25,
+    ),
+    ("region = \"observation\"", "region = \"observation\"\nweight = 0", "objective.weight", "no effect", 25),
+    ("region = \"observation\"", "kind = \"loss\"", "objective.region", "missing key", 23),
+    (
+        "region = \"observation\"",
+        "region = \"observation\"\nkind = \"uniformity\"",
+        "objective.target",
+        "missing key",
+        23,
+    ),
+    (
+        "region = \"observation\"",
+        "region = \"observation\"\ntarget = [0, 0, \"0.5 T\"]",
+        "objective.target",
+        "no use for the kind `flux_density_squared`",
+        25,
+    ),
+    (
+        "region = \"observation\"",
+        "region = \"observation\"\nkind = \"field_component\"\ndirection = [0, 0, 0]",
+        "objective.direction",
+        "has no length",
+        26,
+    ),
+    (
+        "region = \"observation\"",
+        "region = \"observation\"\nfrequency = \"50 Hz\"",
+        "objective.frequency",
+        "not analysed",
+        25,
+    ),
+    (
+        "region = \"observation\"",
+        "weight = 2\n[[objective.terms]]\nregion = \"observation\"",
+        "objective.weight",
+        "both `terms` and `weight`",
+        24,
+    ),
+    ("region = \"observation\"", "terms = []", "objective.terms", "has no term", 24),
+    ("[optimizer]", "[[constraints]]\n[optimizer]", "constraints[0].kind", "missing key", 34),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"volum\"\n[optimizer]",
+        "constraints[0].kind",
+        "cannot be `volum`",
+        35,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper = \"5 mm\"\n[optimizer]",
+        "constraints[0].upper",
+        "is a length, not a volume",
+        37,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\n[optimizer]",
+        "constraints[0].upper",
+        "missing key",
+        34,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"energy\"\nupper = \"1 J\"\nupper_ratio = 0.9\n[optimizer]",
+        "constraints[0].upper_ratio",
+        "both",
+        37,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"thickness\"\nminimum = 0.02\nmaximum = 0.01\n[optimizer]",
+        "constraints[0].maximum",
+        "at most",
+        37,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"thickness\"\n[optimizer]",
+        "constraints[0].minimum",
+        "missing key",
+        34,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"volume\"\nname = \"a,b\"\nregion = \"plate\"\nupper = 1\n[optimizer]",
+        "constraints[0].name",
+        "`a,b`",
+        36,
+    ),
+    (
+        "[optimizer]",
+        "[[constraints]]\nkind = \"thickness\"\nminimum = 0.01\n[optimizer]\nalgorithm = \"lbfgs\"",
+        "optimizer.algorithm",
+        "`lbfgs` cannot keep constraints",
+        38,
     ),
     ("[1.0, 2.0, -2.5]", "[0, 0, 0]", "design.direction", "has no length", 27),
     ("[1.0, 2.0, -2.5]", "[0, 0, nan]", "design.direction[2]", "not a finite number", 27),
@@ -191,6 +297,23 @@ fn an_impedance_surface_needs_a_frequency_and_a_conductor() {
         .replace("material = \"steel\"", "material = \"steel\"\nmodel = \"impedance\"");
     let shown = report(&text).to_string();
     assert!(shown.contains("the frequency is 0 Hz") && shown.contains("`steel` does not conduct"), "{shown}");
+}
+
+#[test]
+fn a_loss_needs_a_frequency_above_zero() {
+    let loss = SMALL.replace("region = \"observation\"", "region = \"plate\"\nkind = \"loss\"");
+    assert!(Config::from_str(&loss, "small.toml").is_ok());
+    let shown = report(&loss.replace("\"60 Hz\"", "0")).to_string();
+    assert!(shown.contains("`objective` is a loss at 0 Hz") && shown.contains("small.toml:25:"), "{shown}");
+    let several = loss.replace("frequency = \"60 Hz\"", "frequencies = [0, 60]");
+    assert!(Config::from_str(&several, "small.toml").is_ok(), "a sum over frequencies has a loss at 60 Hz");
+}
+
+#[test]
+fn two_constraints_of_one_name_are_refused() {
+    let one = "[[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper_ratio = 0.9\n";
+    let shown = report(&SMALL.replace("[optimizer]", &format!("{one}{one}[optimizer]"))).to_string();
+    assert!(shown.contains("two constraints are named `volume_plate`"), "{shown}");
 }
 
 #[test]

@@ -48,6 +48,48 @@ name = "behind"
 points = [["0 mm", "0 mm", "-50 mm"]]
 "#;
 
+/// An objective with terms of all kinds.
+const SUM: &str = r#"goal = "maximise"
+[[objective.terms]]
+kind = "flux_density_squared"
+region = "observation"
+weighting = "volume"
+[[objective.terms]]
+kind = "uniformity"
+region = "observation"
+target = ["0 T", "0 T", "5 mT"]
+weight = -2.5
+[[objective.terms]]
+kind = "field_component"
+region = "observation"
+direction = [1, 2, 2]
+[[objective.terms]]
+kind = "loss"
+region = "plate"
+frequency = "60 Hz"
+[[objective.terms]]
+kind = "energy""#;
+
+/// Constraints of all kinds.
+const CONSTRAINTS: &str = r#"[[constraints]]
+kind = "flux_density_squared"
+region = "observation"
+upper = "3 mT2"
+[[constraints]]
+kind = "loss"
+region = "plate"
+upper = "20 W"
+[[constraints]]
+name = "lighter"
+kind = "mass"
+region = "plate"
+upper_ratio = 0.9
+[[constraints]]
+kind = "thickness"
+minimum = "6 mm"
+maximum = "25 mm"
+[optimizer]"#;
+
 fn shipped(name: &str) -> (Config, Source) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(name);
     Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -111,7 +153,11 @@ fn values_are_in_si_and_defaults_filled_in() {
     assert_eq!(config.title, "small");
     assert_eq!(
         config.analysis,
-        Analysis { frequency: 60.0, penalty: 1.0, linear_solver: LinearSolver::default() }
+        Analysis {
+            frequencies: Frequencies::One(60.0),
+            penalty: 1.0,
+            linear_solver: LinearSolver::default()
+        }
     );
     assert_eq!(config.coils[0].half_window, [0.06, 0.16]);
     assert!((config.coils[0].phase - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
@@ -123,6 +169,23 @@ fn values_are_in_si_and_defaults_filled_in() {
     assert_eq!((remesh.poisson, remesh.stiffness), (0.3, StiffnessLaw::InverseSize));
     let length: f64 = config.design.expect("design").direction.iter().map(|x| x * x).sum();
     assert!((length - 1.0).abs() < 1e-15);
+}
+
+#[test]
+fn objectives_and_constraints_are_in_si_with_their_names() {
+    let text = SMALL.replace("region = \"observation\"", SUM).replace("[optimizer]", CONSTRAINTS);
+    let (config, _) = Config::from_str(&text, "small.toml").unwrap_or_else(|error| panic!("{error}"));
+    let objective = config.objective.expect("an objective");
+    assert_eq!((objective.goal, objective.terms().len()), (Goal::Maximise, 5));
+    assert_eq!(objective.terms()[1].functional.target, Some([0.0, 0.0, 0.005]));
+    assert_eq!(objective.terms()[1].weight, -2.5);
+    assert_eq!(objective.terms()[3].functional.frequency, Some(60.0));
+    let names: Vec<_> = config.constraints.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["flux_density_squared_observation", "loss_plate", "lighter", "thickness"]);
+    let Limit::Field { bound, .. } = &config.constraints[0].limit else { panic!("a bound on the field") };
+    assert_eq!(*bound, UpperBound::Value(3e-6));
+    let Limit::Body { bound, .. } = &config.constraints[2].limit else { panic!("a bound on a body") };
+    assert_eq!(*bound, UpperBound::Ratio(0.9));
 }
 
 #[test]
@@ -144,6 +207,8 @@ fn a_resolved_configuration_reads_back_as_itself() {
             "[[remesh.subregions]]\nname = \"plate\"\nforce = [0, 0, 1.5]\n[optimizer]",
         ),
         "[mesh]\ngenerator = \"block\"\n[analysis]\nfrequency = 0".to_owned(),
+        SMALL.replace("frequency = \"60 Hz\"", "frequencies = [\"50 Hz\", \"1 kHz\"]"),
+        SMALL.replace("region = \"observation\"", SUM).replace("[optimizer]", CONSTRAINTS),
     ];
     for text in &variants {
         let (config, _) = Config::from_str(text, "small.toml").unwrap_or_else(|error| panic!("{error}"));

@@ -24,7 +24,7 @@ fn overrides_replace_add_and_reach_into_lists() {
         "title=a = b",
     ];
     let (config, source) = with(&overrides).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(config.analysis.frequency, 50.0);
+    assert_eq!(config.analysis.frequency(), 50.0);
     assert_eq!(config.analysis.linear_solver.tolerance, 1e-12);
     assert_eq!(config.optimizer.algorithm, Algorithm::Ccsaq);
     assert_eq!(config.optimizer.max_evaluations, 3);
@@ -39,7 +39,7 @@ fn overrides_replace_add_and_reach_into_lists() {
 #[test]
 fn the_last_override_of_a_key_holds() {
     let (config, _) = with(&["analysis.frequency=50", "analysis.frequency=70"]).expect("good");
-    assert_eq!(config.analysis.frequency, 70.0);
+    assert_eq!(config.analysis.frequency(), 70.0);
 }
 
 #[test]

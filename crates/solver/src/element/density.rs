@@ -1,0 +1,257 @@
+//! Integrals of real densities over one element, with their derivatives: field energy, eddy-current loss.
+//!
+//! For an integral of a density `j` of `∂_i A_j`, `A` and `∂_i ψ` on a straight-sided tetrahedron and at fixed nodal
+//! values, moving vertex `k` gives `V ⟨S⟩ ∇λ_k` with the tensor `S_di = j δ_di − (terms of dj with ∂_i replaced by
+//! ∂_d)`, as in [`super::point`]. The quadrature is exact for each order. Derivatives by the complex nodal values are
+//! halved, so that `d(∫j) = 2 Re Σ derivative · d(value)`.
+
+use fluxmorph_geometry::fem::{LocalMatrix, c64};
+use fluxmorph_geometry::tet4::{Point, Tet4};
+
+use super::impedance::{self, ImpedanceTriangle};
+use super::lagrange::Lagrange;
+use super::point::{self, PointField};
+use super::quadrature::{self, Node};
+use super::volume::NodalField;
+use super::{Complex3, cross3, dot3};
+
+/// A real integral over an element of `N` nodes with `M` vertices, and its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementIntegral<const N: usize, const M: usize> {
+    /// The integral.
+    pub value: f64,
+    /// By the nodal `A_x, A_y, A_z, ψ`, shape `(N, 4)`: `d value = 2 Re Σ potentials · d(potential)`.
+    pub potentials: [[c64; 4]; N],
+    /// By the positions of the vertices at fixed potentials, shape `(M, 3)`.
+    pub positions: [Point; M],
+}
+
+/// `f ∫|curl A − B_r|² dV` over a tetrahedron; `remanence` is `B_r` [T], zero outside magnets.
+pub fn flux_energy<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    factor: f64,
+    remanence: Point,
+    field: &NodalField<N>,
+) -> ElementIntegral<N, 4> {
+    let rule: &[Node] = if N == 4 { &[([0.25; 4], 1.0)] } else { quadrature::degree_2() };
+    integrate(shape, tet, rule, field, |at| {
+        let b = at.flux_density();
+        let conjugate: Complex3 = std::array::from_fn(|d| (b[d] - remanence[d]).conj());
+        let square: f64 = conjugate.iter().map(|c| c.norm_sqr()).sum();
+        // δ(∂_i A_j) = −∂_i λ_k ∂_d A_j, hence conj(b)·δb = −∇λ_k · (∂_d A × conj(b)).
+        let turned: [Complex3; 3] = at.gradient.map(|row| cross3(row, conjugate));
+        Density {
+            value: factor * square,
+            by_curl: conjugate.map(|c| factor * c),
+            by_drive: [c64::default(); 3],
+            replaced: turned.map(|row| row.map(|c| -2.0 * factor * c.re)),
+        }
+    })
+}
+
+/// `f ∫|A + ∇ψ|² dV` over a tetrahedron.
+pub fn eddy_loss<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    factor: f64,
+    field: &NodalField<N>,
+) -> ElementIntegral<N, 4> {
+    let rule: &[Node] = if N == 4 { quadrature::degree_2() } else { quadrature::degree_5() };
+    integrate(shape, tet, rule, field, |at| {
+        let conjugate = at.electric_potential().map(|c| c.conj());
+        let square: f64 = conjugate.iter().map(|c| c.norm_sqr()).sum();
+        Density {
+            value: factor * square,
+            by_curl: [c64::default(); 3],
+            by_drive: conjugate.map(|c| factor * c),
+            replaced: at.scalar_gradient.map(|slope| conjugate.map(|c| -2.0 * factor * (c * slope).re)),
+        }
+    })
+}
+
+/// A density at a point and its derivatives, halved as in the module's documentation.
+struct Density {
+    value: f64,
+    /// By `curl A`.
+    by_curl: Complex3,
+    /// By `A + ∇ψ`.
+    by_drive: Complex3,
+    /// The terms of `S_di` with `∂_i` replaced by `∂_d`, index `[d][i]`.
+    replaced: [Point; 3],
+}
+
+/// The integral of a density by a quadrature rule.
+fn integrate<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    rule: &[Node],
+    field: &NodalField<N>,
+    density: impl Fn(&PointField) -> Density,
+) -> ElementIntegral<N, 4> {
+    let mut integral =
+        ElementIntegral { value: 0.0, potentials: [[c64::default(); 4]; N], positions: [[0.0; 3]; 4] };
+    let mut tensor = [[0.0; 3]; 3];
+    for (lambda, share) in rule {
+        let at = density(&PointField::new(shape, tet, lambda, field));
+        let weight = share * tet.volume;
+        integral.value += weight * at.value;
+        for (a, derivative) in integral.potentials.iter_mut().enumerate() {
+            let (n, g) = (shape.value(a, lambda), point::gradient(shape, tet, lambda, a));
+            // by_curl·(∇N × A) = (by_curl × ∇N)·A.
+            let turned = cross3(at.by_curl, g.map(c64::from));
+            for d in 0..3 {
+                derivative[d] += weight * (turned[d] + n * at.by_drive[d]);
+                derivative[3] += weight * g[d] * at.by_drive[d];
+            }
+        }
+        for d in 0..3 {
+            tensor[d][d] += share * at.value;
+            for i in 0..3 {
+                tensor[d][i] += share * at.replaced[d][i];
+            }
+        }
+    }
+    integral.positions = tet
+        .gradients
+        .map(|g| std::array::from_fn(|d| tet.volume * (0..3).map(|i| tensor[d][i] * g[i]).sum::<f64>()));
+    integral
+}
+
+/// `f ∫|A_t|² dS` over a triangle, `A_t` the tangential part.
+pub fn surface_loss<const N: usize>(
+    shape: &'static Lagrange<N, 3>,
+    vertices: [Point; 3],
+    factor: f64,
+    potential: &[Complex3; N],
+) -> ElementIntegral<N, 3> {
+    let coefficient = c64::new(factor, 0.0);
+    let matrix = ImpedanceTriangle::new(shape, vertices, coefficient);
+    let conjugate = potential.map(|a| a.map(|c| c.conj()));
+    let mut potentials = [[c64::default(); 4]; N];
+    for a in 0..N {
+        for b in 0..N {
+            let block = matrix.block(a, b);
+            for i in 0..3 {
+                for j in 0..3 {
+                    potentials[b][j] += conjugate[a][i] * block[i][j];
+                }
+            }
+        }
+    }
+    let product = |b: usize| dot3([potentials[b][0], potentials[b][1], potentials[b][2]], potential[b]);
+    let positions = impedance::shape_derivative(shape, vertices, coefficient, &conjugate, potential)
+        .map(|row| row.map(|c| c.re));
+    ElementIntegral { value: (0..N).map(product).sum::<c64>().re, potentials, positions }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::volume::tests::{SKEW, noise};
+    use super::*;
+
+    type Components<const N: usize> = [[c64; 4]; N];
+
+    fn values<const N: usize>(seed: u32) -> Components<N> {
+        std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (4 * a + c) as u32)))
+    }
+
+    /// Both derivatives of an element integral against central differences.
+    fn derivatives_hold<const N: usize, const M: usize>(
+        vertices: [Point; M],
+        integral: impl Fn([Point; M], Components<N>) -> ElementIntegral<N, M>,
+    ) {
+        let field = values::<N>(11);
+        let exact = integral(vertices, field);
+        // Truncation and rounding of a central difference of values of order one balance near 1e-5.
+        let (h, tolerance) = (1e-5, 1e-8 * (1.0 + exact.value.abs()));
+        for a in 0..N {
+            for c in 0..4 {
+                for direction in [c64::new(1.0, 0.0), c64::new(0.0, 1.0)] {
+                    let at = |s: f64| {
+                        let mut moved = field;
+                        moved[a][c] += s * direction;
+                        integral(vertices, moved).value
+                    };
+                    let difference = (at(h) - at(-h)) / (2.0 * h);
+                    let derivative = 2.0 * (exact.potentials[a][c] * direction).re;
+                    assert!((difference - derivative).abs() < tolerance, "potential {c} of node {a}");
+                }
+            }
+        }
+        for k in 0..M {
+            for d in 0..3 {
+                let at = |s: f64| {
+                    let mut moved = vertices;
+                    moved[k][d] += s;
+                    integral(moved, field).value
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!(
+                    (difference - exact.positions[k][d]).abs() < tolerance,
+                    "direction {d} of vertex {k}"
+                );
+            }
+        }
+    }
+
+    const REMANENCE: Point = [0.4, -0.2, 0.9];
+
+    #[test]
+    fn the_derivatives_of_the_energy_match_central_differences() {
+        derivatives_hold::<4, 4>(SKEW, |x, u| {
+            flux_energy(Lagrange::<4, 4>::tet(), &Tet4::new(x), 0.7, REMANENCE, &NodalField::new(u))
+        });
+        derivatives_hold::<10, 4>(SKEW, |x, u| {
+            flux_energy(Lagrange::<10, 4>::tet(), &Tet4::new(x), 0.7, REMANENCE, &NodalField::new(u))
+        });
+    }
+
+    #[test]
+    fn the_derivatives_of_the_eddy_loss_match_central_differences() {
+        derivatives_hold::<4, 4>(SKEW, |x, u| {
+            eddy_loss(Lagrange::<4, 4>::tet(), &Tet4::new(x), 1.3, &NodalField::new(u))
+        });
+        derivatives_hold::<10, 4>(SKEW, |x, u| {
+            eddy_loss(Lagrange::<10, 4>::tet(), &Tet4::new(x), 1.3, &NodalField::new(u))
+        });
+    }
+
+    #[test]
+    fn the_derivatives_of_the_surface_loss_match_central_differences() {
+        let triangle = [SKEW[0], SKEW[1], SKEW[3]];
+        let vector = |[x, y, z, _]: [c64; 4]| [x, y, z];
+        derivatives_hold::<3, 3>(triangle, |x, u| {
+            surface_loss(Lagrange::<3, 3>::triangle(), x, 0.9, &u.map(vector))
+        });
+        derivatives_hold::<6, 3>(triangle, |x, u| {
+            surface_loss(Lagrange::<6, 3>::triangle(), x, 0.9, &u.map(vector))
+        });
+    }
+
+    #[test]
+    fn a_uniform_field_has_the_energy_of_its_volume() {
+        // A = ½ b × x has the curl b.
+        let (tet, b) = (Tet4::new(SKEW), [0.3, -0.4, 1.2]);
+        let field = NodalField::new(SKEW.map(|x| {
+            let a = fluxmorph_geometry::tet4::cross(b, x).map(|c| c64::new(0.5 * c, 0.0));
+            [a[0], a[1], a[2], c64::default()]
+        }));
+        let shape = Lagrange::<4, 4>::tet();
+        let energy = flux_energy(shape, &tet, 2.0, [0.0; 3], &field).value;
+        assert!((energy - 2.0 * 1.69 * tet.volume).abs() < 1e-14, "|b|² = 1.69");
+        assert!(flux_energy(shape, &tet, 2.0, b, &field).value < 1e-28, "a magnet at its remanence");
+    }
+
+    #[test]
+    fn a_constant_potential_has_the_loss_of_its_volume_and_its_face() {
+        let tet = Tet4::new(SKEW);
+        let constant = [c64::new(0.0, 2.0), c64::default(), c64::default(), c64::default()];
+        let loss = eddy_loss(Lagrange::<4, 4>::tet(), &tet, 0.5, &NodalField::new([constant; 4])).value;
+        assert!((loss - 2.0 * tet.volume).abs() < 1e-14, "½ |2j|² V");
+        let flat = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let vector = [constant[0], constant[1], constant[2]];
+        let loss = surface_loss(Lagrange::<3, 3>::triangle(), flat, 0.5, &[vector; 3]).value;
+        assert!((loss - 2.0).abs() < 1e-14, "½ |2j|² on the area 1");
+    }
+}

@@ -1,0 +1,175 @@
+//! Integrals of energy and loss densities over elements and impedance surfaces that may move with the design.
+//!
+//! The sums run in the order of the elements, whatever the number of threads.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use rayon::prelude::*;
+
+use super::FunctionalValue;
+use crate::element::density::{ElementIntegral, eddy_loss, flux_energy, surface_loss};
+use crate::element::lagrange::Lagrange;
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+use crate::space::Order;
+use crate::surface::SurfaceTerm;
+
+/// The integral of a density.
+#[derive(Clone, Debug)]
+pub enum Integral {
+    /// `½∫ν|B − B_r|²` [J] in statics, `¼∫ν|B|²` in harmonics, over these elements, ascending.
+    Energy(Vec<ElementId>),
+    /// `½∫σ|E|²` [W] over these elements, ascending.
+    VolumeLoss(Vec<ElementId>),
+    /// `½Re(1/Zs)∫|E_t|²` [W] over the impedance surface of the conductor with this index.
+    SurfaceLoss(usize),
+}
+
+impl Integral {
+    pub(super) fn loss(model: &FieldModel, region: &str) -> Result<Self, SolverError> {
+        let topology = model.topology();
+        if let Some(index) = model.conductors().iter().position(|c| c.name == region) {
+            return Ok(Self::SurfaceLoss(index));
+        }
+        let id = topology.region(region)?;
+        let elements = topology.elements_of(id);
+        if elements.is_empty() || model.materials()[id.index()].conductivity == 0.0 {
+            return Err(SolverError::EmptyRegion {
+                region: region.to_owned(),
+                expected: "a loss needs a region whose material conducts",
+            });
+        }
+        Ok(Self::VolumeLoss(elements))
+    }
+
+    pub(super) fn energy(model: &FieldModel, region: Option<RegionId>) -> Result<Self, SolverError> {
+        let topology = model.topology();
+        let elements: Vec<ElementId> = match region {
+            Some(region) => topology.elements_of(region),
+            None => topology.elements().collect(),
+        };
+        if elements.is_empty() {
+            let name = region.map_or("", |region| &topology.region_names()[region.index()]);
+            return Err(SolverError::EmptyRegion {
+                region: name.to_owned(),
+                expected: "its field energy is asked for",
+            });
+        }
+        Ok(Self::Energy(elements))
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> FunctionalValue {
+        match model.space().order() {
+            Order::Linear => {
+                let shapes = (Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle());
+                self.of_order(shapes, |triangle| triangle, model, mesh, solution)
+            }
+            Order::Quadratic => {
+                let shapes = (Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle());
+                let nodes_of = |triangle| model.space().quadratic_triangle(triangle);
+                self.of_order(shapes, nodes_of, model, mesh, solution)
+            }
+        }
+    }
+
+    /// On elements with `N` and faces with `F` nodes.
+    fn of_order<const N: usize, const F: usize>(
+        &self,
+        (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
+        nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F],
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> FunctionalValue {
+        let mut sum = Sum::new(model);
+        let tet = |e: ElementId| Tet4::new(mesh.vertices(e));
+        match self {
+            Self::Energy(elements) => {
+                let share = if model.angular_frequency() == 0.0 { 0.5 } else { 0.25 };
+                sum.elements(elements, |e| {
+                    let factor = share * model.coefficients_of(e).reluctivity;
+                    let field = solution.element_field(model, e);
+                    flux_energy(tet_shape, &tet(e), factor, model.remanence_of(e), &field)
+                });
+            }
+            Self::VolumeLoss(elements) => sum.elements(elements, |e| {
+                // ½σ|E|² with E = −jω(A + ∇ψ), and the imaginary part ωσ of the eddy coefficient.
+                let factor = 0.5 * model.angular_frequency() * model.coefficients_of(e).eddy.im;
+                eddy_loss(tet_shape, &tet(e), factor, &solution.element_field(model, e))
+            }),
+            Self::SurfaceLoss(index) => {
+                for (triangle, term) in model.surface() {
+                    let SurfaceTerm::Impedance(coefficient, owner) = term else { continue };
+                    if owner != *index {
+                        continue;
+                    }
+                    let nodes = nodes_of(triangle);
+                    let potential = solution.nodal_field(model, nodes).vector_potential;
+                    // ½ω²Re(1/Zs), and the real part ωRe(1/Zs) of the surface coefficient.
+                    let factor = 0.5 * model.angular_frequency() * coefficient.re;
+                    let vertices = triangle.map(|n| mesh.point(n));
+                    sum.add(&nodes, &triangle, &surface_loss(face_shape, vertices, factor, &potential));
+                }
+            }
+        }
+        sum.into_value()
+    }
+}
+
+/// Gathers element integrals.
+struct Sum<'a> {
+    model: &'a FieldModel,
+    value: f64,
+    derivative: Vec<c64>,
+    explicit: Vec<Point>,
+}
+
+impl<'a> Sum<'a> {
+    fn new(model: &'a FieldModel) -> Self {
+        Self {
+            model,
+            value: 0.0,
+            derivative: vec![c64::default(); model.unknown_count()],
+            explicit: vec![[0.0; 3]; model.topology().node_count()],
+        }
+    }
+
+    fn elements<const N: usize>(
+        &mut self,
+        elements: &[ElementId],
+        integral: impl Fn(ElementId) -> ElementIntegral<N, 4> + Sync,
+    ) {
+        let integrals: Vec<_> = elements.par_iter().map(|&e| integral(e)).collect();
+        for (&e, integral) in elements.iter().zip(&integrals) {
+            self.add(self.model.space().nodes_of(e), &self.model.topology().tet(e), integral);
+        }
+    }
+
+    fn add<const N: usize, const M: usize>(
+        &mut self,
+        nodes: &[NodeId],
+        vertices: &[NodeId; M],
+        integral: &ElementIntegral<N, M>,
+    ) {
+        self.value += integral.value;
+        for (&node, terms) in nodes.iter().zip(integral.potentials) {
+            self.model.unknowns().scatter_add(&mut self.derivative, node, terms);
+        }
+        for (vertex, terms) in vertices.iter().zip(integral.positions) {
+            for d in 0..3 {
+                self.explicit[vertex.index()][d] += terms[d];
+            }
+        }
+    }
+
+    fn into_value(self) -> FunctionalValue {
+        FunctionalValue { value: self.value, derivative: self.derivative, explicit: Some(self.explicit) }
+    }
+}

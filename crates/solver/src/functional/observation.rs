@@ -1,0 +1,173 @@
+//! Functions of the flux density in observation cells that do not move with the design.
+//!
+//! The driver refuses an observation region inside the remesh region, so these depend on the node positions through
+//! the field alone.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+
+use super::FunctionalValue;
+use crate::element::quadrature::{self, Node};
+use crate::element::{Complex3, cross3};
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+use crate::space::Order;
+
+/// How observation cells are weighted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weighting {
+    /// One term per observation cell: `F = Σ_k B_k·B_k*` [T²], the paper's.
+    Point,
+    /// `F = ∫ B·B* dV` [T² m³].
+    Volume,
+}
+
+/// What is made of the flux densities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Observed {
+    /// `Σ_k w_k |B_k − B_target|²`; with the target zero, the squared flux density.
+    Deviation {
+        /// `B_target` [T]; real, so in harmonics the imaginary part of B is to vanish.
+        target: Point,
+        /// `w_k`.
+        weighting: Weighting,
+    },
+    /// The volume mean of `B·d` [T]: its real value in statics, its magnitude in harmonics.
+    Component {
+        /// The unit vector `d`.
+        direction: Point,
+    },
+}
+
+/// A function of the mean flux densities `B_k` of cells.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    cells: Vec<Vec<ElementId>>,
+    observed: Observed,
+}
+
+impl Observation {
+    /// On the cells of a region: those that the mesh defines (point), each element (volume), or the region as one.
+    ///
+    /// # Errors
+    /// [`SolverError::EmptyRegion`].
+    pub fn new(mesh: &Mesh, region: RegionId, observed: Observed) -> Result<Self, SolverError> {
+        let topology = mesh.topology();
+        let elements = topology.elements_of(region);
+        if elements.is_empty() {
+            return Err(SolverError::EmptyRegion {
+                region: topology.region_names()[region.index()].clone(),
+                expected: "the objective observes the field there",
+            });
+        }
+        let cells = match observed {
+            Observed::Deviation { weighting: Weighting::Point, .. } => topology.cells_of(region),
+            Observed::Deviation { weighting: Weighting::Volume, .. } => {
+                elements.into_iter().map(|e| vec![e]).collect()
+            }
+            Observed::Component { .. } => vec![elements],
+        };
+        Ok(Self { cells, observed })
+    }
+
+    /// Elements that take part.
+    pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.cells.iter().flatten().copied()
+    }
+
+    /// Mean flux density of every cell [T], shape `(n_cells, 3)`.
+    pub fn cell_flux_densities(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Vec<Complex3> {
+        self.cells.iter().map(|cell| mean(cell, &[0.25; 4], 1.0, model, mesh, solution).0).collect()
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> FunctionalValue {
+        let mut value = 0.0;
+        let mut derivative = vec![c64::default(); model.unknown_count()];
+        let rule: &[Node] = match (self.observed, model.space().order()) {
+            // The integral of |B|² is taken exactly; a mean over a cell needs one point of a linear B.
+            (Observed::Deviation { weighting: Weighting::Volume, .. }, Order::Quadratic) => {
+                quadrature::degree_2()
+            }
+            _ => &[([0.25; 4], 1.0)],
+        };
+        for (cell, (lambda, share)) in self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q))) {
+            let (b, volume) = mean(cell, lambda, *share, model, mesh, solution);
+            let (term, by_b) = self.term(b, volume, model.angular_frequency());
+            value += term;
+            let by_b = by_b.map(|c| c / volume);
+            for &e in cell {
+                let tet = Tet4::new(mesh.vertices(e));
+                for (node, _, gradient) in model.space().basis(e, &tet, lambda).iter() {
+                    // w·(∇N × A) = (w × ∇N)·A.
+                    let [x, y, z] = cross3(by_b, gradient.map(|g| c64::from(share * tet.volume * g)));
+                    model.unknowns().scatter_add(&mut derivative, node, [x, y, z, c64::default()]);
+                }
+            }
+        }
+        FunctionalValue { value, derivative, explicit: None }
+    }
+
+    /// The term of a cell with the mean `b` [T] and its volume [m³], and its derivative `q`: `d term = 2 Re(q·db)`.
+    fn term(&self, b: Complex3, volume: f64, angular_frequency: f64) -> (f64, Complex3) {
+        match self.observed {
+            Observed::Deviation { target, weighting } => {
+                let weight = match weighting {
+                    Weighting::Point => 1.0,
+                    Weighting::Volume => volume,
+                };
+                let difference: Complex3 = std::array::from_fn(|d| b[d] - target[d]);
+                let square: f64 = difference.iter().map(|c| c.norm_sqr()).sum();
+                (weight * square, difference.map(|c| weight * c.conj()))
+            }
+            Observed::Component { direction } => {
+                let along: c64 = (0..3).map(|d| b[d] * direction[d]).sum();
+                let magnitude = along.norm();
+                // Where the magnitude vanishes it has a kink, and zero is the one derivative that prefers no side.
+                let (value, phase) = if angular_frequency == 0.0 {
+                    (along.re, c64::new(1.0, 0.0))
+                } else if magnitude > 0.0 {
+                    (magnitude, along.conj() / magnitude)
+                } else {
+                    (0.0, c64::default())
+                };
+                (value, direction.map(|d| 0.5 * d * phase))
+            }
+        }
+    }
+}
+
+/// Mean of B [T] over a cell, taken at one point of each element with the share `share` of its volume, and the volume
+/// [m³] of these shares.
+fn mean(
+    cell: &[ElementId],
+    lambda: &[f64; 4],
+    share: f64,
+    model: &FieldModel,
+    mesh: &Mesh,
+    solution: &FieldSolution,
+) -> (Complex3, f64) {
+    let mut sum = [c64::default(); 3];
+    let mut volume = 0.0;
+    for &e in cell {
+        let tet = Tet4::new(mesh.vertices(e));
+        let b = solution.at(model, &model.space().basis(e, &tet, lambda)).flux_density();
+        let v = share * tet.volume;
+        volume += v;
+        for d in 0..3 {
+            sum[d] += v * b[d];
+        }
+    }
+    (sum.map(|s| s / volume), volume)
+}
