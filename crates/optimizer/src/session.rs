@@ -421,6 +421,8 @@ fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
     let origin = match &config.mesh {
         MeshConfig::Shield(_) => "shield".to_owned(),
         MeshConfig::Block(_) => "block".to_owned(),
+        MeshConfig::Boxes(_) => "boxes".to_owned(),
+        MeshConfig::Sphere(_) => "sphere".to_owned(),
         MeshConfig::File { path, .. } => path.display().to_string(),
     };
     let topology = mesh.topology();

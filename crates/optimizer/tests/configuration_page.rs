@@ -6,7 +6,7 @@ use std::path::Path;
 use fluxmorph_optimizer::config::{Config, ConfigError, resolved_toml};
 
 /// Configurations that together write every table, each with the alternatives that exclude one another.
-const FULL: [&str; 3] = [
+const FULL: [&str; 5] = [
     r#"
     [mesh]
     generator = "shield"
@@ -32,7 +32,23 @@ const FULL: [&str; 3] = [
     half_window = [1, 1]
     width = 1
     height = 1
+    direction = [1, 0, 0]
     inner_radius = 1
+    [[coils]]
+    name = "circle"
+    shape = "circular"
+    ampere_turns = 1
+    center = [0, 0, 0]
+    radius = 1
+    width = 1
+    height = 1
+    [[coils]]
+    name = "winding"
+    region = "winding"
+    ampere_turns = 1
+    terminals = ["in", "out"]
+    [boundaries]
+    uniform_field = { surfaces = ["outer"], b = [0, 0, 1] }
     [objective]
     region = "observation"
     [design]
@@ -59,6 +75,10 @@ const FULL: [&str; 3] = [
     generator = "block"
     [analysis]
     frequency = 0
+    [materials.magnet]
+    [regions.magnet]
+    material = "magnet"
+    remanence = [0, 0, 1]
     [design]
     surface = "z_max"
     direction = [0, 0, 1]
@@ -66,6 +86,36 @@ const FULL: [&str; 3] = [
     upper = 0.02
     [remesh]
     box = [[0, 0, 0], [1, 1, 1]]
+    "#,
+    r#"
+    [mesh]
+    generator = "boxes"
+    [mesh.boxes]
+    box = [[0, 0, 0], [1, 1, 1]]
+    [[mesh.boxes.regions]]
+    name = "plate"
+    box = [[0, 0, 0], [1, 1, 0.5]]
+    size = 0.1
+    skin = 0.1
+    cells = [1, 1, 1]
+    [[mesh.boxes.sizes]]
+    axis = "z"
+    from = 0.5
+    size = 0.1
+    [[mesh.boxes.surfaces]]
+    name = "top"
+    box = [[0, 0, 0.5], [1, 1, 0.5]]
+    [analysis]
+    frequency = 0
+    "#,
+    r#"
+    [mesh]
+    generator = "sphere"
+    [mesh.sphere]
+    inner_radius = 0.045
+    air_layer = 0.005
+    [analysis]
+    frequency = 0
     "#,
     r#"
     [mesh]
@@ -174,12 +224,18 @@ fn every_key_that_the_reader_asks_for_is_mentioned() {
         "[mesh]",
         "[mesh.shield]",
         "[mesh.block]",
+        "[mesh.sphere]",
+        "[mesh.boxes]",
+        "[[mesh.boxes.regions]]",
+        "[[mesh.boxes.sizes]]",
+        "[[mesh.boxes.surfaces]]",
         "[analysis]",
         "[analysis.linear_solver]",
         "[materials.a]",
         "[regions.a]",
         "[[coils]]",
         "[boundaries]",
+        "[boundaries.uniform_field]",
         "[objective]",
         "[design]",
         "[remesh]",

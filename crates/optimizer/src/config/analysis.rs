@@ -15,8 +15,29 @@ pub struct Analysis {
     /// Penalty reluctivity over reluctivity, ν_p / ν. Default 1: the penalised operator then is the Laplacian in
     /// uniform material, which is what iterative solvers like best.
     pub penalty: f64,
+    /// Polynomial degree of the elements, 1 or 2. Default 1: a fifth of the unknowns; 2 is far more exact on the same mesh.
+    pub order: ElementOrder,
     /// How the linear systems are solved.
     pub linear_solver: LinearSolver,
+}
+
+/// The degree of the potentials in an element, written as its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(into = "u8")]
+pub enum ElementOrder {
+    /// 1.
+    Linear,
+    /// 2.
+    Quadratic,
+}
+
+impl From<ElementOrder> for u8 {
+    fn from(order: ElementOrder) -> Self {
+        match order {
+            ElementOrder::Linear => 1,
+            ElementOrder::Quadratic => 2,
+        }
+    }
 }
 
 /// One frequency or several [Hz]; 0: magnetostatic. Each is a field problem of its own.
@@ -48,8 +69,12 @@ impl Analysis {
     pub(super) fn read(section: &Section<'_>) -> Self {
         let frequencies = Frequencies::read(section);
         let penalty = section.number("penalty", Range::POSITIVE).unwrap_or(1.0);
+        let order = match section.integer("order", 1, 2) {
+            Some(2) => ElementOrder::Quadratic,
+            _ => ElementOrder::Linear,
+        };
         let linear_solver = section.table("linear_solver").map(LinearSolver::read).unwrap_or_default();
-        Self { frequencies, penalty, linear_solver }
+        Self { frequencies, penalty, order, linear_solver }
     }
 
     /// All frequencies [Hz], at least one.

@@ -1,4 +1,4 @@
-//! `[[coils]]`: sources given by their analytic shape.
+//! `[[coils]]`: sources given by their analytic shape, or by a region of the mesh.
 
 use serde::Serialize;
 
@@ -7,22 +7,47 @@ use super::choice::choice;
 use super::range::Range;
 use super::section::{Section, first_duplicate};
 
-/// A coil with a uniform current density.
+/// A coil.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coil {
     /// Its name in messages and results.
     pub name: String,
-    /// Its shape.
-    pub shape: CoilShape,
-    /// Current times turns, amplitude [A]; positive is counter-clockwise about the axis.
+    /// Current times turns, amplitude [A]; positive is counter-clockwise about the axis, or from the first terminal to
+    /// the second.
     pub ampere_turns: f64,
     /// Phase of the current [rad]. Default 0.
     pub phase: f64,
+    /// Where the current flows.
+    #[serde(flatten)]
+    pub shape: CoilShape,
+}
+
+/// Where a coil's current flows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "shape", rename_all = "lowercase")]
+pub enum CoilShape {
+    /// Four straight sides.
+    Racetrack(Racetrack),
+    /// Four straight sides with mitred corners.
+    Rectangular(Rectangular),
+    /// A circle.
+    Circular(Circular),
+    /// A region of the mesh.
+    #[serde(untagged)]
+    Region(RegionCoil),
+}
+
+/// A coil with straight sides, as analytic source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Racetrack {
     /// Centre of the coil [m].
     pub center: [f64; 3],
     /// Axis of the winding. Default z.
     pub axis: Axis,
-    /// Inner half sizes across the axis, in cyclic order of the coordinates [m].
+    /// Direction of the first half size of the window. Default: the coordinate that follows the axis cyclically.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
+    /// Inner half sizes across the axis: along the direction, and across both [m].
     pub half_window: [f64; 2],
     /// Radial width of the winding [m].
     pub width: f64,
@@ -33,23 +58,105 @@ pub struct Coil {
     pub corner: Corner,
 }
 
+/// A rectangular coil, as analytic source; fields as those of [`Racetrack`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the fields are those of the racetrack")]
+pub struct Rectangular {
+    pub center: [f64; 3],
+    pub axis: Axis,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
+    pub half_window: [f64; 2],
+    pub width: f64,
+    pub height: f64,
+}
+
+/// A circular coil, as analytic source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Circular {
+    /// Centre of the coil [m].
+    pub center: [f64; 3],
+    /// Axis of the winding. Default z.
+    pub axis: Axis,
+    /// Inner radius [m].
+    pub radius: f64,
+    /// Radial width of the winding [m].
+    pub width: f64,
+    /// Axial height of the winding [m].
+    pub height: f64,
+}
+
+/// A coil that is a region of the mesh.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegionCoil {
+    /// Name of the region.
+    pub region: String,
+    /// The way of the current.
+    #[serde(flatten)]
+    pub path: CoilPath,
+}
+
+/// The way of the current in a region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum CoilPath {
+    /// From one surface to another.
+    Terminals {
+        /// Names of the surfaces.
+        terminals: [String; 2],
+    },
+    /// Round a hole.
+    Closed {
+        /// A point of a line through the hole [m].
+        center: [f64; 3],
+        /// Direction of that line. Default z.
+        axis: Axis,
+    },
+}
+
 choice! {
-    /// Shapes of coils.
-    pub enum CoilShape {
+    /// Words for `shape`.
+    pub enum ShapeWord {
         /// Four straight sides.
         Racetrack = "racetrack",
+        /// Four straight sides with mitred corners.
+        Rectangular = "rectangular",
+        /// A circle.
+        Circular = "circular",
     }
 }
 
 choice! {
     /// A coordinate axis.
-    pub enum Axis {
+    pub enum AxisWord {
         /// x.
         X = "x",
         /// y.
         Y = "y",
         /// z.
         Z = "z",
+    }
+}
+
+/// The axis of a coil.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Axis {
+    /// A coordinate axis.
+    Coordinate(AxisWord),
+    /// Along a vector of any length.
+    Vector([f64; 3]),
+}
+
+impl Axis {
+    /// A vector along the axis.
+    pub fn vector(self) -> [f64; 3] {
+        match self {
+            Self::Coordinate(AxisWord::X) => [1.0, 0.0, 0.0],
+            Self::Coordinate(AxisWord::Y) => [0.0, 1.0, 0.0],
+            Self::Coordinate(AxisWord::Z) => [0.0, 0.0, 1.0],
+            Self::Vector(vector) => vector,
+        }
     }
 }
 
@@ -72,6 +179,9 @@ pub enum Corner {
     Round(f64),
 }
 
+/// Examples for messages.
+const CENTER: &str = "[\"0 mm\", \"0 mm\", \"60 mm\"]";
+
 /// Read `[[coils]]`.
 pub(super) fn read_coils(root: &Section<'_>) -> Vec<Coil> {
     let coils: Vec<_> = root.tables("coils").into_iter().map(Coil::read).collect();
@@ -85,43 +195,136 @@ pub(super) fn read_coils(root: &Section<'_>) -> Vec<Coil> {
 impl Coil {
     fn read(section: Section<'_>) -> Self {
         let name = section.text("name");
-        let shape = section.choice("shape");
-        if section.text("region").is_some() {
-            section.wrong(
-                "region",
-                format!("`{}.region`: coils made of a mesh region are not supported", section.path()),
-                "shape = \"racetrack\" with its dimensions",
-            );
-        } else if shape.is_none() && !section.has("shape") {
-            section.missing("shape", "shape = \"racetrack\"");
-        }
         let ampere_turns = section.quantity("ampere_turns", Dimension::Current, Range::FINITE);
         if ampere_turns == Some(0.0) {
             let message = format!("`{}.ampere_turns` is 0 A: the coil makes no field", section.path());
             section.wrong("ampere_turns", message, "any current but 0 A");
         }
         let phase = section.quantity("phase", Dimension::Angle, Range::FINITE).unwrap_or(0.0);
-        let center = section.lengths("center", Range::FINITE);
-        let axis = section.choice("axis").unwrap_or(Axis::Z);
-        let half_window = section.lengths("half_window", Range::POSITIVE);
-        let width = section.quantity("width", Dimension::Length, Range::POSITIVE);
-        let height = section.quantity("height", Dimension::Length, Range::POSITIVE);
-        let corner = read_corner(&section, half_window);
+        let shape = section.choice("shape");
+        let region = section.text("region");
+        if section.has("shape") && section.has("region") {
+            section.wrong(
+                "region",
+                format!("`{}` has both `shape` and `region`", section.path()),
+                "shape with its dimensions, or region with its terminals",
+            );
+        } else if !section.has("shape") && !section.has("region") {
+            section.missing("shape", "shape = \"racetrack\", or region = \"winding\"");
+        }
         let coil = Self {
             name: section.need("name", name, "\"coil\""),
-            shape: shape.unwrap_or(CoilShape::Racetrack),
             ampere_turns: section.need("ampere_turns", ampere_turns, "\"40 kA\""),
             phase,
-            center: section.need("center", center, "[\"0 mm\", \"0 mm\", \"60 mm\"]"),
-            axis,
-            half_window: section.need("half_window", half_window, "[\"60 mm\", \"160 mm\"]"),
-            width: section.need("width", width, "\"20 mm\""),
-            height: section.need("height", height, "\"40 mm\""),
-            corner,
+            shape: match (shape, region) {
+                (None, Some(region)) if !section.has("shape") => {
+                    CoilShape::Region(RegionCoil { region, path: read_path(&section) })
+                }
+                (shape, _) => read_shape(&section, shape.unwrap_or(ShapeWord::Racetrack)),
+            },
         };
         section.finish();
         coil
     }
+}
+
+fn read_shape(section: &Section<'_>, shape: ShapeWord) -> CoilShape {
+    if section.names("terminals").is_some() && !section.has("region") {
+        section.wrong(
+            "terminals",
+            format!("`{}` has terminals, but an analytic coil closes on itself", section.path()),
+            "region = \"NAME\" in place of shape, or no terminals",
+        );
+    }
+    let center = section.need("center", section.lengths("center", Range::FINITE), CENTER);
+    let axis = read_axis(section);
+    let width = section.quantity("width", Dimension::Length, Range::POSITIVE);
+    let height = section.quantity("height", Dimension::Length, Range::POSITIVE);
+    let width = section.need("width", width, "\"20 mm\"");
+    let height = section.need("height", height, "\"40 mm\"");
+    if shape == ShapeWord::Circular {
+        let radius = section.quantity("radius", Dimension::Length, Range::POSITIVE);
+        let radius = section.need("radius", radius, "\"60 mm\"");
+        return CoilShape::Circular(Circular { center, axis, radius, width, height });
+    }
+    let direction = read_direction(section, axis);
+    let window = section.lengths("half_window", Range::POSITIVE);
+    let half_window = section.need("half_window", window, "[\"60 mm\", \"160 mm\"]");
+    if shape == ShapeWord::Rectangular {
+        return CoilShape::Rectangular(Rectangular { center, axis, direction, half_window, width, height });
+    }
+    let corner = read_corner(section, window);
+    CoilShape::Racetrack(Racetrack { center, axis, direction, half_window, width, height, corner })
+}
+
+fn read_path(section: &Section<'_>) -> CoilPath {
+    let names = section.names("terminals");
+    let center = section.lengths("center", Range::FINITE);
+    let axis = read_axis(section);
+    if section.has("terminals") {
+        for key in ["center", "axis"].into_iter().filter(|key| section.has(key)) {
+            section.wrong(
+                key,
+                format!("`{}` has terminals, and `{key}` of a coil that closes on itself", section.path()),
+                "terminals, or center and axis of a line through the hole",
+            );
+        }
+        let terminals = names.and_then(|names| {
+            let count = names.len();
+            let pair = <[String; 2]>::try_from(names).ok();
+            if pair.is_none() {
+                let message = format!("`{}.terminals` has {count} items", section.path());
+                section.wrong(
+                    "terminals",
+                    message,
+                    "two surfaces: where the current comes in, where it goes out",
+                );
+            }
+            pair
+        });
+        return CoilPath::Terminals { terminals: terminals.unwrap_or_default() };
+    }
+    if !section.has("center") {
+        section.missing(
+            "terminals",
+            "terminals = [\"in\", \"out\"], or center = [\"0 mm\", \"0 mm\", \"0 mm\"] with an axis for a closed coil",
+        );
+    }
+    CoilPath::Closed { center: center.unwrap_or([f64::NAN; 3]), axis }
+}
+
+/// `axis`: the name of a coordinate, or a vector.
+fn read_axis(section: &Section<'_>) -> Axis {
+    let default = Axis::Coordinate(AxisWord::Z);
+    if !section.is_list("axis") {
+        return section.choice("axis").map_or(default, Axis::Coordinate);
+    }
+    match section.numbers("axis", Range::FINITE) {
+        Some(vector) if length(vector) > 0.0 => Axis::Vector(vector),
+        Some(_) => {
+            let message = format!("`{}.axis` has no length", section.path());
+            section.wrong("axis", message, "\"x\", \"y\", \"z\", or a vector that is not zero");
+            default
+        }
+        None => default,
+    }
+}
+
+fn read_direction(section: &Section<'_>, axis: Axis) -> Option<[f64; 3]> {
+    let direction: [f64; 3] = section.numbers("direction", Range::FINITE)?;
+    let [a, b] = [axis.vector(), direction];
+    let across = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    // The bound of the solver's frame, below which no plane is left to turn in.
+    if length(across) > 1e-6 * length(a) * length(b) {
+        return Some(direction);
+    }
+    let message = format!("`{}.direction` has no part across the axis", section.path());
+    section.wrong("direction", message, "a vector that is not along the axis");
+    None
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 fn read_corner(section: &Section<'_>, half_window: Option<[f64; 2]>) -> Corner {

@@ -39,22 +39,39 @@ pub struct Region {
     pub material: String,
     /// Default `volume`: right for every conductor whose mesh resolves the skin depth.
     pub model: RegionModel,
+    /// Remanence `B_r` of a permanent magnet [T]: `B = μ H + B_r`. Default none.
+    pub remanence: Option<[f64; 3]>,
 }
 
 /// Read `[materials]`.
 pub(super) fn read_materials(root: &Section<'_>) -> BTreeMap<String, Material> {
     let read = |(name, section): (String, Section<'_>)| {
-        let relative_permeability = section.number("relative_permeability", Range::POSITIVE).unwrap_or(1.0);
+        let relative_permeability = isotropic(&section, "relative_permeability", "800")
+            .and_then(|key| section.number(key, Range::POSITIVE))
+            .unwrap_or(1.0);
         // A conductivity that is written but wrong stays unknown: nothing follows from it.
         let left_out = if section.has("conductivity") { f64::NAN } else { 0.0 };
-        let conductivity = section
-            .quantity("conductivity", Dimension::Conductivity, Range::NOT_NEGATIVE)
+        let conductivity = isotropic(&section, "conductivity", "\"7e6 S/m\"")
+            .and_then(|key| section.quantity(key, Dimension::Conductivity, Range::NOT_NEGATIVE))
             .unwrap_or(left_out);
         let density = section.quantity("density", Dimension::MassDensity, Range::POSITIVE);
         section.finish();
         (name, Material { relative_permeability, conductivity, density })
     };
     root.named_tables("materials").into_iter().map(read).collect()
+}
+
+/// The key, if its value is not one of an anisotropic material: several numbers, which are refused by name.
+fn isotropic(section: &Section<'_>, key: &'static str, example: &str) -> Option<&'static str> {
+    if !section.is_list(key) && !section.is_table(key) {
+        return Some(key);
+    }
+    section.refuse(
+        key,
+        format!("`{}.{key}` has several values: anisotropic materials are not supported", section.path()),
+        format!("one number, such as {key} = {example}"),
+    );
+    None
 }
 
 /// Read `[regions]`, and check it against the materials and the frequency [Hz].
@@ -71,10 +88,30 @@ pub(super) fn read_regions(
             check_region(&section, material, model, materials.get(material), &known, frequency);
         }
         let material = section.need("material", material, "\"steel\"");
+        let remanence = read_remanence(&section, frequency);
         section.finish();
-        (name, Region { material, model })
+        (name, Region { material, model, remanence })
     };
     root.named_tables("regions").into_iter().map(read).collect()
+}
+
+fn read_remanence(section: &Section<'_>, frequency: f64) -> Option<[f64; 3]> {
+    let remanence = section.quantities("remanence", Dimension::FluxDensity, Range::FINITE)?;
+    if remanence == [0.0; 3] {
+        let message = format!("`{}.remanence` is zero: the region is no magnet", section.path());
+        section.wrong("remanence", message, "a flux density, or no remanence");
+    }
+    if frequency > 0.0 {
+        section.wrong(
+            "remanence",
+            format!(
+                "`{}` is a permanent magnet, but the frequency is {frequency} Hz: its field does not alternate",
+                section.path()
+            ),
+            "analysis.frequency = 0, or no remanence",
+        );
+    }
+    Some(remanence)
 }
 
 fn check_region(

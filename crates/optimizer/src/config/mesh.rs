@@ -5,6 +5,12 @@ use std::path::{Path, PathBuf};
 use fluxmorph_geometry::generate::{BlockParameters, ObservationBox, ShieldParameters};
 use serde::{Serialize, Serializer};
 
+mod boxes;
+mod sphere;
+
+pub use boxes::{BoxOfRegion, BoxesMesh, Patch, SizeAlong};
+pub use sphere::SphereMesh;
+
 use super::Dimension;
 use super::choice::choice;
 use super::range::Range;
@@ -17,6 +23,10 @@ pub enum MeshConfig {
     Shield(Box<ShieldMesh>),
     /// A box of equal cells, as in the paper's first example.
     Block(BlockMesh),
+    /// Regions with faces along the axes.
+    Boxes(Box<BoxesMesh>),
+    /// An octant of a ball in a larger one.
+    Sphere(SphereMesh),
     /// A mesh file.
     File {
         /// Absolute path of the file, or relative to the working directory for a text without a file.
@@ -59,6 +69,10 @@ choice! {
         Shield = "shield",
         /// The block.
         Block = "block",
+        /// Boxes.
+        Boxes = "boxes",
+        /// The sphere.
+        Sphere = "sphere",
     }
 }
 
@@ -124,6 +138,8 @@ impl MeshConfig {
         let unit = section.choice::<LengthUnit>("unit");
         let shield = section.table("shield").map(ShieldMesh::read).unwrap_or_default();
         let block = section.table("block").map(BlockMesh::read).unwrap_or_default();
+        let boxes = section.table("boxes").map(BoxesMesh::read);
+        let sphere = section.table("sphere").map(SphereMesh::read).unwrap_or_default();
 
         match (section.has("generator"), section.has("file")) {
             (true, true) => section.wrong(
@@ -142,7 +158,16 @@ impl MeshConfig {
             ),
             _ => {}
         }
-        for (key, owner) in [("shield", Generator::Shield), ("block", Generator::Block)] {
+        if generator == Some(Generator::Boxes) && !section.has("boxes") {
+            section.missing("boxes", "[mesh.boxes] with the box of the whole and its regions");
+        }
+        let owners = [
+            ("shield", Generator::Shield),
+            ("block", Generator::Block),
+            ("boxes", Generator::Boxes),
+            ("sphere", Generator::Sphere),
+        ];
+        for (key, owner) in owners {
             let other_mesh = match generator {
                 Some(generator) => generator != owner,
                 None => section.has("file") && !section.has("generator"),
@@ -160,6 +185,8 @@ impl MeshConfig {
                 Self::File { path: directory.join(file), unit: unit.unwrap_or(LengthUnit::Metre) }
             }
             (None, Some(Generator::Block)) => Self::Block(block),
+            (None, Some(Generator::Boxes)) => Self::Boxes(Box::new(boxes.unwrap_or_default())),
+            (None, Some(Generator::Sphere)) => Self::Sphere(sphere),
             (None, _) => Self::Shield(Box::new(shield)),
         }
     }
@@ -330,11 +357,21 @@ struct MeshKeys<'a> {
     unit: Option<LengthUnit>,
     shield: Option<&'a ShieldMesh>,
     block: Option<&'a BlockMesh>,
+    boxes: Option<&'a BoxesMesh>,
+    sphere: Option<&'a SphereMesh>,
 }
 
 impl Serialize for MeshConfig {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut keys = MeshKeys { generator: None, file: None, unit: None, shield: None, block: None };
+        let mut keys = MeshKeys {
+            generator: None,
+            file: None,
+            unit: None,
+            shield: None,
+            block: None,
+            boxes: None,
+            sphere: None,
+        };
         match self {
             Self::Shield(shield) => {
                 keys.generator = Some(Generator::Shield);
@@ -343,6 +380,14 @@ impl Serialize for MeshConfig {
             Self::Block(block) => {
                 keys.generator = Some(Generator::Block);
                 keys.block = Some(block);
+            }
+            Self::Boxes(boxes) => {
+                keys.generator = Some(Generator::Boxes);
+                keys.boxes = Some(boxes);
+            }
+            Self::Sphere(sphere) => {
+                keys.generator = Some(Generator::Sphere);
+                keys.sphere = Some(sphere);
             }
             Self::File { path, unit } => {
                 keys.file = Some(path.to_string_lossy());

@@ -32,15 +32,21 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use analysis::{Analysis, Frequencies, LinearSolver};
-pub use boundary::Boundaries;
-pub use coil::{Axis, Coil, CoilShape, Corner, CornerWord};
+pub use analysis::{Analysis, ElementOrder, Frequencies, LinearSolver};
+pub use boundary::{Boundaries, UniformField};
+pub use coil::{
+    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,
+    RegionCoil, ShapeWord,
+};
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::Design;
 pub use fault::{Fault, Place, nearest};
 pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use material::{Material, Region, RegionModel};
-pub use mesh::{BlockMesh, Generator, LengthUnit, MeshConfig, ShieldMesh};
+pub use mesh::{
+    BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,
+    SphereMesh,
+};
 pub use objective::{Goal, Objective, Probe, Sum, Term};
 pub use optimizer::{Algorithm, Optimizer};
 pub use output::{FieldsKept, Output};

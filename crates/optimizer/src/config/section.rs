@@ -28,9 +28,9 @@ impl Placeholder for f64 {
     }
 }
 
-impl<const N: usize> Placeholder for [f64; N] {
+impl<T: Placeholder, const N: usize> Placeholder for [T; N] {
     fn placeholder() -> Self {
-        [f64::NAN; N]
+        std::array::from_fn(|_| T::placeholder())
     }
 }
 
@@ -74,6 +74,22 @@ impl<'a> Section<'a> {
     /// Whether a key is written that is known but not read here.
     pub(super) fn skip(&self, key: &'static str) -> bool {
         self.get(key).is_some()
+    }
+
+    /// Whether the key is written with a list.
+    pub(super) fn is_list(&self, key: &str) -> bool {
+        self.table.get(key).is_some_and(|node| matches!(node.value, Value::Array(_)))
+    }
+
+    /// Whether the key is written with a table.
+    pub(super) fn is_table(&self, key: &str) -> bool {
+        self.table.get(key).is_some_and(|node| matches!(node.value, Value::Table(_)))
+    }
+
+    /// Record a fault at a key that is known and not read.
+    pub(super) fn refuse(&self, key: &'static str, message: impl Into<String>, expected: impl Into<String>) {
+        self.asked.borrow_mut().push(key);
+        self.wrong(key, message, expected);
     }
 
     fn get(&self, key: &'static str) -> Option<&'a Node> {
@@ -299,6 +315,19 @@ impl<'a> Section<'a> {
         self.array_of(node, &join(&self.path, key), "numbers", |item, path| self.number_of(item, path, range))
     }
 
+    /// `N` quantities of one dimension.
+    pub(super) fn quantities<const N: usize>(
+        &self,
+        key: &'static str,
+        dimension: Dimension,
+        range: Range,
+    ) -> Option<[f64; N]> {
+        let node = self.get(key)?;
+        self.array_of(node, &join(&self.path, key), "quantities", |item, path| {
+            self.quantity_of(item, path, dimension, range)
+        })
+    }
+
     /// `N` whole numbers from `least` to `most`.
     pub(super) fn integers<const N: usize>(
         &self,
@@ -320,19 +349,6 @@ impl<'a> Section<'a> {
         range: Range,
     ) -> Option<Vec<f64>> {
         self.list(key, "quantities", |item, path| self.quantity_of(item, path, dimension, range))
-    }
-
-    /// `N` quantities, in SI.
-    pub(super) fn quantities<const N: usize>(
-        &self,
-        key: &'static str,
-        dimension: Dimension,
-        range: Range,
-    ) -> Option<[f64; N]> {
-        let node = self.get(key)?;
-        self.array_of(node, &join(&self.path, key), "quantities", |item, path| {
-            self.quantity_of(item, path, dimension, range)
-        })
     }
 
     /// `N` lengths [m].
@@ -377,17 +393,40 @@ impl<'a> Section<'a> {
 
     /// Two opposite corners of a box, lower first [m].
     pub(super) fn corners(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
-        let node = self.get(key)?;
-        let corners: [[f64; 3]; 2] =
-            self.array_of(node, &join(&self.path, key), "points", |item, path| {
-                self.lengths_of(item, path, Range::FINITE)
-            })?;
+        let corners = self.two_points(key)?;
         if (0..3).all(|axis| corners[0][axis] < corners[1][axis]) {
             return Some(corners);
         }
         let message = format!("`{}` has no volume", join(&self.path, key));
         self.wrong(key, message, "the lower corner first, below the upper corner in x, y and z");
         None
+    }
+
+    /// Two opposite corners of a box that may be flat, lower first [m].
+    pub(super) fn flat_corners(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
+        let corners = self.two_points(key)?;
+        if (0..3).all(|axis| corners[0][axis] <= corners[1][axis]) {
+            return Some(corners);
+        }
+        let message = format!("`{}` is turned over", join(&self.path, key));
+        self.wrong(key, message, "the lower corner first, nowhere above the upper corner");
+        None
+    }
+
+    fn two_points(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
+        let node = self.get(key)?;
+        self.array_of(node, &join(&self.path, key), "points", |item, path| {
+            self.lengths_of(item, path, Range::FINITE)
+        })
+    }
+
+    /// Three lengths, or one that holds along all three axes [m].
+    pub(super) fn length_per_axis(&self, key: &'static str, range: Range) -> Option<[f64; 3]> {
+        let node = self.get(key)?;
+        match &node.value {
+            Value::Array(_) => self.lengths_of(node, &join(&self.path, key), range),
+            _ => Some([self.quantity_of(node, &join(&self.path, key), Dimension::Length, range)?; 3]),
+        }
     }
 
     /// A list of different names.

@@ -1,11 +1,11 @@
 //! The field problems of a configuration.
 
-use fluxmorph_geometry::Mesh;
-use fluxmorph_solver::coil::{self, Racetrack};
+use fluxmorph_geometry::{Mesh, Topology};
+use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
 use fluxmorph_solver::linear::LinearSolverSettings;
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, UniformField};
 
-use crate::config::{self, Config, RegionModel};
+use crate::config::{self, Config, Fault, RegionModel, Source};
 use crate::error::Error;
 
 /// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
@@ -85,12 +85,20 @@ fn field_model(
     impedance_surfaces: Vec<Conductor>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
-    let coils = config.coils.iter().map(coil).collect::<Result<Vec<_>, Error>>()?;
+    let coils = config.coils.iter().map(|c| coil(c, mesh)).collect::<Result<Vec<_>, Error>>()?;
     let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
         names.iter().map(|name| (name.clone(), boundary)).collect()
     };
     let mut boundaries = of(&config.boundaries.flux_parallel, Boundary::FluxParallel);
     boundaries.extend(of(&config.boundaries.flux_normal, Boundary::FluxNormal));
+    if let Some(field) = &config.boundaries.uniform_field {
+        let applied = UniformField { flux_density: field.b, centre: field.center };
+        boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
+    }
+    let order = match config.analysis.order {
+        config::ElementOrder::Linear => Order::Linear,
+        config::ElementOrder::Quadratic => Order::Quadratic,
+    };
     let linear_solver = LinearSolverSettings {
         tolerance: config.analysis.linear_solver.tolerance,
         ..LinearSolverSettings::default()
@@ -98,27 +106,100 @@ fn field_model(
     let setup = FieldModelSetup {
         frequency,
         penalty: config.analysis.penalty,
+        order,
         materials,
+        remanence: remanences(config, mesh.topology()),
         impedance_surfaces,
         coils,
         boundaries,
         linear_solver,
-        ..FieldModelSetup::default()
     };
     Ok(FieldModel::new(mesh, setup)?)
 }
 
-fn coil(coil: &config::Coil) -> Result<coil::Coil, Error> {
-    let config::CoilShape::Racetrack = coil.shape;
-    let corner = match coil.corner {
-        config::Corner::Sharp(config::CornerWord::Mitred) => coil::Corner::Mitred,
-        config::Corner::Round(inner_radius) => coil::Corner::Round { inner_radius },
+/// A coil of the configuration on its mesh.
+fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
+    let frame = |center, axis: config::Axis, direction| Frame::new(center, axis.vector(), direction);
+    let shape = match &coil.shape {
+        config::CoilShape::Racetrack(r) => {
+            let corner = match r.corner {
+                config::Corner::Sharp(config::CornerWord::Mitred) => coil::Corner::Mitred,
+                config::Corner::Round(inner_radius) => coil::Corner::Round { inner_radius },
+            };
+            let frame = frame(r.center, r.axis, r.direction)?;
+            Racetrack::in_frame(frame, r.half_window, r.width, r.height, corner)?.into()
+        }
+        config::CoilShape::Rectangular(r) => {
+            let frame = frame(r.center, r.axis, r.direction)?;
+            Racetrack::in_frame(frame, r.half_window, r.width, r.height, coil::Corner::Mitred)?.into()
+        }
+        config::CoilShape::Circular(c) => {
+            Racetrack::circular(frame(c.center, c.axis, None)?, c.radius, c.width, c.height)?.into()
+        }
+        config::CoilShape::Region(region) => {
+            let topology = mesh.topology();
+            let elements = topology.elements_of(topology.region(&region.region)?);
+            let terminal = |name: &String| -> Result<Terminal, Error> {
+                Ok(Terminal { name: name.clone(), triangles: topology.surface(name)?.to_vec() })
+            };
+            let path = match &region.path {
+                config::CoilPath::Terminals { terminals: [from, to] } => {
+                    Path::Terminals { from: terminal(from)?, to: terminal(to)? }
+                }
+                config::CoilPath::Closed { center, axis } => Path::Closed(frame(*center, *axis, None)?),
+            };
+            RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
+        }
     };
-    let axis = match coil.axis {
-        config::Axis::X => 0,
-        config::Axis::Y => 1,
-        config::Axis::Z => 2,
+    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
+}
+
+/// What to tell the user about the current of each coil region.
+pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
+    let notice = |coil: &coil::Coil| match &coil.shape {
+        CoilShape::Racetrack(_) => None,
+        CoilShape::Region(current) => Some(format!("coil `{}`: {}", coil.name, current.report())),
     };
-    let shape = Racetrack::new(coil.center, axis, coil.half_window, coil.width, coil.height, corner)?;
-    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape: shape.into() })
+    model.coils().iter().filter_map(notice).collect()
+}
+
+/// Every region and surface that a coil names and the mesh does not have, and every region that no coil can be.
+pub(super) fn coil_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+    let surfaces: Vec<&str> = topology.surface_names().collect();
+    let mut faults = Vec::new();
+    for (i, coil) in config.coils.iter().enumerate() {
+        let config::CoilShape::Region(region) = &coil.shape else { continue };
+        let (path, name) = (format!("coils[{i}].region"), &region.region);
+        if topology.region(name).is_err() {
+            faults.push(source.unknown_name(&path, "region", name, &regions));
+        }
+        if let config::CoilPath::Terminals { terminals } = &region.path {
+            for (j, name) in terminals.iter().enumerate().filter(|(_, name)| topology.surface(name).is_err())
+            {
+                let path = format!("coils[{i}].terminals[{j}]");
+                faults.push(source.unknown_name(&path, "surface", name, &surfaces));
+            }
+        }
+        if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
+            let fault = source.fault(&path, format!("`{name}` is replaced by its impedance surface"));
+            faults.push(fault.expected("a region that is meshed"));
+        } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
+            && super::material(config, name).conductivity > 0.0
+        {
+            let message = format!(
+                "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
+            );
+            faults.push(
+                source.fault(&path, message).expected("a material without conductivity for the winding"),
+            );
+        }
+    }
+    faults
+}
+
+/// Remanence of every region [T], by `RegionId`; zero where there is no magnet.
+fn remanences(config: &Config, topology: &Topology) -> Vec<[f64; 3]> {
+    let of = |name: &String| config.regions.get(name).and_then(|region| region.remanence);
+    topology.region_names().iter().map(|name| of(name).unwrap_or_default()).collect()
 }

@@ -8,11 +8,11 @@ mod functional;
 mod shape;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::{block, shield};
+use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
 use fluxmorph_geometry::{Mesh, MeshError, RegionId, Topology};
-use fluxmorph_solver::Material;
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::recovery::locate;
+use fluxmorph_solver::{FieldModel, Material};
 
 use crate::config::{self, Config, Fault, MeshConfig, RegionModel, Source};
 use crate::error::Error;
@@ -71,11 +71,17 @@ pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
         MeshConfig::Block(parameters) => {
             block(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
         }
+        MeshConfig::Boxes(parameters) => {
+            boxes(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
+        }
+        MeshConfig::Sphere(parameters) => {
+            sphere(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
+        }
         MeshConfig::File { .. } => Err(source
             .error(vec![
                 source
                     .fault("mesh.file", "mesh files cannot be read yet")
-                    .expected("generator = \"shield\" or \"block\""),
+                    .expected("a built-in mesh: generator = \"boxes\""),
             ])
             .into()),
     }
@@ -102,12 +108,16 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     let mut warnings = Vec::new();
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
-    if config.coils.is_empty() {
-        warnings.push("there is no coil: the field is zero everywhere; add [[coils]]".to_owned());
-    }
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
     source.check(probe_faults(config, source, &full_mesh, &mesh))?;
     let states = field::field_models(config, &mesh, &conductors)?;
+    warnings.extend(field::coil_notices(&states[0]));
+    if states.iter().all(FieldModel::is_unexcited) {
+        warnings.push(
+            "nothing excites a field, it is zero everywhere; add [[coils]], a magnet's remanence or an applied field"
+                .to_owned(),
+        );
+    }
     let objective = functional::objective(config, &mesh, &states)?;
     let (mut shape, mut constraints) = (None, Vec::new());
     if let (Some(design), Some(remesh)) = (&config.design, &config.remesh) {
@@ -169,7 +179,7 @@ fn phasor(coil: &config::Coil) -> c64 {
 
 /// Every name of the configuration that the mesh does not have, and every region named that is empty.
 fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
-    let mut faults = Vec::new();
+    let mut faults = field::coil_faults(config, source, topology);
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     let surfaces: Vec<&str> = topology.surface_names().collect();
     let mut region = |path: String, name: &str| match topology.region(name) {
@@ -202,6 +212,9 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
     };
     surface("boundaries.flux_parallel", &config.boundaries.flux_parallel);
     surface("boundaries.flux_normal", &config.boundaries.flux_normal);
+    if let Some(field) = &config.boundaries.uniform_field {
+        surface("boundaries.uniform_field.surfaces", &field.surfaces);
+    }
     if let Some(remesh) = &config.remesh {
         surface("remesh.slide", &remesh.slide);
         surface("remesh.fixed", &remesh.fixed);

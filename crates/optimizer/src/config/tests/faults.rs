@@ -3,7 +3,7 @@
 use super::*;
 use crate::diagnostics::line_and_column;
 
-fn report(text: &str) -> FaultReport {
+pub(super) fn report(text: &str) -> FaultReport {
     match Config::from_str(text, "small.toml") {
         Err(ConfigError::Faults(report)) => *report,
         Err(other) => panic!("{other}"),
@@ -63,7 +63,7 @@ const CASES: &[Case] = &[
     ("phase = \"30 deg\"", "axis = \"w\"", "coils[0].axis", "cannot be `w`", 20),
     ("phase = \"30 deg\"", "inner_radius = \"61 mm\"", "coils[0].inner_radius", "more than a half size", 20),
     ("phase = \"30 deg\"", "corner = \"mitred\"\ninner_radius = 0.01", "coils[0].inner_radius", "both", 21),
-    ("phase = \"30 deg\"", "region = \"winding\"", "coils[0].region", "not supported", 20),
+    ("phase = \"30 deg\"", "region = \"winding\"", "coils[0].region", "both `shape` and `region`", 20),
     (
         "[boundaries]",
         "[[coils]]\nname = \"coil\"\nshape = \"racetrack\"\nampere_turns = 1\ncenter = [0, 0, 0]\n\
@@ -76,7 +76,6 @@ const CASES: &[Case] = &[
     ("[\"x_min\", \"y_min\"]", "[\"x_min\", 3]", "boundaries.flux_parallel[1]", "not a text", 22),
     ("[\"x_min\", \"y_min\"]", "[\"x_min\", \"\"]", "boundaries.flux_parallel[1]", "is empty", 22),
     ("\"y_min\"]", "\"y_min\"]\nflux_normal = [\"y_min\"]", "boundaries.flux_normal", "at once", 23),
-    ("\"y_min\"]", "\"y_min\"]\nuniform_field = {}", "boundaries.uniform_field", "not supported", 23),
     (
         "region = \"observation\"",
         "region = \"observation\"\nkind = \"lost\"",

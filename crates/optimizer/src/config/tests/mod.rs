@@ -2,6 +2,7 @@
 
 mod faults;
 mod overrides;
+mod sources;
 
 use std::path::Path;
 
@@ -156,12 +157,14 @@ fn values_are_in_si_and_defaults_filled_in() {
         Analysis {
             frequencies: Frequencies::One(60.0),
             penalty: 1.0,
+            order: ElementOrder::Linear,
             linear_solver: LinearSolver::default()
         }
     );
-    assert_eq!(config.coils[0].half_window, [0.06, 0.16]);
+    let CoilShape::Racetrack(coil) = &config.coils[0].shape else { panic!("a racetrack") };
+    assert_eq!(coil.half_window, [0.06, 0.16]);
+    assert_eq!(coil.corner, Corner::Sharp(CornerWord::Mitred));
     assert!((config.coils[0].phase - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
-    assert_eq!(config.coils[0].corner, Corner::Sharp(CornerWord::Mitred));
     assert_eq!(config.optimizer.max_time, Some(600.0));
     assert_eq!(config.optimizer.algorithm, Algorithm::Mma);
     assert_eq!(config.output.directory, Path::new("runs/small"));

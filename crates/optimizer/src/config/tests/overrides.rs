@@ -28,8 +28,9 @@ fn overrides_replace_add_and_reach_into_lists() {
     assert_eq!(config.analysis.linear_solver.tolerance, 1e-12);
     assert_eq!(config.optimizer.algorithm, Algorithm::Ccsaq);
     assert_eq!(config.optimizer.max_evaluations, 3);
-    assert_eq!(config.coils[0].width, 0.03);
-    assert_eq!(config.coils[0].center, [0.0, 0.0, 0.07]);
+    let CoilShape::Racetrack(coil) = &config.coils[0].shape else { panic!("a racetrack") };
+    assert_eq!(coil.width, 0.03);
+    assert_eq!(coil.center, [0.0, 0.0, 0.07]);
     assert_eq!(config.design.expect("design").grid, Some([2, 3]));
     assert_eq!(config.title, "a = b");
     assert_eq!(source.text(), SMALL);

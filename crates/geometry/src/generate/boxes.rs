@@ -1,0 +1,398 @@
+//! A box of boxes: regions painted one over the other on a graded grid, for devices with faces along the axes.
+//!
+//! Every face of every box lies on mesh lines. Sizes are upper limits: within a region, at its faces (the skin), or
+//! along a part of an axis; between them cells grow by a ratio (`generate::sizing`). As the grid is a product of three
+//! sets of lines, a size counts along its axis throughout the mesh.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::error::MeshError;
+use crate::generate::grading::equal_parts;
+use crate::generate::grid::{Grid, check_size};
+use crate::generate::sizing::{self, SizeLimit};
+use crate::ids::{ElementId, NodeId, RegionId};
+use crate::mesh::Mesh;
+use crate::tet4::Point;
+use crate::topology::Topology;
+
+/// The region of all that no box covers.
+pub const BACKGROUND: &str = "air";
+
+/// Lower and upper corner of a box [m].
+pub type Corners = [Point; 2];
+
+/// A region, or a part of one: later boxes lie over earlier ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoxRegion {
+    /// Name of the region; several boxes may share it, and one named [`BACKGROUND`] is a hole.
+    pub name: String,
+    /// Lower and upper corner [m].
+    pub corners: Corners,
+    /// Largest cell within the box along x, y and z [m]; infinity for no limit.
+    pub size: [f64; 3],
+    /// Largest first cell on either side of the box's faces across x, y and z [m]; infinity for no limit.
+    pub skin: [f64; 3],
+    /// Observation cells along x, y and z, `z` fast; without them every element is one.
+    pub cells: Option<[usize; 3]>,
+}
+
+/// A size along a part of one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisSize {
+    /// Axis: 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// Where, and how large a cell may be.
+    pub limit: SizeLimit,
+}
+
+/// A named surface: all faces between regions, or outside, within a box that may be flat.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfacePatch {
+    /// Name of the surface.
+    pub name: String,
+    /// Lower and upper corner [m], equal along an axis for a plane patch.
+    pub corners: Corners,
+}
+
+/// A graded box with regions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoxesParameters {
+    /// Lower and upper corner of the whole [m].
+    pub corners: Corners,
+    /// Regions; later ones lie over earlier ones.
+    pub regions: Vec<BoxRegion>,
+    /// Further sizes along the axes.
+    pub sizes: Vec<AxisSize>,
+    /// Named surfaces beside the six outer faces.
+    pub surfaces: Vec<SurfacePatch>,
+    /// Ratio of neighbouring cells away from the places that have a size, above 1.
+    pub growth: f64,
+    /// All sizes are divided by it; the growth ratio becomes its root, so that the far field is refined alike.
+    pub refinement: f64,
+}
+
+/// The mesh of a box of boxes.
+///
+/// Regions: `air`, then the others in the order of their first boxes. Surfaces: `x_min` … `z_max` outside, and the
+/// named patches, whose triangles point outwards, and between two regions out of the later one.
+///
+/// # Errors
+/// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.boxes.…`).
+pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
+    check(parameters)?;
+    let axis_lines = |axis| {
+        let ends = parameters.corners.map(|corner| corner[axis]);
+        let growth = parameters.growth.powf(1.0 / parameters.refinement);
+        sizing::lines("mesh.boxes", ends, &limits(parameters, axis), growth)
+    };
+    let lines = [axis_lines(0)?, axis_lines(1)?, axis_lines(2)?];
+    check_size("mesh.boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
+    let grid = Grid::new("mesh.boxes", lines)?;
+
+    let names = region_names(&parameters.regions);
+    let id_of: BTreeMap<&str, RegionId> =
+        names.iter().enumerate().map(|(i, &name)| (name, RegionId::new(i))).collect();
+    let painted: Vec<(Corners, RegionId)> =
+        parameters.regions.iter().map(|region| (region.corners, id_of[region.name.as_str()])).collect();
+    let region_at = |centre: Point| {
+        let holds =
+            |corners: &Corners| (0..3).all(|d| corners[0][d] < centre[d] && centre[d] < corners[1][d]);
+        painted.iter().rev().find(|(corners, _)| holds(corners)).map_or(RegionId(0), |&(_, id)| id)
+    };
+    let mut topology = grid.topology(&names, region_at)?;
+    for (name, cells) in observation_cells(parameters, &grid, &topology, &id_of)? {
+        topology = topology.with_cells(name, cells);
+    }
+    let points = grid.points();
+    for patch in &parameters.surfaces {
+        let triangles = patch_triangles(patch, &topology, &points, tolerance(parameters));
+        if triangles.is_empty() {
+            return Err(MeshError::Parameter {
+                parameter: "mesh.boxes.surfaces",
+                value: format!("`{}` in {:?} m", patch.name, patch.corners),
+                expected: "no face between regions and no outer face lies there; a patch must hold some"
+                    .into(),
+            });
+        }
+        topology = topology.with_surface(&patch.name, triangles)?;
+    }
+    Mesh::new(Arc::new(topology), points)
+}
+
+/// Lengths below this are rounding of decimal lengths [m].
+fn tolerance(p: &BoxesParameters) -> f64 {
+    1e-9 * (0..3).map(|d| p.corners[1][d] - p.corners[0][d]).fold(0.0, f64::max)
+}
+
+fn check(p: &BoxesParameters) -> Result<(), MeshError> {
+    let refuse =
+        |parameter, value: String, expected: String| Err(MeshError::Parameter { parameter, value, expected });
+    let [lower, upper] = p.corners;
+    if !(0..3).all(|d| lower[d] < upper[d] && lower[d].is_finite() && upper[d].is_finite()) {
+        let expected = "the lower corner first, below the upper corner in x, y and z".to_owned();
+        return refuse("mesh.boxes.box", format!("{:?} m", p.corners), expected);
+    }
+    if !(p.refinement > 0.0 && p.refinement.is_finite()) {
+        let expected = "a positive number".to_owned();
+        return refuse("mesh.boxes.refinement", p.refinement.to_string(), expected);
+    }
+    let room = tolerance(p);
+    let within = |corners: &Corners| {
+        (0..3).all(|d| corners[0][d] >= lower[d] - room && corners[1][d] <= upper[d] + room)
+    };
+    for region in &p.regions {
+        let volume = (0..3).all(|d| region.corners[0][d] < region.corners[1][d]);
+        if !(volume && within(&region.corners)) {
+            return refuse(
+                "mesh.boxes.regions",
+                format!("`{}` from {:?} to {:?} m", region.name, region.corners[0], region.corners[1]),
+                format!("a box with a volume within {lower:?} to {upper:?} m"),
+            );
+        }
+        if region.cells.is_some_and(|cells| cells.contains(&0)) {
+            let expected = "at least one observation cell along every axis".to_owned();
+            return refuse("mesh.boxes.regions", format!("`{}`: {:?}", region.name, region.cells), expected);
+        }
+    }
+    if let Some(size) = p.sizes.iter().find(|size| size.axis > 2) {
+        return refuse("mesh.boxes.sizes", format!("axis {}", size.axis), "axis 0, 1 or 2".into());
+    }
+    Ok(())
+}
+
+/// All limits along an axis, refined; the faces of every box and observation cell among them.
+fn limits(p: &BoxesParameters, axis: usize) -> Vec<SizeLimit> {
+    let growth = p.growth.powf(1.0 / p.refinement);
+    let mut limits = Vec::new();
+    for region in &p.regions {
+        let interval = region.corners.map(|corner| corner[axis]);
+        limits.push(SizeLimit { interval, size: region.size[axis] / p.refinement });
+        // Divided by the growth, because cells beside a limit start at `growth` times its size.
+        let size = region.skin[axis] / p.refinement / growth;
+        limits.extend(interval.map(|face| SizeLimit { interval: [face, face], size }));
+        if let Some(cells) = region.cells {
+            let ends = equal_parts(interval, cells[axis]);
+            limits.extend(ends.iter().map(|&at| SizeLimit { interval: [at, at], size: f64::INFINITY }));
+        }
+    }
+    let along = p.sizes.iter().filter(|size| size.axis == axis).map(|size| size.limit);
+    limits.extend(along.map(|limit| SizeLimit { size: limit.size / p.refinement, ..limit }));
+    limits
+}
+
+fn region_names(regions: &[BoxRegion]) -> Vec<&str> {
+    let mut names = vec![BACKGROUND];
+    for region in regions {
+        if !names.contains(&region.name.as_str()) {
+            names.push(&region.name);
+        }
+    }
+    names
+}
+
+/// The observation cells by region; of a region with some, a box without is one cell.
+fn observation_cells<'a>(
+    p: &'a BoxesParameters,
+    grid: &Grid,
+    topology: &Topology,
+    id_of: &BTreeMap<&str, RegionId>,
+) -> Result<BTreeMap<&'a str, Vec<Vec<ElementId>>>, MeshError> {
+    let mut cells_of: BTreeMap<&str, Vec<Vec<ElementId>>> = BTreeMap::new();
+    let divided = |name: &str| p.regions.iter().any(|region| region.name == name && region.cells.is_some());
+    for region in p.regions.iter().filter(|region| divided(&region.name)) {
+        let counts = region.cells.unwrap_or([1; 3]);
+        let lines: [Vec<usize>; 3] = [0, 1, 2].map(|d| {
+            let ends = equal_parts([region.corners[0][d], region.corners[1][d]], counts[d]);
+            ends.iter().map(|&at| grid.nearest_line(d, at)).collect()
+        });
+        let all = cells_of.entry(&region.name).or_default();
+        for i in lines[0].windows(2) {
+            for j in lines[1].windows(2) {
+                for k in lines[2].windows(2) {
+                    let mut cell = grid.elements_within([[i[0], i[1]], [j[0], j[1]], [k[0], k[1]]]);
+                    cell.retain(|e| topology.region_of()[e.index()] == id_of[region.name.as_str()]);
+                    if cell.is_empty() {
+                        return Err(MeshError::Parameter {
+                            parameter: "mesh.boxes.regions",
+                            value: format!("`{}` with cells = {counts:?}", region.name),
+                            expected: "a later box covers one of its observation cells; move one of them"
+                                .into(),
+                        });
+                    }
+                    all.push(cell);
+                }
+            }
+        }
+    }
+    Ok(cells_of)
+}
+
+fn patch_triangles(
+    patch: &SurfacePatch,
+    topology: &Topology,
+    points: &[Point],
+    tolerance: f64,
+) -> Vec<[NodeId; 3]> {
+    let [lower, upper] = patch.corners;
+    let within = |node: &NodeId| {
+        let point = points[node.index()];
+        (0..3).all(|d| point[d] >= lower[d] - tolerance && point[d] <= upper[d] + tolerance)
+    };
+    let region_at = |e: ElementId| topology.region_of()[e.index()];
+    topology
+        .facets()
+        .iter()
+        .filter(|facet| facet.nodes.iter().all(within))
+        .map(|facet| {
+            let [a, b, c] = facet.nodes;
+            match facet.outside {
+                Some(outside) if region_at(outside) > region_at(facet.inside) => [a, c, b],
+                _ => [a, b, c],
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tet4;
+
+    const FREE: [f64; 3] = [f64::INFINITY; 3];
+
+    fn region(name: &str, corners: Corners) -> BoxRegion {
+        BoxRegion { name: name.into(), corners, size: FREE, skin: FREE, cells: None }
+    }
+
+    /// A plate of 6 x 4 x 1 with a hole of 2 x 2 through it, in a box of 20.
+    fn plate() -> BoxesParameters {
+        BoxesParameters {
+            corners: [[-10.0; 3], [10.0; 3]],
+            regions: vec![
+                BoxRegion {
+                    size: [1.0, 1.0, 0.5],
+                    skin: [f64::INFINITY, f64::INFINITY, 0.2],
+                    ..region("plate", [[-3.0, -2.0, 0.0], [3.0, 2.0, 1.0]])
+                },
+                region("air", [[-2.0, -1.0, 0.0], [0.0, 1.0, 1.0]]),
+            ],
+            sizes: vec![],
+            surfaces: vec![],
+            growth: 2.0,
+            refinement: 1.0,
+        }
+    }
+
+    fn volume(mesh: &Mesh, name: &str) -> f64 {
+        let id = mesh.topology().region(name).expect("it has it");
+        mesh.topology().elements_of(id).iter().map(|&e| tet4::volume(mesh.vertices(e))).sum()
+    }
+
+    fn area(mesh: &Mesh, name: &str) -> Point {
+        let triangles = mesh.topology().surface(name).expect("it has it");
+        triangles.iter().fold([0.0; 3], |sum, t| {
+            let a = tet4::area_vector(t.map(|n| mesh.point(n)));
+            [0, 1, 2].map(|d| sum[d] + a[d])
+        })
+    }
+
+    #[test]
+    fn a_later_box_is_a_hole_in_an_earlier_one() {
+        let mesh = boxes(&plate()).expect("valid");
+        assert_eq!(mesh.topology().region_names(), ["air", "plate"]);
+        assert!((volume(&mesh, "plate") - 20.0).abs() < 1e-10);
+        assert!((volume(&mesh, "air") - 7980.0).abs() < 1e-8);
+    }
+
+    #[test]
+    fn the_skin_limits_the_cells_at_both_sides_of_a_face() {
+        let mesh = boxes(&plate()).expect("valid");
+        let mut z: Vec<f64> = mesh.points().iter().map(|p| p[2]).collect();
+        z.sort_by(f64::total_cmp);
+        z.dedup();
+        for face in [0.0, 1.0] {
+            let at = z.iter().position(|&c| c == face).expect("faces are lines");
+            assert!(z[at] - z[at - 1] <= 0.211 && z[at + 1] - z[at] <= 0.211, "{z:?}");
+        }
+    }
+
+    #[test]
+    fn patches_hold_the_faces_within_them_oriented_out_of_the_later_region() {
+        let mut parameters = plate();
+        let patch = |name: &str, corners| SurfacePatch { name: name.into(), corners };
+        parameters.surfaces = vec![
+            patch("top", [[-3.0, -2.0, 1.0], [3.0, 2.0, 1.0]]),
+            patch("bottom", [[-3.0, -2.0, 0.0], [3.0, 2.0, 0.0]]),
+            patch("hole", [[-2.0, -1.0, 0.0], [0.0, 1.0, 1.0]]),
+            patch("ground", [[-10.0, -10.0, -10.0], [10.0, 10.0, -10.0]]),
+        ];
+        let mesh = boxes(&parameters).expect("valid");
+        let close = |found: Point, expected: Point| {
+            (0..3).for_each(|d| assert!((found[d] - expected[d]).abs() < 1e-9, "{found:?} {expected:?}"));
+        };
+        close(area(&mesh, "top"), [0.0, 0.0, 20.0]);
+        close(area(&mesh, "bottom"), [0.0, 0.0, -20.0]);
+        close(area(&mesh, "hole"), [0.0; 3]);
+        close(area(&mesh, "ground"), [0.0, 0.0, -400.0]);
+        parameters.surfaces = vec![patch("nowhere", [[5.0; 3], [6.0; 3]])];
+        let refused = boxes(&parameters).expect_err("no face lies there").to_string();
+        assert!(refused.contains("mesh.boxes.surfaces") && refused.contains("`nowhere`"), "{refused}");
+    }
+
+    #[test]
+    fn observation_cells_fill_their_box_in_order() {
+        let mut parameters = plate();
+        parameters.regions.push(BoxRegion {
+            cells: Some([2, 3, 1]),
+            ..region("observation", [[0.0, 0.0, 4.0], [2.0, 3.0, 5.0]])
+        });
+        let mesh = boxes(&parameters).expect("valid");
+        let topology = mesh.topology();
+        let cells = topology.cells_of(topology.region("observation").expect("it has it"));
+        assert_eq!(cells.len(), 6);
+        for (number, cell) in cells.iter().enumerate() {
+            let volume: f64 = cell.iter().map(|&e| tet4::volume(mesh.vertices(e))).sum();
+            assert!((volume - 1.0).abs() < 1e-10);
+            let (i, j) = (number / 3, number % 3);
+            for &e in cell {
+                for p in mesh.vertices(e) {
+                    assert!((i as f64..=i as f64 + 1.0).contains(&p[0]));
+                    assert!((j as f64..=j as f64 + 1.0).contains(&p[1]));
+                }
+            }
+        }
+        parameters.regions.push(region("air", [[0.0, 0.0, 4.0], [1.0, 1.0, 5.0]]));
+        assert!(boxes(&parameters).expect_err("a cell is covered").to_string().contains("observation"));
+    }
+
+    #[test]
+    fn refinement_halves_the_cells_everywhere() {
+        let coarse = boxes(&plate()).expect("valid").topology().tets().len();
+        let fine =
+            boxes(&BoxesParameters { refinement: 2.0, ..plate() }).expect("valid").topology().tets().len();
+        assert!((5.0..12.0).contains(&(fine as f64 / coarse as f64)), "{coarse} {fine}");
+    }
+
+    #[test]
+    fn what_makes_no_mesh_is_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut BoxesParameters)| {
+            let mut parameters = plate();
+            change(&mut parameters);
+            match boxes(&parameters) {
+                Err(MeshError::Parameter { parameter, .. }) => parameter,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(refused(&|p| p.corners[1][2] = -10.0), "mesh.boxes.box");
+        assert_eq!(refused(&|p| p.corners[1][2] = f64::NAN), "mesh.boxes.box");
+        assert_eq!(refused(&|p| p.refinement = 0.0), "mesh.boxes.refinement");
+        assert_eq!(refused(&|p| p.growth = 1.0), "mesh.boxes");
+        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = 11.0), "mesh.boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = -3.0), "mesh.boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].cells = Some([1, 0, 1])), "mesh.boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].size[0] = 1e-4), "mesh.boxes");
+        let far = AxisSize { axis: 3, limit: SizeLimit { interval: [0.0; 2], size: 1.0 } };
+        assert_eq!(refused(&|p| p.sizes = vec![far]), "mesh.boxes.sizes");
+    }
+}

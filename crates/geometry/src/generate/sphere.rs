@@ -1,0 +1,464 @@
+//! An octant of a ball, solid or hollow, in a larger ball: the sphere of the closed forms.
+//!
+//! The core is a cube of `n³` cells whose shells `max(i, j, k) = m` are mapped to spheres; beyond the core the three
+//! outer faces of the cube go on as radial layers of `3 n²` cells. A cell is cut into the six monotone paths from its
+//! lowest to its highest corner (Kuhn 1960), in the core along (x, y, z), in a layer along (radius, and the two axes
+//! of its face); on a face between two cells both rules draw the same diagonal, because each runs from the corner
+//! with the lower indices to the one with the higher. Every node is on a sphere, every tetrahedron has a face on one.
+//!
+//! Directions are equal angles on each face of the cube: the point `(n, j, k)` looks along
+//! `(1, tan(π j/4n), tan(π k/4n))`. So nodes on the symmetry planes have the coordinate zero exactly.
+
+use std::f64::consts::FRAC_PI_4;
+use std::sync::Arc;
+
+use crate::error::MeshError;
+use crate::generate::grading::{self, Fine, Growth, Skin};
+use crate::generate::grid::{TETS_LIMIT, TETS_PER_CELL};
+use crate::ids::{NodeId, RegionId};
+use crate::mesh::Mesh;
+use crate::tet4::{self, Point};
+use crate::topology::Topology;
+
+/// Radii and layers of the sphere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SphereParameters {
+    /// Outer radius of the sphere [m].
+    pub radius: f64,
+    /// Radius of the cavity of a hollow sphere [m].
+    pub inner_radius: Option<f64>,
+    /// Radius of the whole mesh [m]; five radii leave 1 % of a dipole's field.
+    pub outer_radius: f64,
+    /// Cells along an eighth of a great circle, and along the radius of the core.
+    pub divisions: usize,
+    /// Depths of layers under the surface [m], ascending; of a hollow sphere under both surfaces. Empty: none.
+    pub skin: Vec<f64>,
+    /// Equal layers of the wall of a hollow sphere without `skin`.
+    pub wall_layers: usize,
+    /// Thickness of the first layer outside [m]; `None`: the length of the surface's cells.
+    pub air_layer: Option<f64>,
+    /// Ratio of neighbouring layers outside, at least 1.
+    pub growth: f64,
+    /// Divisions are multiplied and layers divided by it; the growth ratio becomes its root.
+    pub refinement: f64,
+}
+
+impl Default for SphereParameters {
+    fn default() -> Self {
+        Self {
+            radius: 0.05,
+            inner_radius: None,
+            outer_radius: 0.25,
+            divisions: 10,
+            skin: Vec::new(),
+            wall_layers: 4,
+            air_layer: None,
+            growth: 1.3,
+            refinement: 1.0,
+        }
+    }
+}
+
+const AIR: RegionId = RegionId(0);
+const SPHERE: RegionId = RegionId(1);
+const CAVITY: RegionId = RegionId(2);
+
+/// Paths along the axes of a cell from its lowest to its highest corner.
+const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+
+/// The mesh of a sphere: the octant `x, y, z ≥ 0`.
+///
+/// Regions: `air`, `sphere`, and `cavity` of a hollow one. Surfaces: `x_min`, `y_min`, `z_min` (the symmetry planes) and
+/// `outer`, oriented outwards; `sphere` and, of a hollow one, `cavity`, oriented out of the region `sphere`.
+///
+/// # Errors
+/// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.sphere.…`).
+pub fn sphere(parameters: &SphereParameters) -> Result<Mesh, MeshError> {
+    check(parameters)?;
+    let n = ((parameters.divisions as f64 * parameters.refinement).round() as usize).max(1);
+    let radii = radii(parameters, n)?;
+    check_size(n, radii.len() - n)?;
+    let numbering = Numbering { n };
+    let (mut tets, mut region_of) = (Vec::new(), Vec::new());
+    let mut cell = |corner: &dyn Fn([usize; 3]) -> NodeId, region| {
+        tets.extend(PATHS.map(|path| kuhn(path, corner)));
+        region_of.extend([region; TETS_PER_CELL]);
+    };
+    let region_within = |outer: f64| match parameters.inner_radius {
+        Some(inner) if outer <= inner => CAVITY,
+        _ if outer <= parameters.radius => SPHERE,
+        _ => AIR,
+    };
+    for i in 0..n {
+        for j in 0..n {
+            for k in 0..n {
+                let region = region_within(radii[i.max(j).max(k) + 1]);
+                cell(&|[a, b, c]| numbering.core([i + a, j + b, k + c]), region);
+            }
+        }
+    }
+    for layer in n..radii.len() - 1 {
+        let region = region_within(radii[layer + 1]);
+        for axis in 0..3 {
+            for j in 0..n {
+                for k in 0..n {
+                    cell(&|[a, b, c]| numbering.layer(layer + a, on_face(axis, n, j + b, k + c)), region);
+                }
+            }
+        }
+    }
+    let points = numbering.points(&radii);
+    for tet in &mut tets {
+        // Half of the paths are left-handed.
+        if tet4::volume(tet.map(|node| points[node.index()])) < 0.0 {
+            tet.swap(1, 2);
+        }
+    }
+    let mut names = vec!["air".to_owned(), "sphere".to_owned()];
+    names.extend(parameters.inner_radius.map(|_| "cavity".to_owned()));
+    let topology = with_surfaces(Topology::new(points.len(), tets, names, region_of)?, &points)?;
+    Mesh::new(Arc::new(topology), points)
+}
+
+/// The point of a face of the cube that is `n` along its axis; the other two follow in cyclic order.
+fn on_face(axis: usize, n: usize, j: usize, k: usize) -> [usize; 3] {
+    let mut index = [0; 3];
+    (index[axis], index[(axis + 1) % 3], index[(axis + 2) % 3]) = (n, j, k);
+    index
+}
+
+/// The tetrahedron of a path through the corners of a cell.
+fn kuhn(path: [usize; 3], corner: &dyn Fn([usize; 3]) -> NodeId) -> [NodeId; 4] {
+    let mut at = [0; 3];
+    let mut tet = [corner(at); 4];
+    for (step, axis) in path.into_iter().enumerate() {
+        at[axis] = 1;
+        tet[step + 1] = corner(at);
+    }
+    tet
+}
+
+/// Numbers of the nodes: first the core, then layer by layer the surface of the cube.
+struct Numbering {
+    n: usize,
+}
+
+impl Numbering {
+    /// Node of the core.
+    fn core(&self, [i, j, k]: [usize; 3]) -> NodeId {
+        let m = self.n + 1;
+        NodeId::new((i * m + j) * m + k)
+    }
+
+    /// Nodes of a shell: `(n + 1)³ − n³`.
+    fn shell_size(&self) -> usize {
+        (self.n + 1).pow(3) - self.n.pow(3)
+    }
+
+    /// Node of a shell at or beyond the core, at a point of the surface of the cube.
+    fn layer(&self, shell: usize, index: [usize; 3]) -> NodeId {
+        if shell == self.n {
+            return self.core(index);
+        }
+        NodeId::new((self.n + 1).pow(3) + (shell - self.n - 1) * self.shell_size() + self.place(index))
+    }
+
+    /// Number of a point among those of the cube's surface: the face x = n, then what is left of y = n, then of z = n.
+    fn place(&self, [i, j, k]: [usize; 3]) -> usize {
+        let (n, m) = (self.n, self.n + 1);
+        if i == n {
+            j * m + k
+        } else if j == n {
+            m * m + i * m + k
+        } else {
+            m * m + n * m + i * n + j
+        }
+    }
+
+    /// Points of the cube's surface, by [`Numbering::place`].
+    fn surface(&self) -> Vec<[usize; 3]> {
+        let n = self.n;
+        let mut points = Vec::with_capacity(self.shell_size());
+        points.extend((0..=n).flat_map(|j| (0..=n).map(move |k| [n, j, k])));
+        points.extend((0..n).flat_map(|i| (0..=n).map(move |k| [i, n, k])));
+        points.extend((0..n).flat_map(|i| (0..n).map(move |j| [i, j, n])));
+        points
+    }
+
+    /// Coordinates of all nodes [m].
+    fn points(&self, radii: &[f64]) -> Vec<Point> {
+        let n = self.n;
+        let mut points = Vec::new();
+        for i in 0..=n {
+            for j in 0..=n {
+                points.extend((0..=n).map(|k| {
+                    let shell = i.max(j).max(k);
+                    direction([i, j, k], shell).map(|c| radii[shell] * c)
+                }));
+            }
+        }
+        let directions: Vec<Point> = self.surface().iter().map(|&index| direction(index, n)).collect();
+        for radius in &radii[n + 1..] {
+            points.extend(directions.iter().map(|direction| direction.map(|c| radius * c)));
+        }
+        points
+    }
+}
+
+/// Unit vector of a point on the shell `max(i, j, k) = m` of the cube; zero of the centre.
+fn direction(index: [usize; 3], m: usize) -> Point {
+    if m == 0 {
+        return [0.0; 3];
+    }
+    // The tangent of 45° is one: without the case it is one less than a bit below.
+    let raw = index.map(|i| if i == m { 1.0 } else { (FRAC_PI_4 * i as f64 / m as f64).tan() });
+    let length = tet4::dot(raw, raw).sqrt();
+    raw.map(|c| c / length)
+}
+
+/// Radii of all shells, from the centre to the outside [m]; the first `n + 1` are those of the core.
+fn radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
+    const SKIN: &str = "mesh.sphere.skin";
+    let parts = (p.refinement.round() as usize).max(1);
+    let wall = match (p.inner_radius, p.skin.last()) {
+        (Some(inner), Some(_)) => {
+            let lines = grading::skin(SKIN, [inner, p.radius], Skin::AtBothEnds, &p.skin)?;
+            grading::subdivided(&lines, parts)
+        }
+        (Some(inner), None) => {
+            let layers = (p.wall_layers as f64 * p.refinement).round().max(1.0);
+            grading::equal_parts([inner, p.radius], layers as usize)
+        }
+        (None, Some(_)) => {
+            let lines = grading::skin(SKIN, [0.0, p.radius], Skin::AtEnd, &p.skin)?;
+            grading::subdivided(&lines[1..], parts)
+        }
+        (None, None) => vec![p.radius],
+    };
+    let mut radii = grading::equal_parts([0.0, wall[0]], n);
+    radii.extend(&wall[1..]);
+    let along = p.radius * FRAC_PI_4 / n as f64;
+    let first = p.air_layer.map_or(along, |layer| layer / p.refinement);
+    let growth = Growth { first, ratio: p.growth.powf(1.0 / p.refinement), largest: f64::INFINITY };
+    let air = grading::growing("mesh.sphere.growth", &[p.radius, p.outer_radius], Fine::Start, growth)?;
+    radii.extend(&air[1..]);
+    Ok(radii)
+}
+
+fn check(p: &SphereParameters) -> Result<(), MeshError> {
+    let refuse = |parameter, value: String, expected: &str| {
+        Err(MeshError::Parameter { parameter, value, expected: expected.to_owned() })
+    };
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    if !positive(p.radius) {
+        return refuse("mesh.sphere.radius", format!("{} m", p.radius), "a positive radius");
+    }
+    if let Some(inner) = p.inner_radius.filter(|&inner| !(positive(inner) && inner < p.radius)) {
+        let expected = format!("a positive radius below that of the sphere, {} m", p.radius);
+        return refuse("mesh.sphere.inner_radius", format!("{inner} m"), &expected);
+    }
+    if !(p.outer_radius.is_finite() && p.outer_radius > p.radius) {
+        let expected = format!("a radius beyond that of the sphere, {} m", p.radius);
+        return refuse("mesh.sphere.outer_radius", format!("{} m", p.outer_radius), &expected);
+    }
+    if p.divisions == 0 {
+        return refuse("mesh.sphere.divisions", "0".into(), "at least one cell");
+    }
+    if p.wall_layers == 0 {
+        return refuse("mesh.sphere.wall_layers", "0".into(), "at least one layer");
+    }
+    if let Some(layer) = p.air_layer.filter(|&layer| !positive(layer)) {
+        return refuse("mesh.sphere.air_layer", format!("{layer} m"), "a positive thickness");
+    }
+    if !positive(p.refinement) {
+        return refuse("mesh.sphere.refinement", p.refinement.to_string(), "a positive number");
+    }
+    Ok(())
+}
+
+/// Refuses too many cells before anything is allocated for them.
+fn check_size(n: usize, layers: usize) -> Result<(), MeshError> {
+    let (n, layers) = (n as u64, layers as u64);
+    let cells = n.saturating_mul(n).saturating_mul(n.saturating_add(layers.saturating_mul(3)));
+    let tets = cells.saturating_mul(TETS_PER_CELL as u64);
+    if tets <= TETS_LIMIT {
+        return Ok(());
+    }
+    Err(MeshError::Parameter {
+        parameter: "mesh.sphere.divisions",
+        value: format!("{n} with {layers} layers, {tets} tetrahedra"),
+        expected: format!("at most {TETS_LIMIT} tetrahedra are made; use fewer divisions"),
+    })
+}
+
+/// Names the symmetry planes, the outside, and the faces of the region `sphere`.
+fn with_surfaces(topology: Topology, points: &[Point]) -> Result<Topology, MeshError> {
+    let mut named: [(&str, Vec<[NodeId; 3]>); 6] =
+        ["x_min", "y_min", "z_min", "outer", "sphere", "cavity"].map(|name| (name, Vec::new()));
+    let region_at = |e: crate::ids::ElementId| topology.region_of()[e.index()];
+    for facet in topology.facets() {
+        let [a, b, c] = facet.nodes;
+        match facet.outside {
+            None => {
+                let plane = (0..3).find(|&d| facet.nodes.iter().all(|node| points[node.index()][d] == 0.0));
+                named[plane.unwrap_or(3)].1.push([a, b, c]);
+            }
+            Some(outside) => {
+                let (inside, outside) = (region_at(facet.inside), region_at(outside));
+                let triangle = if inside == SPHERE { [a, b, c] } else { [a, c, b] };
+                let surface = if inside == CAVITY || outside == CAVITY { 5 } else { 4 };
+                named[surface].1.push(triangle);
+            }
+        }
+    }
+    let hollow = topology.region_names().len() > CAVITY.index();
+    let mut topology = topology;
+    for (name, triangles) in named {
+        if name != "cavity" || hollow {
+            topology = topology.with_surface(name, triangles)?;
+        }
+    }
+    Ok(topology)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::quality::QualityReport;
+
+    fn volume(mesh: &Mesh, name: &str) -> f64 {
+        let id = mesh.topology().region(name).expect("it has it");
+        mesh.topology().elements_of(id).iter().map(|&e| tet4::volume(mesh.vertices(e))).sum()
+    }
+
+    fn area(mesh: &Mesh, name: &str) -> Point {
+        let triangles = mesh.topology().surface(name).expect("it has it");
+        triangles.iter().fold([0.0; 3], |sum, t| {
+            let a = tet4::area_vector(t.map(|n| mesh.point(n)));
+            [0, 1, 2].map(|d| sum[d] + a[d])
+        })
+    }
+
+    fn thin_skinned() -> SphereParameters {
+        SphereParameters {
+            radius: 0.01,
+            outer_radius: 0.06,
+            divisions: 8,
+            skin: vec![0.2e-3, 0.5e-3, 1e-3, 2e-3],
+            air_layer: Some(0.4e-3),
+            growth: 1.5,
+            ..SphereParameters::default()
+        }
+    }
+
+    fn hollow() -> SphereParameters {
+        SphereParameters {
+            radius: 0.055,
+            inner_radius: Some(0.05),
+            wall_layers: 3,
+            ..SphereParameters::default()
+        }
+    }
+
+    #[test]
+    fn volumes_converge_with_the_second_order() {
+        let errors: Vec<f64> = [4, 8, 16]
+            .into_iter()
+            .map(|divisions| {
+                let mesh = sphere(&SphereParameters { divisions, ..hollow() }).expect("valid");
+                let octant = |r: f64| PI / 6.0 * r.powi(3);
+                let error = |found: f64, exact: f64| (1.0 - found / exact).abs();
+                error(volume(&mesh, "cavity"), octant(0.05))
+                    .max(error(volume(&mesh, "sphere"), octant(0.055) - octant(0.05)))
+                    .max(error(volume(&mesh, "air"), octant(0.25) - octant(0.055)))
+            })
+            .collect();
+        for pair in errors.windows(2) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((order - 2.0).abs() < 0.1, "{errors:?}");
+        }
+        assert!(errors[2] < 1.5e-3, "{errors:?}");
+    }
+
+    #[test]
+    fn the_surfaces_close_and_lie_on_their_spheres() {
+        for parameters in [SphereParameters::default(), thin_skinned(), hollow()] {
+            let mesh = sphere(&parameters).expect("valid");
+            let topology = mesh.topology();
+            // A T-junction would leave outside faces in the interior.
+            let outside = topology.facets().iter().filter(|f| f.outside.is_none()).count();
+            let named: usize = ["x_min", "y_min", "z_min", "outer"]
+                .into_iter()
+                .map(|name| topology.surface(name).expect("it has it").len())
+                .sum();
+            assert_eq!(named, outside);
+            let sum = ["x_min", "y_min", "z_min", "outer"].into_iter().fold([0.0; 3], |sum, name| {
+                let a = area(&mesh, name);
+                [0, 1, 2].map(|d| sum[d] + a[d])
+            });
+            let scale = parameters.outer_radius.powi(2);
+            assert!(sum.iter().all(|s| s.abs() < 1e-12 * scale), "{sum:?}");
+            let mut spheres = vec![("sphere", parameters.radius), ("outer", parameters.outer_radius)];
+            spheres.extend(parameters.inner_radius.map(|inner| ("cavity", inner)));
+            for (name, radius) in spheres {
+                for node in topology.surface(name).expect("it has it").iter().flatten() {
+                    let p = mesh.point(*node);
+                    assert!((tet4::dot(p, p).sqrt() / radius - 1.0).abs() < 1e-14, "{name}");
+                }
+                // The area vector of an octant of a sphere is that of three flat quarter circles.
+                let sign = if name == "cavity" { -1.0 } else { 1.0 };
+                for component in area(&mesh, name) {
+                    let exact = sign * PI / 4.0 * radius * radius;
+                    assert!((component / exact - 1.0).abs() < 0.01, "{name}: {component} {exact}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_tetrahedron_is_a_sliver() {
+        for (parameters, least) in [
+            // Growing layers outside are thicker than their triangles are long.
+            (SphereParameters::default(), 0.15),
+            // Layers of 0.2 mm on triangles of 1 mm.
+            (thin_skinned(), 0.1),
+            (hollow(), 0.2),
+            (SphereParameters { divisions: 1, growth: 2.0, ..SphereParameters::default() }, 0.1),
+        ] {
+            let report = QualityReport::of_mesh(&sphere(&parameters).expect("valid")).expect("not empty");
+            assert!(report.worst >= least, "{parameters:?}: {report:?}");
+        }
+    }
+
+    #[test]
+    fn refinement_divides_every_direction() {
+        let coarse = sphere(&thin_skinned()).expect("valid").topology().tets().len();
+        let fine = sphere(&SphereParameters { refinement: 2.0, ..thin_skinned() }).expect("valid");
+        let ratio = fine.topology().tets().len() as f64 / coarse as f64;
+        assert!((7.0..9.0).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn what_makes_no_sphere_is_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut SphereParameters)| {
+            let mut parameters = hollow();
+            change(&mut parameters);
+            match sphere(&parameters) {
+                Err(MeshError::Parameter { parameter, .. }) => parameter,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert_eq!(refused(&|p| p.radius = f64::NAN), "mesh.sphere.radius");
+        assert_eq!(refused(&|p| p.inner_radius = Some(0.06)), "mesh.sphere.inner_radius");
+        assert_eq!(refused(&|p| p.outer_radius = 0.05), "mesh.sphere.outer_radius");
+        assert_eq!(refused(&|p| p.divisions = 0), "mesh.sphere.divisions");
+        assert_eq!(refused(&|p| p.divisions = 10_000), "mesh.sphere.divisions");
+        assert_eq!(refused(&|p| p.skin = vec![0.003]), "mesh.sphere.skin");
+        assert_eq!(refused(&|p| p.wall_layers = 0), "mesh.sphere.wall_layers");
+        assert_eq!(refused(&|p| p.air_layer = Some(0.0)), "mesh.sphere.air_layer");
+        assert_eq!(refused(&|p| p.growth = 0.5), "mesh.sphere.growth");
+        assert_eq!(refused(&|p| p.refinement = f64::NAN), "mesh.sphere.refinement");
+    }
+}
