@@ -299,22 +299,6 @@ fn every_fault_is_named_with_its_line_and_the_expectation() {
 }
 
 #[test]
-fn a_mesh_file_is_refused_as_long_as_none_can_be_read() {
-    let home = folder();
-    let text = fs::read_to_string(quick()).expect("the quick configuration");
-    let (before, rest) = text.split_once("generator = \"shield\"").expect("the generator");
-    let (_, after) = rest.split_once("[analysis]").expect("the next table");
-    let config = home.path().join("device.toml");
-    let mesh = "file = \"device.msh\"\nunit = \"mm\"\n\n[analysis]";
-    fs::write(&config, format!("{before}{mesh}{after}")).expect("written");
-    fluxmorph(&["check".as_ref(), config.as_os_str()]).exits_with(3).says(&[
-        "mesh files cannot be read yet",
-        "device.toml:10:",
-        "generator = \"shield\"",
-    ]);
-}
-
-#[test]
 fn the_bound_that_the_message_offers_can_be_used() {
     let home = folder();
     let (finished, _) = run_changed(home.path(), "upper = \"20 mm\"", "upper = \"40 mm\"");

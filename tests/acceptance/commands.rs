@@ -18,6 +18,8 @@ fn solve_writes_one_analysis_of_the_initial_design() {
             "fields.pvd",
             "fields/eval_0000.vtu",
             "manifest.json",
+            "optimum.msh",
+            "optimum_plate_bottom.stl",
             "resolved.toml",
             "result.json",
         ];

@@ -6,6 +6,7 @@ mod commands;
 mod determinism;
 mod folders;
 mod interruption;
+mod mesh_files;
 mod program;
 mod pyvista;
 mod run_files;

@@ -111,6 +111,28 @@ pub enum MeshError {
         /// What is wrong.
         cause: String,
     },
+    /// A Gmsh file is refused.
+    #[error("{}, {cause}", path.display())]
+    Msh {
+        /// The file.
+        path: PathBuf,
+        /// Place and fault.
+        cause: Box<crate::io::MshError>,
+    },
+    /// The name of a region or surface cannot stand in a mesh file.
+    #[error("the name `{}` {problem}, and cannot stand in a mesh file: give it another name", name.escape_debug())]
+    Name {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Two regions, or a region and the outside, do not touch.
+    #[error("the regions of `{name}` have no face in common")]
+    NoInterface {
+        /// The two names with a bar between them.
+        name: String,
+    },
     /// Reading or writing a file failed.
     #[error("{}: {cause}", path.display())]
     File {

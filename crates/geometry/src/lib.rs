@@ -2,11 +2,12 @@
 //!
 //! The mesh topology never changes during an optimisation; only coordinates move (section 2 of the seed paper). So
 //! [`Topology`] (connectivity, regions, surfaces) lives apart from [`Mesh`] (topology and coordinates), and
-//! everything that follows from topology alone is made once a run. Meshes come from [`generate`]; they leave through
+//! everything that follows from topology alone is made once a run. Meshes come from [`generate`] or files; they leave through
 //! [`io`]; [`quality`] judges them (Eq. 4). [`fem`] is the kernel that the elastic and the electromagnetic problem
 //! share, as the paper's appendix suggests.
 
 pub mod error;
+mod facets;
 pub mod fem;
 pub mod generate;
 pub mod ids;

@@ -5,12 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
 use crate::error::MeshError;
+use crate::facets::find_facets;
 use crate::ids::{ElementId, NodeId, RegionId};
 use crate::incidence::Incidence;
-use crate::tet4::FACES;
+
+/// What stands for the outside of the mesh in the name of an interface.
+pub const OUTSIDE: &str = "outside";
 
 /// A triangle between two regions or at the outside of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +71,7 @@ impl Topology {
             return Err(MeshError::DanglingNode { node, nodes: node_count });
         }
         let incidence = Incidence::new(node_count, &tets);
-        let facets = find_facets(&tets, &region_of)?;
+        let facets = find_facets(node_count, &tets, &region_of)?;
         Ok(Self {
             node_count,
             tets,
@@ -182,14 +183,66 @@ impl Topology {
         self.incidence.around(node)
     }
 
+    /// Whether three different nodes make a face of some element.
+    pub fn has_face(&self, [a, b, c]: [NodeId; 3]) -> bool {
+        let holds = |e: &ElementId| self.tet(*e).contains(&b) && self.tet(*e).contains(&c);
+        a != b && b != c && c != a && self.elements_around(a).iter().any(holds)
+    }
+
     /// Faces between two regions and at the outside, ordered by (inside element, local face).
     pub fn facets(&self) -> &[Facet] {
         &self.facets
     }
 
+    /// Faces between two regions, oriented out of the first, in the order of [`Topology::facets`].
+    pub fn interface(&self, of: RegionId, towards: RegionId) -> Vec<[NodeId; 3]> {
+        let region_at = |e: ElementId| self.region_of[e.index()];
+        let oriented = |f: &Facet| {
+            let [a, b, c] = f.nodes;
+            match (region_at(f.inside), region_at(f.outside?)) {
+                pair if pair == (of, towards) => Some([a, b, c]),
+                pair if pair == (towards, of) => Some([a, c, b]),
+                _ => None,
+            }
+        };
+        self.facets.iter().filter_map(oriented).collect()
+    }
+
+    /// Faces of a region at the outside of the mesh, oriented outwards.
+    pub fn outer_faces(&self, of: RegionId) -> Vec<[NodeId; 3]> {
+        let outer = |f: &&Facet| f.outside.is_none() && self.region_of[f.inside.index()] == of;
+        self.facets.iter().filter(outer).map(|f| f.nodes).collect()
+    }
+
+    /// The faces that a name `"a|b"` stands for: between the regions `a` and `b`, oriented out of `a`.
+    ///
+    /// `"a|outside"` are the faces of `a` at the outside of the mesh, unless a region has that name.
+    ///
+    /// # Errors
+    /// [`MeshError::UnknownRegion`] for a side that is no region, [`MeshError::NoInterface`] for regions that do not
+    /// touch, [`MeshError::UnknownSurface`] for a name without bar.
+    pub fn faces_between(&self, name: &str) -> Result<Vec<[NodeId; 3]>, MeshError> {
+        // A region's own name may hold a bar: the first bar with a region on both sides is the one.
+        let side = |name: &str| match self.region(name) {
+            Err(_) if name == OUTSIDE => Ok(None),
+            other => other.map(Some),
+        };
+        let splits = || name.match_indices('|').map(|(at, _)| (name[..at].trim(), name[at + 1..].trim()));
+        let known = splits().find(|(of, towards)| self.region(of).is_ok() && side(towards).is_ok());
+        let Some((of, towards)) = known.or_else(|| splits().next()) else {
+            return self.surface(name).map(<[_]>::to_vec);
+        };
+        let of = self.region(of)?;
+        let faces = match side(towards)? {
+            Some(towards) => self.interface(of, towards),
+            None => self.outer_faces(of),
+        };
+        if faces.is_empty() { Err(MeshError::NoInterface { name: name.to_owned() }) } else { Ok(faces) }
+    }
+
     /// The same mesh without one region: its elements and the nodes that only it used are gone.
     ///
-    /// Surfaces keep the triangles whose nodes all survive.
+    /// Surfaces keep the triangles that are faces of a remaining element.
     ///
     /// # Errors
     /// [`MeshError::OverfullFace`] cannot occur on a valid topology; it is passed through.
@@ -224,7 +277,10 @@ impl Topology {
         topology.surfaces = self
             .surfaces
             .iter()
-            .map(|(name, triangles)| (name.clone(), triangles.iter().filter_map(renumber).collect()))
+            .map(|(name, triangles)| {
+                let left = triangles.iter().filter_map(renumber).filter(|face| topology.has_face(*face));
+                (name.clone(), left.collect())
+            })
             .collect();
         topology.cells = self
             .cells
@@ -256,42 +312,6 @@ impl Topology {
     }
 }
 
-/// Faces between different regions and at the outside.
-fn find_facets(tets: &[[NodeId; 4]], region_of: &[RegionId]) -> Result<Vec<Facet>, MeshError> {
-    let mut faces: Vec<([NodeId; 3], u32)> = tets
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(e, tet)| {
-            FACES.iter().enumerate().map(move |(f, face)| {
-                let mut key = face.map(|v| tet[v]);
-                key.sort_unstable();
-                (key, (4 * e + f) as u32)
-            })
-        })
-        .collect();
-    faces.par_sort_unstable();
-    let oriented = |code: u32| {
-        let tet = tets[(code / 4) as usize];
-        (FACES[(code % 4) as usize].map(|v| tet[v]), ElementId(code / 4))
-    };
-    let mut found: Vec<(u32, Facet)> = Vec::new();
-    for group in faces.chunk_by(|a, b| a.0 == b.0) {
-        let (nodes, inside) = oriented(group[0].1);
-        match group {
-            [(_, code)] => found.push((*code, Facet { nodes, inside, outside: None })),
-            [(_, code), (_, other)] => {
-                let outside = ElementId(other / 4);
-                if region_of[inside.index()] != region_of[outside.index()] {
-                    found.push((*code, Facet { nodes, inside, outside: Some(outside) }));
-                }
-            }
-            _ => return Err(MeshError::OverfullFace { face: group[0].0 }),
-        }
-    }
-    found.sort_unstable_by_key(|&(code, _)| code);
-    Ok(found.into_iter().map(|(_, facet)| facet).collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -321,6 +341,27 @@ mod tests {
     }
 
     #[test]
+    fn an_interface_points_out_of_its_first_region() {
+        let topology = pair();
+        assert_eq!(topology.interface(RegionId(0), RegionId(1)), [[n(1), n(2), n(3)]]);
+        assert_eq!(topology.interface(RegionId(1), RegionId(0)), [[n(1), n(3), n(2)]]);
+        assert!(topology.interface(RegionId(0), RegionId(0)).is_empty());
+        assert_eq!(topology.outer_faces(RegionId(0)).len(), 3);
+        assert_eq!(topology.faces_between("right|left").expect("they touch"), [[n(1), n(3), n(2)]]);
+        assert_eq!(topology.faces_between("left | outside").expect("it is outside").len(), 3);
+    }
+
+    #[test]
+    fn an_interface_that_is_not_there_says_which_side_is_wrong() {
+        let topology = pair();
+        let message = |name| topology.faces_between(name).expect_err("there is none").to_string();
+        assert_eq!(message("left|rihgt"), "there is no region `rihgt`; the mesh has: left, right");
+        assert_eq!(message("outside|left"), "there is no region `outside`; the mesh has: left, right");
+        assert_eq!(message("left|left"), "the regions of `left|left` have no face in common");
+        assert_eq!(message("top"), "there is no surface `top`; the mesh has: ");
+    }
+
+    #[test]
     fn removing_a_region_exposes_its_faces_and_drops_its_nodes() {
         let left = pair().without_region(RegionId(1)).expect("a region may go");
         assert_eq!((left.topology.node_count(), left.topology.tets().len()), (4, 1));
@@ -328,6 +369,19 @@ mod tests {
         assert_eq!(left.exposed, [[n(1), n(2), n(3)]]);
         let right = pair().without_region(RegionId(0)).expect("a region may go");
         assert_eq!(right.exposed, [[n(0), n(2), n(1)]], "oriented out of the element that stays");
+    }
+
+    #[test]
+    fn a_surface_loses_the_faces_of_a_removed_region_although_their_nodes_stay() {
+        // On the nodes 1, 2, 3 and 0 stands a tet of another region too; its face (0, 1, 4) lies between kept nodes.
+        let tets = vec![[n(0), n(1), n(2), n(3)], [n(4), n(1), n(3), n(2)], [n(0), n(1), n(3), n(4)]];
+        let regions = vec![RegionId(0), RegionId(0), RegionId(1)];
+        let topology = Topology::new(5, tets, vec!["a".into(), "b".into()], regions).expect("a mesh");
+        let topology =
+            topology.with_surface("s", vec![[n(0), n(1), n(4)], [n(0), n(1), n(2)]]).expect("nodes");
+        let left = topology.without_region(RegionId(1)).expect("a region may go").topology;
+        assert_eq!(left.surface("s").expect("named"), [[n(0), n(1), n(2)]]);
+        assert!(!left.has_face([n(0), n(0), n(1)]) && left.has_face([n(2), n(1), n(0)]));
     }
 
     #[test]

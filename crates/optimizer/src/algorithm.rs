@@ -152,7 +152,7 @@ pub fn minimise<E>(
     if settings.constraints > 0 {
         let tolerance = vec![CONSTRAINT_TOLERANCE; settings.constraints];
         accepted = accepted.and_then(|_| {
-            library.add_inequality_mconstraint(settings.constraints, &constraints, (), &tolerance)
+            library.add_inequality_mconstraint(settings.constraints, constraints, (), &tolerance)
         });
     }
     if accepted.is_err() {
@@ -246,11 +246,16 @@ mod tests {
         }
     }
 
+    /// Where a variable is best: inside the bounds, or beyond the upper one.
+    fn centre(k: usize) -> f64 {
+        if k.is_multiple_of(3) { 0.03 } else { 0.004 }
+    }
+
     /// `1 + Σ w_k ((p_k − c_k)/25 mm)²` with minima inside the bounds, and beyond the upper one.
     fn quadratic(p: &[f64]) -> Sample {
         let mut sample = Sample { value: 1.0, ..Sample::default() };
         for (k, p) in p.iter().enumerate() {
-            let (weight, centre) = (1.0 + k as f64, if k % 3 == 0 { 0.03 } else { 0.004 });
+            let (weight, centre) = (1.0 + k as f64, centre(k));
             sample.value += weight * ((p - centre) / 0.025).powi(2);
             sample.gradient.push(2.0 * weight * (p - centre) / 0.025_f64.powi(2));
         }
@@ -336,8 +341,7 @@ mod tests {
                 // Lagrange's conditions: both bounds are active, and all free variables have w_k (p_k − c_k) = −μ.
                 assert!((p[6] - 0.010).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
                 assert!((p.iter().sum::<f64>() - 0.016).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
-                let multiplier =
-                    |k: usize| (1.0 + k as f64) * ((if k % 3 == 0 { 0.03 } else { 0.004 }) - p[k]);
+                let multiplier = |k: usize| (1.0 + k as f64) * (centre(k) - p[k]);
                 let free: Vec<f64> = (0..8)
                     .filter(|&k| k != 6 && p[k] > -0.004999 && p[k] < 0.019999)
                     .map(multiplier)

@@ -1,12 +1,15 @@
 //! Inequality constraints: what must keep within a bound while the objective is optimised.
 //!
 //! A method sees `c = ±(value − bound) / scale`, satisfied where `c ≤ 0` and of order one: the scale is the bound
-//! itself, so `c` is the relative distance from it. How a value is computed is [`crate::problem`]'s business.
+//! itself, so `c` is the relative distance from it. Quantities of the field are computed by [`crate::problem`].
+
+use fluxmorph_geometry::Mesh;
 
 use crate::algorithm::CONSTRAINT_TOLERANCE;
 use crate::error::Error;
 use crate::geometric;
 use crate::objective::Term;
+use crate::problem::Shape;
 
 /// A constraint of a problem.
 #[derive(Debug)]
@@ -24,13 +27,8 @@ pub struct Constraint {
 pub enum Quantity {
     /// A functional of the field; its weight is one.
     Field(Term),
-    /// A volume [m³] times a density: 1 for the volume itself, or [kg/m³] for a mass [kg].
-    Volume {
-        /// The body.
-        body: geometric::Volume,
-        /// The density.
-        density: f64,
-    },
+    /// A volume [m³] or mass [kg].
+    Volume(geometric::Volume),
     /// The least or greatest thickness [m] of the designed body, where the measure counts from `bound`.
     Thickness {
         /// By how much the worst place is beyond the bound.
@@ -61,6 +59,20 @@ pub struct Bound {
 }
 
 impl Constraint {
+    /// Value and gradient of a quantity of the shape alone; `None` for one of the field.
+    pub fn of_shape(&self, p: &[f64], mesh: &Mesh, shape: &Shape) -> Option<(f64, Vec<f64>)> {
+        match &self.quantity {
+            Quantity::Field(_) => None,
+            Quantity::Volume(body) => Some(body.evaluate(mesh, shape)),
+            Quantity::Thickness { measure, bound } => {
+                // Beyond a minimum is below it, beyond a maximum above.
+                let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
+                let (beyond, gradient) = measure.evaluate(shape, p);
+                Some((bound + sign * beyond, gradient.iter().map(|g| sign * g).collect()))
+            }
+        }
+    }
+
     /// The bound, given the value at the initial design.
     ///
     /// # Errors

@@ -132,6 +132,18 @@ impl DesignSurface {
         self.heights(p).into_iter().map(|height| self.direction.map(|d| height * d)).collect()
     }
 
+    /// The transpose of [`DesignSurface::heights`]: from derivatives with respect to the nodes' heights to those with
+    /// respect to the variables.
+    pub fn height_gradient(&self, heights: &[f64]) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.variable_count()];
+        for (row, g) in self.weights.iter().zip(heights) {
+            for &(k, weight) in row {
+                gradient[k] += weight * g;
+            }
+        }
+        gradient
+    }
+
     /// `Pᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
     pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
         let mut gradient = vec![0.0; self.variable_count()];

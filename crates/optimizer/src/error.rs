@@ -6,6 +6,7 @@ use fluxmorph_solver::SolverError;
 
 use crate::cli::ExitCode;
 use crate::config::ConfigError;
+use crate::geometric::GeometricError;
 use crate::output::{DesignFileError, OutputError};
 
 /// Errors of this crate.
@@ -24,6 +25,9 @@ pub enum Error {
     /// The mesh cannot follow the design.
     #[error(transparent)]
     Remesh(#[from] RemeshError),
+    /// A geometric constraint has no meaning for the shape.
+    #[error(transparent)]
+    Geometric(#[from] GeometricError),
     /// A file with a design is wrong.
     #[error(transparent)]
     Design(#[from] DesignFileError),
@@ -84,6 +88,7 @@ impl Error {
             | Self::Config(_)
             | Self::Solver(_)
             | Self::Remesh(_)
+            | Self::Geometric(_)
             | Self::Design(_) => ExitCode::Configuration,
             Self::Threads { .. } => ExitCode::Usage,
         }

@@ -8,6 +8,7 @@ pub mod design;
 pub mod diagnostics;
 pub mod driver;
 mod error;
+mod exports;
 pub mod fields;
 pub mod geometric;
 pub mod objective;

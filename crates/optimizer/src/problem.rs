@@ -288,24 +288,13 @@ impl Problem {
         gathered: &[Gathered],
     ) -> Vec<Measured> {
         let Some(shape) = &self.shape else { return Vec::new() };
-        let of = |(k, constraint): (usize, &Constraint)| match &constraint.quantity {
-            Quantity::Field(_) => {
-                let position = fields.iter().position(|(number, _)| *number == k);
-                let own = &gathered[position.expect("every constraint of the field was gathered")];
-                Measured { value: own.values[0], gradient: wanted.map(|shape| shape.pull_back(&own.nodal)) }
+        let of = |(k, constraint): (usize, &Constraint)| {
+            if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape) {
+                return Measured { value, gradient: wanted.map(|_| gradient) };
             }
-            Quantity::Volume { body, density } => {
-                let (volume, gradient) = body.evaluate(mesh, shape);
-                let gradient = wanted.map(|_| gradient.iter().map(|g| density * g).collect());
-                Measured { value: density * volume, gradient }
-            }
-            Quantity::Thickness { measure, bound } => {
-                // Beyond a minimum is below it, beyond a maximum above.
-                let sign = if matches!(constraint.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
-                let (beyond, gradient) = measure.evaluate(shape, p);
-                let gradient = wanted.map(|_| gradient.iter().map(|g| sign * g).collect());
-                Measured { value: bound + sign * beyond, gradient }
-            }
+            let position = fields.iter().position(|(number, _)| *number == k);
+            let own = &gathered[position.expect("every constraint of the field was gathered")];
+            Measured { value: own.values[0], gradient: wanted.map(|shape| shape.pull_back(&own.nodal)) }
         };
         self.constraints.iter().enumerate().map(of).collect()
     }

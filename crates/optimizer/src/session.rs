@@ -14,13 +14,14 @@ use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::constraint::{Bound, Constraint};
 use crate::driver::{self, Recorder};
 use crate::error::Error;
+use crate::exports;
 use crate::fields;
 use crate::objective::Term;
 use crate::observer::{Evaluation, Observer, Started};
 use crate::output::{
     ConstraintResult, DesignResult, FileHash, History, LinearSolverResult, Manifest, MeshHash, MeshResult,
     ObjectiveResult, OlderRun, ProbeResult, RunDirectory, RunResult, RunStatus, StateResult, StopReason,
-    TermResult, blake3_hex, peak_memory_bytes, write_atomic,
+    TermResult, blake3_hex, peak_memory_bytes, surface_files, write_atomic,
 };
 use crate::problem::{Analysis, Measured, Problem, Timings, Want};
 use crate::setup::{Purpose, Setup, set_up};
@@ -64,6 +65,7 @@ pub fn run(
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, problem, &best.analysis)?;
         }
+        exports::write(config, &session.directory, &best.analysis.mesh, observer)?;
         Ok(RunResult {
             evaluations: optimised.evaluations,
             iterations: optimised.iterations,
@@ -129,6 +131,7 @@ pub fn solve(
             write_field(&session.directory, 0, problem, &analysis)?;
             write_collection(&session.directory, &[0])?;
         }
+        exports::write(config, &session.directory, &analysis.mesh, observer)?;
         let value = analysis.objective;
         let initial_quality = problem.quality(&problem.reference).worst;
         Ok(RunResult {
@@ -183,6 +186,7 @@ impl<'a> Session<'a> {
         });
         manifest.overrides = source.overrides().map(str::to_owned).collect();
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
+        manifest.surfaces = surface_files(&config.output.stl);
         manifest.write(&directory)?;
 
         let mesh = setup.problem.reference.topology();

@@ -41,6 +41,11 @@ impl Thickness {
         Some(Self { initial })
     }
 
+    /// Initial thickness [m] at every design node that has one, with the node's place in the design surface.
+    pub fn at_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.initial.iter().copied().enumerate()
+    }
+
     /// Least and greatest thickness [m] for the heights of the design nodes [m].
     pub fn range(&self, heights: &[f64]) -> (f64, f64) {
         self.initial

@@ -14,6 +14,7 @@ const FULL: [&str; 5] = [
     frequency = "60 Hz"
     [materials.steel]
     conductivity = "7e6 S/m"
+    density = "7850 kg/m3"
     [regions.plate]
     material = "steel"
     [[coils]]
@@ -50,7 +51,29 @@ const FULL: [&str; 5] = [
     [boundaries]
     uniform_field = { surfaces = ["outer"], b = [0, 0, 1] }
     [objective]
+    kind = "uniformity"
     region = "observation"
+    target = [0, 0, 1]
+    frequency = "60 Hz"
+    [[constraints]]
+    kind = "uniformity"
+    region = "observation"
+    target = [0, 0, 1]
+    frequency = "60 Hz"
+    upper = 1
+    [[constraints]]
+    kind = "field_component"
+    region = "observation"
+    direction = [0, 0, 1]
+    upper_ratio = 1
+    [[constraints]]
+    kind = "mass"
+    region = "plate"
+    upper = 1
+    [[constraints]]
+    kind = "thickness"
+    minimum = 0.001
+    maximum = 0.1
     [design]
     surface = "plate_bottom"
     direction = [0, 0, -1]
@@ -74,11 +97,11 @@ const FULL: [&str; 5] = [
     [mesh]
     generator = "block"
     [analysis]
-    frequency = 0
-    [materials.magnet]
-    [regions.magnet]
-    material = "magnet"
-    remanence = [0, 0, 1]
+    frequencies = [0, 50]
+    [objective]
+    kind = "field_component"
+    region = "block"
+    direction = [0, 0, 1]
     [design]
     surface = "z_max"
     direction = [0, 0, 1]
@@ -107,6 +130,10 @@ const FULL: [&str; 5] = [
     box = [[0, 0, 0.5], [1, 1, 0.5]]
     [analysis]
     frequency = 0
+    [materials.magnet]
+    [regions.plate]
+    material = "magnet"
+    remanence = [0, 0, 1]
     "#,
     r#"
     [mesh]
@@ -123,6 +150,15 @@ const FULL: [&str; 5] = [
     unit = "mm"
     [analysis]
     frequency = 0
+    [[objective.terms]]
+    kind = "uniformity"
+    region = "gap"
+    target = [0, 0, 1]
+    frequency = 0
+    [[objective.terms]]
+    kind = "field_component"
+    region = "gap"
+    direction = [0, 0, 1]
     "#,
 ];
 
@@ -237,6 +273,10 @@ fn every_key_that_the_reader_asks_for_is_mentioned() {
         "[boundaries]",
         "[boundaries.uniform_field]",
         "[objective]",
+        "[[objective.terms]]",
+        "[[constraints]]\nkind = \"uniformity\"",
+        "[[constraints]]\nkind = \"mass\"",
+        "[[constraints]]\nkind = \"thickness\"",
         "[design]",
         "[remesh]",
         "[[remesh.subregions]]",

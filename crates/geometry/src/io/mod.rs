@@ -1,9 +1,13 @@
-//! Files: fields for ParaView.
+//! Files: meshes from Gmsh and back, fields for ParaView, surfaces for printing.
 //!
 //! Writers make bytes and never touch the disk: whether a file replaces another whole is not decided here.
 
+pub mod msh;
 pub mod pvd;
+pub mod stl;
 pub mod vtu;
 
+pub use msh::{MshEncoding, MshError, MshMesh, MshNotices, msh_bytes, read_msh, read_msh_file};
 pub use pvd::pvd_text;
+pub use stl::stl_bytes;
 pub use vtu::{ArrayData, Field, VtuArray, VtuContents, read_vtu, vtu_bytes, vtu_contents, write_vtu};

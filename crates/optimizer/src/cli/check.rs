@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::args::CheckArgs;
 use super::exit::ExitCode;
 use super::{stdout, with_threads};
-use crate::config::{Config, RegionModel, Source};
+use crate::config::{Config, MeshConfig, RegionModel, Source};
 use crate::error::Error;
 use crate::setup::{Purpose, Setup, set_up};
 
@@ -31,6 +31,8 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
 #[derive(Debug, Serialize)]
 struct Summary {
     title: String,
+    /// The file of the mesh and the unit of its coordinates; `None` for a generated mesh.
+    mesh_file: Option<MeshFileSummary>,
     nodes: usize,
     tets: usize,
     unknowns: usize,
@@ -43,6 +45,13 @@ struct Summary {
     skin: Vec<SkinSummary>,
     memory_estimate_bytes: usize,
     warnings: Vec<String>,
+}
+
+/// The file that the mesh was read from.
+#[derive(Debug, Serialize)]
+struct MeshFileSummary {
+    path: String,
+    unit: &'static str,
 }
 
 /// One region of the mesh.
@@ -150,6 +159,12 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
     let reference = problem.reference.topology();
     Ok(Summary {
         title: config.title.clone(),
+        mesh_file: match &config.mesh {
+            MeshConfig::File { path, unit } => {
+                Some(MeshFileSummary { path: path.display().to_string(), unit: unit.name() })
+            }
+            _ => None,
+        },
         nodes: reference.node_count(),
         tets: reference.tets().len(),
         unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
@@ -177,6 +192,9 @@ fn table(summary: &Summary) -> String {
     let millimetres = |p: [f64; 3]| format!("{:.1} {:.1} {:.1}", p[0] * 1e3, p[1] * 1e3, p[2] * 1e3);
     let mut text = format!("{}\n\n", summary.title);
     let mut row = |name: &str, value: String| text += &format!("{name:<22}{value}\n");
+    if let Some(file) = &summary.mesh_file {
+        row("mesh file", format!("{}, coordinates in {}", file.path, file.unit));
+    }
     row("nodes", summary.nodes.to_string());
     row("tetrahedra", summary.tets.to_string());
     row("unknowns", format!("{} (field), {} (elastic)", summary.unknowns, summary.elastic_equations));

@@ -240,9 +240,10 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let optimizer =
         root.table("optimizer").map(|s| Optimizer::read(s, constraints.len())).unwrap_or_default();
     let probes = objective::read_probes(&root);
+    let surface = design.as_ref().map(|design| design.surface.as_str()).filter(|name| !name.is_empty());
     let output = match root.table("output") {
-        Some(section) => Output::read(section, &source.directory, &source.stem),
-        None => Output::new(&source.directory, &source.stem),
+        Some(section) => Output::read(section, &source.directory, &source.stem, surface),
+        None => Output::new(&source.directory, &source.stem, surface),
     };
     root.finish();
     Some(Config {

@@ -1,4 +1,4 @@
-//! `[output]`: where results go, and which fields are kept.
+//! `[output]`: where results go, which fields are kept, and in which forms the optimum is written.
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,10 @@ pub struct Output {
     pub directory: PathBuf,
     /// Which evaluations leave a VTU file. Default `every`: a run has some tens of evaluations.
     pub fields: FieldsKept,
+    /// Whether the mesh of the optimum is written as a Gmsh file. Default `true`: it is what a user goes on with.
+    pub mesh: bool,
+    /// Surfaces of the optimum that are written as STL files. Default: the design surface, where there is one.
+    pub stl: Vec<String>,
 }
 
 choice! {
@@ -32,16 +36,23 @@ choice! {
 }
 
 impl Output {
-    /// The defaults for a configuration called `stem` in a folder.
-    pub(super) fn new(directory: &Path, stem: &str) -> Self {
-        Self { directory: directory.join("runs").join(stem), fields: FieldsKept::Every }
+    /// The defaults for a configuration called `stem` in a folder, with its design surface.
+    pub(super) fn new(directory: &Path, stem: &str, surface: Option<&str>) -> Self {
+        Self {
+            directory: directory.join("runs").join(stem),
+            fields: FieldsKept::Every,
+            mesh: true,
+            stl: surface.map(str::to_owned).into_iter().collect(),
+        }
     }
 
-    pub(super) fn read(section: Section<'_>, folder: &Path, stem: &str) -> Self {
-        let default = Self::new(folder, stem);
+    pub(super) fn read(section: Section<'_>, folder: &Path, stem: &str, surface: Option<&str>) -> Self {
+        let default = Self::new(folder, stem, surface);
         let output = Self {
             directory: section.text("directory").map_or(default.directory, |path| folder.join(path)),
             fields: section.choice("fields").unwrap_or(default.fields),
+            mesh: section.boolean("mesh").unwrap_or(default.mesh),
+            stl: section.names("stl").unwrap_or(default.stl),
         };
         section.finish();
         output

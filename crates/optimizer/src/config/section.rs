@@ -241,6 +241,18 @@ impl<'a> Section<'a> {
         None
     }
 
+    /// `true` or `false`.
+    pub(super) fn boolean(&self, key: &'static str) -> Option<bool> {
+        let node = self.get(key)?;
+        if let Value::Boolean(value) = node.value {
+            return Some(value);
+        }
+        let path = join(&self.path, key);
+        let message = format!("`{path}` is {}, not true or false", node.value.describe());
+        self.wrong_at(node, &path, message, "true or false, without quotes", None);
+        None
+    }
+
     /// One of a few words.
     pub(super) fn choice<T: Choice>(&self, key: &'static str) -> Option<T> {
         let text = self.text(key)?;

@@ -1,100 +1,92 @@
-//! Quantities of the shape alone: volume of a body, bound on its thickness.
+//! Functions of the shape alone, for constraints: volume or mass of a region, least and greatest thickness.
+//!
+//! Each gives its value and its exact gradient with respect to the design variables. None of them needs a field; what
+//! does lives with the objectives. Bounds on these values and their scaling are the caller's.
 
-use fluxmorph_geometry::tet4::{Point, Tet4, area_vector, cross, dot, sub};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+mod thickness;
+mod volume;
 
-use crate::error::Error;
-use crate::problem::Shape;
+pub use thickness::{Bound, ThicknessBound};
+pub use volume::Volume;
 
-/// Volume of a region on the moved mesh.
-#[derive(Clone, Debug)]
-pub struct Volume {
-    elements: Vec<ElementId>,
-    surface: Vec<[NodeId; 3]>,
+use fluxmorph_geometry::MeshError;
+
+/// Why a geometric function cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GeometricError {
+    /// A name that the mesh does not have.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// The region has no elements, and no surface stands for it.
+    #[error(
+        "the region `{region}` has no elements in the mesh: its volume is not defined; name a region that is meshed"
+    )]
+    NoElements {
+        /// Its name.
+        region: String,
+    },
+    /// The region is cut by two parallel outer planes along x, along y and along z.
+    #[error(
+        "the region `{region}` is replaced by its impedance surface and ends at two outer planes along each of x, y and \
+         z: its volume does not follow from that surface; take model = \"volume\""
+    )]
+    Boxed {
+        /// Its name.
+        region: String,
+    },
+    /// The design has no thickness.
+    #[error(
+        "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \
+         line through it meets no opposite face; leave the thickness limit out, or give the body a [regions] entry"
+    )]
+    NoThickness,
 }
 
-impl Volume {
-    /// Of a meshed region, or of one that an impedance surface replaces.
-    ///
-    /// # Errors
-    /// When the region is unknown.
-    pub fn new(
-        reference: &Mesh,
-        _full_mesh: &Mesh,
-        region: &str,
-        impedance_surface: Option<&[[NodeId; 3]]>,
-    ) -> Result<Self, Error> {
-        let elements = match impedance_surface {
-            Some(_) => Vec::new(),
-            None => reference.topology().elements_of(reference.topology().region(region)?),
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::Config;
+    use crate::problem::Problem;
+    use crate::setup::{Purpose, Setup, set_up};
+
+    pub(super) fn shield(overrides: &[&str]) -> Setup {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/shield_quick.toml");
+        let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+        let (config, source) = Config::from_file(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
+        set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// A design inside the bounds that is flat nowhere.
+    pub(super) fn wavy(problem: &Problem) -> Vec<f64> {
+        let variables = problem.shape.as_ref().expect("a shape").surface.variable_count();
+        (0..variables).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
+    }
+
+    /// Slope 2 of the Taylor remainder, or a remainder that is rounding alone, in a direction that is flat nowhere.
+    pub(super) fn taylor(value: impl Fn(&[f64]) -> (f64, Vec<f64>), p: &[f64], first_step: f64) {
+        let direction: Vec<f64> = (0..p.len()).map(|k| (0.9 * k as f64 + 0.4).cos()).collect();
+        let (base, gradient) = value(p);
+        let slope: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
+        let remainder = |h: f64| {
+            let moved: Vec<f64> = p.iter().zip(&direction).map(|(p, d)| p + h * d).collect();
+            (value(&moved).0 - base - h * slope).abs()
         };
-        Ok(Self { elements, surface: impedance_surface.unwrap_or_default().to_vec() })
-    }
-
-    /// Volume [m³] and its derivative by the variables [m²].
-    pub fn evaluate(&self, mesh: &Mesh, shape: &Shape) -> (f64, Vec<f64>) {
-        let mut nodal: Vec<Point> = vec![[0.0; 3]; mesh.points().len()];
-        let mut volume = 0.0;
-        for &e in &self.elements {
-            let tet = Tet4::new(mesh.vertices(e));
-            volume += tet.volume;
-            for (n, g) in mesh.topology().tet(e).into_iter().zip(tet.gradients) {
-                for d in 0..3 {
-                    nodal[n.index()][d] += tet.volume * g[d];
-                }
-            }
+        let steps: Vec<f64> = (0..4).map(|i| first_step * 0.5_f64.powi(i)).collect();
+        let remainders: Vec<f64> = steps.iter().map(|&h| remainder(h)).collect();
+        println!("value {base:e}, slope {slope:e}, remainders {remainders:?}");
+        // A sum of some thousand terms of the value's size carries this much rounding.
+        let rounding = 1e-13 * base.abs();
+        for pair in remainders.windows(2).filter(|pair| pair[1] > 10.0 * rounding) {
+            let order = (pair[0] / pair[1]).log2();
+            assert!((1.9..2.2).contains(&order), "order {order}: {remainders:?}");
         }
-        for nodes in &self.surface {
-            let x = nodes.map(|n| mesh.point(n));
-            volume -= dot(x[0], area_vector(x)) / 3.0;
-            for k in 0..3 {
-                let by = cross(x[(k + 1) % 3], x[(k + 2) % 3]);
-                for d in 0..3 {
-                    nodal[nodes[k].index()][d] -= by[d] / 6.0;
-                }
-            }
-        }
-        let _ = sub;
-        (volume, shape.surface.gradient(&shape.map.gradient(&nodal)))
-    }
-}
-
-/// A bound on the thickness.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bound {
-    /// At least [m].
-    Minimum(f64),
-    /// At most [m].
-    Maximum(f64),
-}
-
-/// By how much the worst place is beyond a bound on the thickness.
-#[derive(Clone, Debug)]
-pub struct ThicknessBound {
-    bound: Bound,
-}
-
-impl ThicknessBound {
-    /// For the designed body of a shape.
-    pub fn new(_shape: &Shape, bound: Bound) -> Self {
-        Self { bound }
-    }
-
-    /// The smooth maximum [m], not positive where the bound holds, and its derivative by the variables [1].
-    pub fn evaluate(&self, shape: &Shape, p: &[f64]) -> (f64, Vec<f64>) {
-        let heights = shape.surface.heights(p);
-        let initial = shape.thickness.as_ref().map_or(0.0, |t| t.range(&vec![0.0; heights.len()]).0);
-        let (sign, bound) = match self.bound {
-            Bound::Minimum(t) => (-1.0, t),
-            Bound::Maximum(t) => (1.0, t),
-        };
-        let beyond: Vec<f64> = heights.iter().map(|h| sign * (initial + h - bound)).collect();
-        let worst = beyond.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let rho = 1e4;
-        let weights: Vec<f64> = beyond.iter().map(|b| (rho * (b - worst)).exp()).collect();
-        let sum: f64 = weights.iter().sum();
-        let nodal: Vec<Point> =
-            weights.iter().map(|w| shape.surface.direction().map(|d| sign * w / sum * d)).collect();
-        (worst + sum.ln() / rho, shape.surface.gradient(&nodal))
+        // Without second order the remainder is nothing but rounding: then the gradient is exact as it stands.
+        assert!(
+            remainders[0] < 0.5 * (first_step * slope).abs() + rounding,
+            "{remainders:?} against {slope}"
+        );
     }
 }

@@ -33,6 +33,9 @@ pub struct Manifest {
     pub overrides: Vec<String>,
     /// The mesh.
     pub mesh: Option<MeshHash>,
+    /// Names of the STL files in the directory.
+    #[serde(default)]
+    pub surfaces: Vec<String>,
     /// The machine.
     pub host: Host,
     /// Threads used.
@@ -122,6 +125,7 @@ impl Manifest {
             config: None,
             overrides: Vec::new(),
             mesh: None,
+            surfaces: Vec::new(),
             host: Host::this(),
             threads,
             started: utc_timestamp(SystemTime::now()),

@@ -19,7 +19,7 @@ pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, StopReason, TermResult,
 };
-pub use run_directory::{OlderRun, RunDirectory};
+pub use run_directory::{OlderRun, RunDirectory, surface_files};
 
 /// Why something could not be written or read back.
 #[derive(Debug, thiserror::Error)]

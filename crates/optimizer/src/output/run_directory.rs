@@ -27,7 +27,10 @@ const MANIFEST: &str = "manifest.json";
 const FIELDS: &str = "fields";
 /// The files of a run beside its manifest.
 const FILES: &[&str] =
-    &["config.toml", "resolved.toml", "history.csv", "history.jsonl", "fields.pvd", "result.json"];
+    &["config.toml", "resolved.toml", "history.csv", "history.jsonl", "fields.pvd", "result.json", OPTIMUM];
+const OPTIMUM: &str = "optimum.msh";
+/// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
+const LONGEST_NAME: usize = 50;
 
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
@@ -85,7 +88,10 @@ impl RunDirectory {
         if older == OlderRun::Keep {
             return Err(OutputError::HoldsRun { path: self.path.clone() });
         }
-        for name in FILES {
+        let surfaces = Manifest::read(&self.manifest()).map(|manifest| manifest.surfaces).unwrap_or_default();
+        // The list is a file's content: only names that this program gives are taken from it.
+        let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
+        for name in FILES.iter().copied().chain(surfaces) {
             remove_if_there(&self.path.join(name))?;
         }
         self.remove_unfinished(&self.path)?;
@@ -153,6 +159,16 @@ impl RunDirectory {
         self.path.join("result.json")
     }
 
+    /// `optimum.msh`, the mesh of the best design.
+    pub fn optimum(&self) -> PathBuf {
+        self.path.join(OPTIMUM)
+    }
+
+    /// A surface of the best design, by the name that [`surface_files`] gives its file.
+    pub fn surface(&self, file: &str) -> PathBuf {
+        self.path.join(file)
+    }
+
     /// `fields`, the folder of the VTU files.
     pub fn fields(&self) -> PathBuf {
         self.path.join(FIELDS)
@@ -172,6 +188,29 @@ impl RunDirectory {
     pub fn collection(&self) -> PathBuf {
         self.path.join("fields.pvd")
     }
+}
+
+/// Names of the STL files of surfaces, in their order: letters, digits, `-` and `_` stay, all else becomes `_`.
+///
+/// Names that come out equal, in small letters or capitals, are numbered: some file systems see no difference.
+pub fn surface_files(surfaces: &[String]) -> Vec<String> {
+    let mut taken = std::collections::BTreeSet::new();
+    let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+    let mut file = |surface: &String| {
+        let stem: String = surface.chars().take(LONGEST_NAME).map(safe).collect();
+        let numbered = (2..).map(|n| format!("{stem}_{n}"));
+        let free =
+            std::iter::once(stem.clone()).chain(numbered).find(|name| taken.insert(name.to_lowercase()));
+        format!("optimum_{}.stl", free.unwrap_or(stem))
+    };
+    surfaces.iter().map(&mut file).collect()
+}
+
+/// Whether a name is one of [`surface_files`].
+fn is_surface(name: &str) -> bool {
+    name.strip_prefix("optimum_")
+        .and_then(|rest| rest.strip_suffix(".stl"))
+        .is_some_and(|stem| stem.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_'))
 }
 
 fn field_name(evaluation: usize) -> String {
@@ -270,6 +309,42 @@ mod tests {
         assert!(ours.iter().all(|path| !path.exists()));
         assert!(foreign.iter().all(|path| path.exists()));
         assert!(run.manifest().exists(), "the mark stays until the next manifest");
+    }
+
+    #[test]
+    fn files_of_surfaces_have_safe_names_of_their_own() {
+        let names =
+            ["plate|air", "plate/air", "Top side", "top_SIDE", "../x", "Fläche", ""].map(str::to_owned);
+        let files = surface_files(&names);
+        let expected = [
+            "optimum_plate_air.stl",
+            "optimum_plate_air_2.stl",
+            "optimum_Top_side.stl",
+            "optimum_top_SIDE_2.stl",
+            "optimum____x.stl",
+            "optimum_Fläche.stl",
+            "optimum_.stl",
+        ];
+        assert_eq!(files, expected);
+        assert!(files.iter().all(|file| is_surface(file)));
+        assert!(surface_files(&["ä".repeat(500)])[0].len() < 255);
+    }
+
+    #[test]
+    fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run = RunDirectory::create(&folder.path().join("run"), OlderRun::Keep).expect("new");
+        let mut manifest = Manifest::started("run", 1);
+        manifest.surfaces =
+            ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
+        manifest.write(&run).expect("written");
+        let (ours, theirs) = (run.surface("optimum_a.stl"), run.surface("optimum_b.stl"));
+        for path in [&ours, &theirs, &folder.path().join("stay.stl"), &run.optimum()] {
+            write_atomic(path, b"x").expect("written");
+        }
+        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        assert!(!ours.exists() && !run.optimum().exists());
+        assert!(theirs.exists() && folder.path().join("stay.stl").exists());
     }
 
     #[cfg(unix)]

@@ -163,23 +163,15 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     model.coils().iter().filter_map(notice).collect()
 }
 
-/// Every region and surface that a coil names and the mesh does not have, and every region that no coil can be.
+/// Every region that a coil names and the mesh does not have, and every region that no coil can be.
 pub(super) fn coil_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
-    let surfaces: Vec<&str> = topology.surface_names().collect();
     let mut faults = Vec::new();
     for (i, coil) in config.coils.iter().enumerate() {
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
         if topology.region(name).is_err() {
             faults.push(source.unknown_name(&path, "region", name, &regions));
-        }
-        if let config::CoilPath::Terminals { terminals } = &region.path {
-            for (j, name) in terminals.iter().enumerate().filter(|(_, name)| topology.surface(name).is_err())
-            {
-                let path = format!("coils[{i}].terminals[{j}]");
-                faults.push(source.unknown_name(&path, "surface", name, &surfaces));
-            }
         }
         if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
             let fault = source.fault(&path, format!("`{name}` is replaced by its impedance surface"));

@@ -185,30 +185,30 @@ pub(super) fn constraints(
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);
                 let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
                 let body = geometric::Volume::new(mesh, full_mesh, region, surface)?;
-                let density = match kind {
-                    BodyKind::Volume => 1.0,
-                    BodyKind::Mass => density(config, region).unwrap_or(f64::NAN),
+                let body = match (kind, density(config, region)) {
+                    (BodyKind::Mass, Some(density)) => body.with_density(density),
+                    _ => body,
                 };
-                add(written.name.clone(), Quantity::Volume { body, density }, upper(*bound));
+                add(written.name.clone(), Quantity::Volume(body), upper(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
-                if shape.thickness.is_none() {
-                    let message = "the designed body has no opposite face to measure its thickness from";
-                    let fault = source.fault(&format!("constraints[{k}].kind"), message);
-                    let fault = fault.help("limit design.lower and design.upper instead");
-                    return Err(source.error(vec![fault]).into());
-                }
                 // Both bounds of one entry are two constraints, told apart by their names.
                 let name = |suffix: &str| match (minimum, maximum) {
                     (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
                     _ => written.name.clone(),
                 };
+                let measure = |bound: geometric::Bound| {
+                    geometric::ThicknessBound::new(shape, bound).map_err(|error| {
+                        let fault = source.fault(&format!("constraints[{k}].kind"), error.to_string());
+                        source.error(vec![fault.help("limit design.lower and design.upper instead")])
+                    })
+                };
                 if let Some(bound) = *minimum {
-                    let measure = geometric::ThicknessBound::new(shape, geometric::Bound::Minimum(bound));
+                    let measure = measure(geometric::Bound::Minimum(bound))?;
                     add(name("minimum"), Quantity::Thickness { measure, bound }, Limit::AtLeast(bound));
                 }
                 if let Some(bound) = *maximum {
-                    let measure = geometric::ThicknessBound::new(shape, geometric::Bound::Maximum(bound));
+                    let measure = measure(geometric::Bound::Maximum(bound))?;
                     add(name("maximum"), Quantity::Thickness { measure, bound }, Limit::AtMost(bound));
                 }
             }

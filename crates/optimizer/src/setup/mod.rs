@@ -1,20 +1,21 @@
 //! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
-//! keys. `field` makes the field problems, `functional` objective and constraints, `shape` the design surface and the elastic map.
+//! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `shape` the design
+//! surface and the elastic map.
 
 mod field;
 mod functional;
+pub(crate) mod mesh;
 mod shape;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
-use fluxmorph_geometry::{Mesh, MeshError, RegionId, Topology};
+use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::recovery::locate;
 use fluxmorph_solver::{FieldModel, Material};
 
-use crate::config::{self, Config, Fault, MeshConfig, RegionModel, Source};
+use crate::config::{self, Config, Fault, RegionModel, Source};
 use crate::error::Error;
 use crate::problem::Problem;
 
@@ -59,39 +60,13 @@ pub enum Purpose {
     Optimisation,
 }
 
-/// Builds or reads the mesh of a configuration.
+/// Builds or reads the mesh of a configuration, with the interfaces that the configuration names.
 ///
 /// # Errors
-/// [`Error::Mesh`] names the parameter; [`Error::Config`] for a mesh file, which no reader takes yet.
+/// [`Error::Config`] for a parameter that a generator refuses or a mesh file that is damaged, [`Error::Output`] for a mesh
+/// file that cannot be read.
 pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
-    match &config.mesh {
-        MeshConfig::Shield(parameters) => {
-            shield(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
-        }
-        MeshConfig::Block(parameters) => {
-            block(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
-        }
-        MeshConfig::Boxes(parameters) => {
-            boxes(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
-        }
-        MeshConfig::Sphere(parameters) => {
-            sphere(&parameters.parameters()).map_err(|error| parameter_fault(error, source))
-        }
-        MeshConfig::File { .. } => Err(source
-            .error(vec![
-                source
-                    .fault("mesh.file", "mesh files cannot be read yet")
-                    .expected("a built-in mesh: generator = \"boxes\""),
-            ])
-            .into()),
-    }
-}
-
-/// A parameter that a generator refuses becomes a fault at its key.
-fn parameter_fault(error: MeshError, source: &Source) -> Error {
-    let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
-    let path = if parameter.starts_with("mesh.") { parameter } else { "mesh" };
-    source.error(vec![source.fault(path, format!("{parameter} = {value}")).expected(expected)]).into()
+    Ok(mesh::build(config, source)?.mesh)
 }
 
 /// Sets up the problem of a configuration.
@@ -102,10 +77,9 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     if purpose == Purpose::Optimisation {
         config.optimisation(source)?;
     }
-    let full_mesh = build_mesh(config, source)?;
+    let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;
 
-    let mut warnings = Vec::new();
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
@@ -181,7 +155,6 @@ fn phasor(coil: &config::Coil) -> c64 {
 fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
     let mut faults = field::coil_faults(config, source, topology);
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
-    let surfaces: Vec<&str> = topology.surface_names().collect();
     let mut region = |path: String, name: &str| match topology.region(name) {
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
@@ -205,26 +178,7 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
             region(format!("remesh.subregions[{i}].name"), &subregion.name);
         }
     }
-    let mut surface = |path: &str, names: &[String]| {
-        for (i, name) in names.iter().enumerate().filter(|(_, name)| topology.surface(name).is_err()) {
-            faults.push(source.unknown_name(&format!("{path}[{i}]"), "surface", name, &surfaces));
-        }
-    };
-    surface("boundaries.flux_parallel", &config.boundaries.flux_parallel);
-    surface("boundaries.flux_normal", &config.boundaries.flux_normal);
-    if let Some(field) = &config.boundaries.uniform_field {
-        surface("boundaries.uniform_field.surfaces", &field.surfaces);
-    }
-    if let Some(remesh) = &config.remesh {
-        surface("remesh.slide", &remesh.slide);
-        surface("remesh.fixed", &remesh.fixed);
-        surface("remesh.free", &remesh.free);
-    }
-    if let Some(design) = &config.design
-        && topology.surface(&design.surface).is_err()
-    {
-        faults.push(source.unknown_name("design.surface", "surface", &design.surface, &surfaces));
-    }
+    faults.extend(mesh::surface_faults(config, source, topology));
     faults.extend(functional::faults(config, source, topology));
     faults
 }

@@ -91,6 +91,15 @@ minimum = "6 mm"
 maximum = "25 mm"
 [optimizer]"#;
 
+/// The shipped shields.
+const SHIPPED: [&str; 5] = [
+    "shield.toml",
+    "shield_impedance.toml",
+    "shield_mass_limit.toml",
+    "shield_quick.toml",
+    "shield_two_frequencies.toml",
+];
+
 fn shipped(name: &str) -> (Config, Source) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(name);
     Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"))
@@ -98,7 +107,7 @@ fn shipped(name: &str) -> (Config, Source) {
 
 #[test]
 fn the_shipped_configurations_are_read() {
-    for name in ["shield.toml", "shield_impedance.toml", "shield_quick.toml"] {
+    for name in SHIPPED {
         let (config, source) = shipped(name);
         let parts = config.optimisation(&source).expect("all tables for an optimisation");
         assert_eq!(parts.design.grid, Some([7, 13]), "{name}");
@@ -115,7 +124,7 @@ fn the_shipped_configurations_are_read() {
 
 #[test]
 fn the_shipped_meshes_are_generated() {
-    for name in ["shield.toml", "shield_impedance.toml", "shield_quick.toml"] {
+    for name in SHIPPED {
         let MeshConfig::Shield(mesh) = shipped(name).0.mesh else { panic!("{name}: the shield's generator") };
         let mesh = fluxmorph_geometry::generate::shield(&mesh.parameters());
         mesh.unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -221,7 +230,7 @@ fn a_resolved_configuration_reads_back_as_itself() {
         assert_eq!(again, config, "{resolved}");
         assert_eq!(resolved_toml(&again), resolved);
     }
-    for name in ["shield.toml", "shield_impedance.toml", "shield_quick.toml"] {
+    for name in SHIPPED {
         let (config, _) = shipped(name);
         let (again, _) = Config::from_str(&resolved_toml(&config), "resolved.toml").expect("resolved");
         assert_eq!(again, config);

@@ -1,0 +1,268 @@
+//! What can be wrong with a Gmsh file: where, at which node or element, and what to do.
+
+use std::borrow::Cow;
+use std::fmt;
+
+/// Where in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Place {
+    /// A line of an ASCII file, from 1.
+    Line(usize),
+    /// A byte of a binary file, from 0.
+    Byte(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+        }
+    }
+}
+
+/// What the file was saying at that place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Subject {
+    /// The order of sections, or the file as a whole.
+    File,
+    /// The head of a section: its name without the dollar.
+    Section(Cow<'static, str>),
+    /// A physical group.
+    Group {
+        /// Its dimension.
+        dimension: i32,
+        /// Its tag.
+        tag: i32,
+    },
+    /// An elementary entity of the geometry.
+    Entity {
+        /// Its dimension.
+        dimension: i32,
+        /// Its tag.
+        tag: i32,
+    },
+    /// A node, by its tag in the file.
+    Node(u64),
+    /// An element, by its tag in the file.
+    Element(u64),
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File => f.write_str("file"),
+            Self::Section(name) => write!(f, "section ${name}"),
+            Self::Group { dimension, tag } => write!(f, "physical group {tag} of dimension {dimension}"),
+            Self::Entity { dimension, tag } => write!(f, "entity {tag} of dimension {dimension}"),
+            Self::Node(tag) => write!(f, "node {tag}"),
+            Self::Element(tag) => write!(f, "element {tag}"),
+        }
+    }
+}
+
+/// A fault of a Gmsh file with its place.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{place}, {subject}: {fault}")]
+pub struct MshError {
+    /// Line or byte.
+    pub place: Place,
+    /// The node, element, entity or section.
+    pub subject: Subject,
+    /// What is wrong.
+    pub fault: MshFault,
+}
+
+/// What is wrong in a Gmsh file.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MshFault {
+    /// Something else was to stand there.
+    #[error("expected {expected}, found `{found}`")]
+    Unexpected {
+        /// What belongs there.
+        expected: &'static str,
+        /// What stands there, shortened.
+        found: String,
+    },
+    /// The file ends too early.
+    #[error("the file ends where {expected} is expected: it is cut off; write or copy it again")]
+    Truncated {
+        /// What belongs there.
+        expected: &'static str,
+    },
+    /// A header promises more than the rest of the file can hold.
+    #[error(
+        "{claimed} {what} are announced, but the {bytes} bytes that remain hold at most {most}: the file is cut off or its header is wrong"
+    )]
+    TooMany {
+        /// What is counted.
+        what: &'static str,
+        /// The number in the header.
+        claimed: u64,
+        /// Bytes that remain.
+        bytes: usize,
+        /// How many could be in them.
+        most: u64,
+    },
+    /// The blocks of a section do not add up to its header.
+    #[error("{claimed} {what} are announced in the section's header, and its blocks announce {found}")]
+    CountMismatch {
+        /// What is counted.
+        what: &'static str,
+        /// The number in the header of the section.
+        claimed: u64,
+        /// The number in the headers of the blocks.
+        found: u64,
+    },
+    /// A version that is not read.
+    #[error("the version {found} of the format is not read: save the mesh as version 4.1 or 2.2")]
+    Version {
+        /// The version of the file.
+        found: String,
+    },
+    /// The size of numbers is not that of 64 bits.
+    #[error("the data size is {found} bytes, and only 8 is read: save the mesh on a 64-bit system")]
+    DataSize {
+        /// The size in the file.
+        found: String,
+    },
+    /// A section comes too early or too late.
+    #[error("the section must come {order}")]
+    Order {
+        /// Where it belongs.
+        order: &'static str,
+    },
+    /// A section comes twice.
+    #[error("the section comes a second time")]
+    SectionTwice,
+    /// A section is missing.
+    #[error("there is no section ${section}: save the mesh with its nodes and elements")]
+    MissingSection {
+        /// Its name without the dollar.
+        section: &'static str,
+    },
+    /// The mesh is cut into partitions.
+    #[error("the mesh is partitioned, which is not read: save it without partitions")]
+    Partitioned,
+    /// A name that cannot be a name.
+    #[error("the name `{name}` {problem}: give the group another name")]
+    Name {
+        /// The name, with control characters escaped.
+        name: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Two groups of one dimension have one name, or one group has two.
+    #[error(
+        "the name `{name}` belongs to group {first} of the same dimension: give every group its own name"
+    )]
+    NameTwice {
+        /// The name.
+        name: String,
+        /// The group that has it already.
+        first: i32,
+    },
+    /// A group or an entity is declared twice.
+    #[error("it is declared a second time")]
+    DeclaredTwice,
+    /// An element block names an entity that is not declared.
+    #[error("the entity is not declared in $Entities")]
+    UnknownEntity,
+    /// Two nodes have one tag.
+    #[error("the tag was given at {first} already: every node needs its own tag")]
+    DuplicateNode {
+        /// The node that has it.
+        first: Place,
+    },
+    /// An element names a node that is not there.
+    #[error("it uses node {node}, which is not in $Nodes")]
+    DanglingNode {
+        /// The tag used.
+        node: u64,
+    },
+    /// A coordinate is not finite.
+    #[error("a coordinate is {value}: every coordinate must be finite")]
+    NotFinite {
+        /// The value.
+        value: f64,
+    },
+    /// A tetrahedron has no volume.
+    #[error(
+        "the tetrahedron at {centroid:?} m is flat: its volume of {volume:e} m³ is nothing but rounding; repair the mesh"
+    )]
+    Flat {
+        /// Its signed volume [m³].
+        volume: f64,
+        /// Its centroid [m].
+        centroid: [f64; 3],
+    },
+    /// A tetrahedron belongs to no physical volume.
+    #[error(
+        "the tetrahedron belongs to no physical volume: put every volume into a physical group, which becomes a region"
+    )]
+    NoGroup,
+    /// A volume belongs to two physical volumes.
+    #[error(
+        "it belongs to the physical volumes `{first}` and `{second}`: every volume belongs to exactly one region"
+    )]
+    TwoGroups {
+        /// One group.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A tetrahedron comes twice.
+    #[error("the tetrahedron has the nodes of element {first}: take one of them out")]
+    DuplicateElement {
+        /// The tag of the other.
+        first: u64,
+    },
+    /// Three or more tetrahedra share a face.
+    #[error("two other tetrahedra have a face with nodes {face:?} too: the mesh overlaps itself")]
+    Overlap {
+        /// Tags of the nodes of the face.
+        face: [u64; 3],
+    },
+    /// A physical volume holds other shapes than tetrahedra.
+    #[error(
+        "a {shape} stands in the physical volume `{group}`: only tetrahedra of first and second order are read; mesh the volume with them"
+    )]
+    NotTetrahedron {
+        /// The shape.
+        shape: &'static str,
+        /// The group.
+        group: String,
+    },
+    /// A type of element that the format does not know.
+    #[error("the element type {code} is not known")]
+    UnknownType {
+        /// The code.
+        code: i32,
+    },
+    /// The type of the elements does not fit the dimension of their entity.
+    #[error("a {shape} cannot lie in an entity of dimension {dimension}")]
+    WrongDimension {
+        /// The shape.
+        shape: &'static str,
+        /// The dimension.
+        dimension: i32,
+    },
+    /// There is nothing to compute on.
+    #[error("the file holds no tetrahedron: mesh in 3D, and save the physical volumes")]
+    Empty,
+    /// More than can be numbered.
+    #[error("there are more than {most} {what}: too many for one mesh")]
+    TooLarge {
+        /// What is counted.
+        what: &'static str,
+        /// The limit.
+        most: u64,
+    },
+    /// What the mesh itself refuses.
+    #[error("{cause}")]
+    Mesh {
+        /// The message.
+        cause: String,
+    },
+}

@@ -1,0 +1,371 @@
+//! Gmsh files of random meshes in every form that is read, written here without the library's own writer.
+
+#![allow(dead_code, reason = "every test binary uses its part")]
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use fluxmorph_geometry::tet4::{FACES, Point, volume};
+use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
+
+/// A small deterministic source of numbers (splitmix64, Steele et al. 2014).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub(crate) fn below(&mut self, limit: u64) -> u64 {
+        self.next() % limit
+    }
+
+    /// From 0 to 1.
+    pub(crate) fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// How a file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    Ascii,
+    Little,
+    Big,
+}
+
+/// The versions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Version {
+    V2,
+    V4,
+}
+
+/// A mesh as a file holds it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Device {
+    /// Tag and coordinates in the unit of the file.
+    pub(crate) nodes: Vec<(u64, Point)>,
+    /// Tag, node tags, physical tag.
+    pub(crate) tets: Vec<(u64, [u64; 4], i32)>,
+    /// Tag, node tags, physical tags.
+    pub(crate) triangles: Vec<(u64, [u64; 3], Vec<i32>)>,
+    /// Dimension, tag, name.
+    pub(crate) names: Vec<(i32, i32, String)>,
+}
+
+impl Device {
+    /// A block of some cells with crooked nodes, random tags, regions and surfaces.
+    pub(crate) fn random(random: &mut Random, tag_limit: u64) -> Self {
+        let cells = [0; 3].map(|_| 1 + random.below(3) as usize);
+        let [nx, ny, nz] = cells.map(|n| n + 1);
+        let mut used = std::collections::BTreeSet::new();
+        let mut tag = |random: &mut Random| loop {
+            let tag = 1 + random.below(tag_limit);
+            if used.insert(tag) {
+                break tag;
+            }
+        };
+        let mut nodes = Vec::new();
+        for k in 0..nz {
+            for j in 0..ny {
+                for i in 0..nx {
+                    // A tenth of a cell off the grid keeps all volumes positive.
+                    let x = [i, j, k].map(|c| c as f64 + 0.1 * (random.unit() - 0.5));
+                    nodes.push((tag(random), x));
+                }
+            }
+        }
+        let at = |c: [usize; 3]| nodes[c[0] + nx * (c[1] + ny * c[2])].0;
+        let mut tets = Vec::new();
+        let groups = 1 + random.below(3);
+        let mut element = 0;
+        for k in 0..cells[2] {
+            for j in 0..cells[1] {
+                for i in 0..cells[0] {
+                    for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
+                        let mut corner = [i, j, k];
+                        let mut tet = [at(corner); 4];
+                        for (step, axis) in order.into_iter().enumerate() {
+                            corner[axis] += 1;
+                            tet[step + 1] = at(corner);
+                        }
+                        // Even permutations are right-handed; the others are turned.
+                        if [[0, 2, 1], [2, 1, 0], [1, 0, 2]].contains(&order) {
+                            tet.swap(2, 3);
+                        }
+                        element += 1 + random.below(5);
+                        tets.push((element, tet, 7 + random.below(groups) as i32));
+                    }
+                }
+            }
+        }
+        let mut triangles = Vec::new();
+        for &(_, tet, _) in &tets {
+            for face in FACES {
+                let nodes = face.map(|v| tet[v]);
+                let mut key = nodes;
+                key.sort_unstable();
+                let new = triangles.iter().all(|(_, other, _): &(u64, [u64; 3], _)| {
+                    let mut other = *other;
+                    other.sort_unstable();
+                    other != key
+                });
+                if new && random.below(3) == 0 {
+                    let mut groups: Vec<i32> = (1..=3).filter(|_| random.below(2) == 0).collect();
+                    if groups.is_empty() {
+                        groups.push(1 + random.below(3) as i32);
+                    }
+                    element += 1 + random.below(5);
+                    triangles.push((element, nodes, groups));
+                }
+            }
+        }
+        let mut names = Vec::new();
+        for tag in 1..=3 {
+            if random.below(3) > 0 {
+                names.push((2, tag, format!("Fläche {tag}")));
+            }
+        }
+        for tag in 7..10 {
+            if random.below(3) > 0 {
+                names.push((3, tag, format!("region {tag}")));
+            }
+        }
+        Self { nodes, tets, triangles, names }
+    }
+
+    /// What a reader must make of it.
+    pub(crate) fn mesh(&self, scale: impl Fn(f64) -> f64) -> Mesh {
+        let mut nodes = self.nodes.clone();
+        nodes.sort_by_key(|node| node.0);
+        let position: BTreeMap<u64, NodeId> =
+            nodes.iter().enumerate().map(|(i, node)| (node.0, NodeId::new(i))).collect();
+        let named = |dimension, tag| {
+            let name = self.names.iter().find(|n| (n.0, n.1) == (dimension, tag)).map(|n| n.2.clone());
+            let kind = if dimension == 3 { "volume" } else { "surface" };
+            name.unwrap_or_else(|| format!("{kind}_{tag}"))
+        };
+        let used = |dimension, tags: Vec<i32>| {
+            let mut all: Vec<i32> =
+                self.names.iter().filter(|n| n.0 == dimension).map(|n| n.1).chain(tags).collect();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        let regions = used(3, self.tets.iter().map(|t| t.2).collect());
+        let mut tets = self.tets.clone();
+        tets.sort_by_key(|tet| tet.0);
+        let topology = Topology::new(
+            nodes.len(),
+            tets.iter().map(|tet| tet.1.map(|n| position[&n])).collect(),
+            regions.iter().map(|&tag| named(3, tag)).collect(),
+            tets.iter().map(|t| RegionId::new(regions.binary_search(&t.2).expect("used"))).collect(),
+        );
+        let mut topology = topology.expect("a mesh");
+        let mut triangles = self.triangles.clone();
+        triangles.sort_by_key(|t| t.0);
+        for tag in used(2, self.triangles.iter().flat_map(|t| t.2.clone()).collect()) {
+            let of =
+                triangles.iter().filter(|t| t.2.contains(&tag)).map(|t| t.1.map(|n| position[&n])).collect();
+            topology = topology.with_surface(&named(2, tag), of).expect("nodes are there");
+        }
+        let points: Vec<Point> = nodes.iter().map(|n| n.1.map(&scale)).collect();
+        let mesh = Mesh::new(Arc::new(topology), points).expect("right-handed");
+        assert!(mesh.topology().elements().all(|e| volume(mesh.vertices(e)) > 0.0));
+        mesh
+    }
+
+    /// The bytes of a file.
+    pub(crate) fn bytes(&self, version: Version, form: Form) -> Vec<u8> {
+        let mut out = Writer { bytes: Vec::new(), form };
+        out.header(version);
+        if !self.names.is_empty() {
+            out.line(&format!("$PhysicalNames\n{}", self.names.len()));
+            for (dimension, tag, name) in &self.names {
+                out.line(&format!("{dimension} {tag} \"{name}\""));
+            }
+            out.line("$EndPhysicalNames");
+        }
+        match version {
+            Version::V2 => self.version2(&mut out),
+            Version::V4 => self.version4(&mut out),
+        }
+        out.bytes
+    }
+
+    fn version2(&self, out: &mut Writer) {
+        out.line(&format!("$Nodes\n{}", self.nodes.len()));
+        for &(tag, x) in &self.nodes {
+            out.int(tag as i32);
+            x.into_iter().for_each(|x| out.real(x));
+            out.end();
+        }
+        out.end_section("Nodes");
+        let elements: Vec<(u64, i32, Vec<u64>, i32)> = self
+            .triangles
+            .iter()
+            .flat_map(|(tag, nodes, groups)| groups.iter().map(|&group| (*tag, 2, nodes.to_vec(), group)))
+            .chain(self.tets.iter().map(|(tag, nodes, group)| (*tag, 4, nodes.to_vec(), *group)))
+            .collect();
+        out.line(&format!("$Elements\n{}", elements.len()));
+        for block in elements.chunk_by(|a, b| a.1 == b.1) {
+            if out.form != Form::Ascii {
+                [block[0].1, block.len() as i32, 2].into_iter().for_each(|n| out.int(n));
+            }
+            for (tag, code, nodes, group) in block {
+                out.int(*tag as i32);
+                if out.form == Form::Ascii {
+                    [*code, 2].into_iter().for_each(|n| out.int(n));
+                }
+                [*group, *group].into_iter().for_each(|n| out.int(n));
+                nodes.iter().for_each(|&n| out.int(n as i32));
+                out.end();
+            }
+        }
+        out.end_section("Elements");
+    }
+
+    fn version4(&self, out: &mut Writer) {
+        let mut surfaces: Vec<Vec<i32>> = self.triangles.iter().map(|t| t.2.clone()).collect();
+        surfaces.sort();
+        surfaces.dedup();
+        let mut volumes: Vec<i32> = self.tets.iter().map(|t| t.2).collect();
+        volumes.sort_unstable();
+        volumes.dedup();
+        out.line("$Entities");
+        [1, 0, surfaces.len(), volumes.len()].into_iter().for_each(|n| out.size(n as u64));
+        out.end();
+        out.int(1);
+        [0.0; 3].into_iter().for_each(|x| out.real(x));
+        out.size(0);
+        out.end();
+        let groups = surfaces.iter().cloned().chain(volumes.iter().map(|&group| vec![group]));
+        for (i, groups) in groups.enumerate() {
+            out.int(if i < surfaces.len() { i + 1 } else { i - surfaces.len() + 1 } as i32);
+            [0.0; 6].into_iter().for_each(|x| out.real(x));
+            out.size(groups.len() as u64);
+            groups.iter().for_each(|&group| out.int(group));
+            out.size(0);
+            out.end();
+        }
+        out.end_section("Entities");
+        out.line("$Nodes");
+        let half = self.nodes.len() / 2;
+        [2, self.nodes.len(), 1, 9].into_iter().for_each(|n| out.size(n as u64));
+        out.end();
+        for (dimension, nodes) in [(2, &self.nodes[..half]), (3, &self.nodes[half..])] {
+            [dimension, 1, 0].into_iter().for_each(|n| out.int(n));
+            out.size(nodes.len() as u64);
+            out.end();
+            for &(tag, _) in nodes {
+                out.size(tag);
+                out.end();
+            }
+            for &(_, x) in nodes {
+                x.into_iter().for_each(|x| out.real(x));
+                out.end();
+            }
+        }
+        out.end_section("Nodes");
+        out.line("$Elements");
+        let count = self.tets.len() + self.triangles.len();
+        [surfaces.len() + volumes.len(), count, 1, 9].into_iter().for_each(|n| out.size(n as u64));
+        out.end();
+        for (i, groups) in surfaces.iter().enumerate() {
+            let of: Vec<_> = self.triangles.iter().filter(|t| t.2 == *groups).collect();
+            [2, i as i32 + 1, 2].into_iter().for_each(|n| out.int(n));
+            out.size(of.len() as u64);
+            out.end();
+            for (tag, nodes, _) in of {
+                std::iter::once(tag).chain(nodes).for_each(|&n| out.size(n));
+                out.end();
+            }
+        }
+        for (i, group) in volumes.iter().enumerate() {
+            let of: Vec<_> = self.tets.iter().filter(|t| t.2 == *group).collect();
+            [3, i as i32 + 1, 4].into_iter().for_each(|n| out.int(n));
+            out.size(of.len() as u64);
+            out.end();
+            for (tag, nodes, _) in of {
+                std::iter::once(tag).chain(nodes).for_each(|&n| out.size(n));
+                out.end();
+            }
+        }
+        out.end_section("Elements");
+    }
+}
+
+/// Numbers in the form of a file.
+pub(crate) struct Writer {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) form: Form,
+}
+
+impl Writer {
+    pub(crate) fn line(&mut self, text: &str) {
+        self.bytes.extend(text.as_bytes());
+        self.bytes.push(b'\n');
+    }
+
+    pub(crate) fn header(&mut self, version: Version) {
+        let version = if version == Version::V2 { "2.2" } else { "4.1" };
+        self.line(&format!("$MeshFormat\n{version} {} 8", u8::from(self.form != Form::Ascii)));
+        if self.form != Form::Ascii {
+            self.int(1);
+        }
+        self.end_section("MeshFormat");
+    }
+
+    fn number<const N: usize>(&mut self, text: String, little: [u8; N]) {
+        match self.form {
+            Form::Ascii => self.bytes.extend(format!("{text} ").as_bytes()),
+            Form::Little => self.bytes.extend(little),
+            Form::Big => self.bytes.extend(little.iter().rev()),
+        }
+    }
+
+    pub(crate) fn int(&mut self, value: i32) {
+        self.number(value.to_string(), value.to_le_bytes());
+    }
+
+    pub(crate) fn size(&mut self, value: u64) {
+        self.number(value.to_string(), value.to_le_bytes());
+    }
+
+    pub(crate) fn real(&mut self, value: f64) {
+        self.number(format!("{value:e}"), value.to_le_bytes());
+    }
+
+    pub(crate) fn end(&mut self) {
+        if self.form == Form::Ascii {
+            self.bytes.push(b'\n');
+        }
+    }
+
+    pub(crate) fn end_section(&mut self, name: &str) {
+        if self.form != Form::Ascii {
+            self.bytes.push(b'\n');
+        }
+        self.line(&format!("$End{name}"));
+    }
+}
+
+/// Asserts that two meshes agree to the bit.
+#[track_caller]
+pub(crate) fn assert_same(a: &Mesh, b: &Mesh) {
+    let bits = |mesh: &Mesh| -> Vec<u64> { mesh.points().iter().flatten().map(|x| x.to_bits()).collect() };
+    assert_eq!(bits(a), bits(b));
+    let (a, b) = (a.topology(), b.topology());
+    assert_eq!(a.tets(), b.tets());
+    assert_eq!(a.region_names(), b.region_names());
+    assert_eq!(a.region_of(), b.region_of());
+    let names = |t: &Topology| t.surface_names().map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(names(a), names(b));
+    for name in a.surface_names() {
+        assert_eq!(a.surface(name).expect("named"), b.surface(name).expect("named"), "{name}");
+    }
+}

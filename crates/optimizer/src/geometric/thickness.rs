@@ -1,0 +1,122 @@
+//! Least and greatest thickness along the design's direction, as one smooth constraint.
+//!
+//! The thickness at every design node is linear in the variables, `t_i = t0_i + h_i(p)`, so a limit on all of them is as
+//! many linear constraints as the surface has nodes. MMA and SLSQP carry dense arrays of that number times the number of
+//! variables and solve a dual problem in it; only where the body is as thick everywhere does it come down to bounds on
+//! the variables. So the limits are gathered in the Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser,
+//! IFAC Proceedings 12 (1979) 113–117): of `g_i = t_min − t_i`, or `t_i − t_max`,
+//!
+//! `KS = (1/ρ) ln Σ exp(ρ g_i)`, `max g_i ≤ KS ≤ max g_i + ln n / ρ`.
+//!
+//! It is smooth and never below the largest `g_i`: what satisfies it satisfies every limit. `ρ` is chosen so that at most
+//! one per cent of the limit is given away.
+
+use super::GeometricError;
+use crate::problem::Shape;
+
+/// What the smooth bound gives away at most, as a share of the limit: below what a workshop holds, and still smooth over
+/// the change of thickness of one optimisation step.
+const MARGIN: f64 = 0.01;
+
+/// A limit of the thickness [m].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    /// At least this thick.
+    Minimum(f64),
+    /// At most this thick.
+    Maximum(f64),
+}
+
+/// A limit of the thickness at every design node as one function of the variables.
+#[derive(Clone, Debug)]
+pub struct ThicknessBound {
+    bound: Bound,
+    /// `ρ` [1/m].
+    sharpness: f64,
+}
+
+impl ThicknessBound {
+    /// # Errors
+    /// [`GeometricError::NoThickness`] where the shape has none.
+    pub fn new(shape: &Shape, bound: Bound) -> Result<Self, GeometricError> {
+        let thickness = shape.thickness.as_ref().ok_or(GeometricError::NoThickness)?;
+        let (Bound::Minimum(limit) | Bound::Maximum(limit)) = bound;
+        // Two at least, as ln 1 = 0; a limit of zero is held as one of a micrometre.
+        let count = thickness.at_nodes().count().max(2) as f64;
+        Ok(Self { bound, sharpness: count.ln() / (MARGIN * limit.abs().max(1e-6)) })
+    }
+
+    /// The limit.
+    pub fn bound(&self) -> Bound {
+        self.bound
+    }
+
+    /// How far the limit is exceeded [m], at most 0 where it is satisfied, and the derivative with respect to every
+    /// variable, shape `(n_variables)`.
+    ///
+    /// # Panics
+    /// If the shape is not the one that the bound was made for.
+    pub fn evaluate(&self, shape: &Shape, p: &[f64]) -> (f64, Vec<f64>) {
+        let thickness = shape.thickness.as_ref().expect("a bound is made for a shape with a thickness");
+        let heights = shape.surface.heights(p);
+        let (sign, limit) = match self.bound {
+            Bound::Minimum(limit) => (-1.0, limit),
+            Bound::Maximum(limit) => (1.0, limit),
+        };
+        let excess: Vec<(usize, f64)> =
+            thickness.at_nodes().map(|(node, t)| (node, sign * (t + heights[node] - limit))).collect();
+        let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
+        // Relative to the greatest: no exponential overflows.
+        let terms: Vec<f64> = excess.iter().map(|&(_, g)| (self.sharpness * (g - greatest)).exp()).collect();
+        let sum: f64 = terms.iter().sum();
+        let mut shares = vec![0.0; heights.len()];
+        for (&(node, _), term) in excess.iter().zip(&terms) {
+            shares[node] = sign * term / sum;
+        }
+        (greatest + sum.ln() / self.sharpness, shape.surface.height_gradient(&shares))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{shield, taylor, wavy};
+    use super::*;
+
+    #[test]
+    fn the_bound_is_conservative_by_no_more_than_its_margin() {
+        let setup = shield(&[]);
+        let shape = setup.problem.shape.as_ref().expect("a shape");
+        let p = wavy(&setup.problem);
+        let (least, most) =
+            shape.thickness.as_ref().expect("a plate has one").range(&shape.surface.heights(&p));
+        for (bound, excess, limit) in
+            [(Bound::Minimum(0.012), 0.012 - least, 0.012), (Bound::Maximum(0.014), most - 0.014, 0.014)]
+        {
+            let (value, _) = ThicknessBound::new(shape, bound).expect("a thickness").evaluate(shape, &p);
+            assert!(excess <= value && value <= excess + MARGIN * limit, "{bound:?}: {excess} {value}");
+        }
+    }
+
+    #[test]
+    fn a_uniform_plate_meets_its_limit_by_the_margin() {
+        let setup = shield(&[]);
+        let shape = setup.problem.shape.as_ref().expect("a shape");
+        let bound = ThicknessBound::new(shape, Bound::Minimum(0.008)).expect("a thickness");
+        let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface.variable_count()]);
+        // 8 mm − 10 mm, and all nodes count alike: the whole margin of 0.08 mm.
+        assert!((value + 0.002 - 0.00008).abs() < 1e-12, "{value}");
+        let sum: f64 = gradient.iter().sum();
+        assert!((sum + 1.0).abs() < 1e-12, "a uniform motion changes all alike: {sum}");
+    }
+
+    #[test]
+    fn the_gradient_holds() {
+        let setup = shield(&[]);
+        let shape = setup.problem.shape.as_ref().expect("a shape");
+        for bound in [Bound::Minimum(0.012), Bound::Maximum(0.014)] {
+            let bound = ThicknessBound::new(shape, bound).expect("a thickness");
+            // Well below 1/ρ, about 0.03 mm, where the function is smooth.
+            taylor(|p| bound.evaluate(shape, p), &wavy(&setup.problem), 2e-6);
+        }
+    }
+}

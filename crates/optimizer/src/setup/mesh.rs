@@ -1,0 +1,142 @@
+//! The mesh of a configuration: generated or read, with the interfaces that the configuration names.
+//!
+//! A surface name `"a|b"` that the mesh does not have stands for the faces between the regions `a` and `b`. It is added to
+//! the mesh under that name before anything else looks for it, so that every key may use it.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
+use fluxmorph_geometry::io::read_msh_file;
+use fluxmorph_geometry::topology::OUTSIDE;
+use fluxmorph_geometry::{Mesh, MeshError, Topology};
+
+use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source};
+use crate::error::Error;
+use crate::output::OutputError;
+
+/// A mesh with all its surfaces, and what was done to its file.
+pub(super) struct Built {
+    pub(super) mesh: Mesh,
+    pub(super) notices: Vec<String>,
+}
+
+/// Builds or reads the mesh of a configuration.
+pub(super) fn build(config: &Config, source: &Source) -> Result<Built, Error> {
+    let generated = |mesh: Result<Mesh, MeshError>| match mesh {
+        Ok(mesh) => Ok(Built { mesh, notices: Vec::new() }),
+        Err(error) => Err(parameter_fault(error, source)),
+    };
+    let built = match &config.mesh {
+        MeshConfig::Shield(parameters) => generated(shield(&parameters.parameters())),
+        MeshConfig::Block(parameters) => generated(block(&parameters.parameters())),
+        MeshConfig::Boxes(parameters) => generated(boxes(&parameters.parameters())),
+        MeshConfig::Sphere(parameters) => generated(sphere(&parameters.parameters())),
+        MeshConfig::File { path, unit } => read_msh_file(path, unit.metres())
+            .map(|read| {
+                let told = |message: String| format!("mesh file `{}`: {message}", path.display());
+                Built { mesh: read.mesh, notices: read.notices.messages().into_iter().map(told).collect() }
+            })
+            .map_err(|error| file_fault(error, source)),
+    }?;
+    Ok(Built { mesh: with_interfaces(built.mesh, &surface_names(config))?, ..built })
+}
+
+/// The unit in which the mesh of a configuration is written: that of its file, and millimetres for a generator.
+pub(crate) fn unit(config: &Config) -> LengthUnit {
+    match &config.mesh {
+        MeshConfig::File { unit, .. } => *unit,
+        _ => LengthUnit::Millimetre,
+    }
+}
+
+/// A parameter that a generator refuses becomes a fault at its key.
+fn parameter_fault(error: MeshError, source: &Source) -> Error {
+    let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
+    let path = if parameter.starts_with("mesh.") { parameter } else { "mesh" };
+    source.error(vec![source.fault(path, format!("{parameter} = {value}")).expected(expected)]).into()
+}
+
+/// A fault of a mesh file is shown at the key that names it.
+fn file_fault(error: MeshError, source: &Source) -> Error {
+    match error {
+        MeshError::Msh { path, cause } => {
+            let fault = source.fault("mesh.file", format!("mesh file `{}`, {cause}", path.display()));
+            source.error(vec![fault]).into()
+        }
+        MeshError::File { path, cause } => OutputError::io("read", path)(cause).into(),
+        other => other.into(),
+    }
+}
+
+/// Every surface that the configuration names, with the path of its key.
+pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
+    let mut names = Vec::new();
+    let mut add = |path: &str, surfaces: &'a [String]| {
+        names.extend(surfaces.iter().enumerate().map(|(i, name)| (format!("{path}[{i}]"), name.as_str())));
+    };
+    add("boundaries.flux_parallel", &config.boundaries.flux_parallel);
+    add("boundaries.flux_normal", &config.boundaries.flux_normal);
+    if let Some(field) = &config.boundaries.uniform_field {
+        add("boundaries.uniform_field.surfaces", &field.surfaces);
+    }
+    for (i, coil) in config.coils.iter().enumerate() {
+        if let CoilShape::Region(region) = &coil.shape
+            && let CoilPath::Terminals { terminals } = &region.path
+        {
+            add(&format!("coils[{i}].terminals"), terminals);
+        }
+    }
+    if let Some(remesh) = &config.remesh {
+        add("remesh.slide", &remesh.slide);
+        add("remesh.fixed", &remesh.fixed);
+        add("remesh.free", &remesh.free);
+    }
+    let design = config.design.as_ref().map(|design| design.surface.as_str());
+    // By default it is the design surface, whose own key is the better place for a fault.
+    if config.output.stl.iter().map(String::as_str).ne(design) {
+        add("output.stl", &config.output.stl);
+    }
+    names.extend(design.map(|name| ("design.surface".to_owned(), name)));
+    names
+}
+
+/// The mesh with a surface for every name of an interface; names that stand for none are left to [`surface_faults`].
+fn with_interfaces(mesh: Mesh, names: &[(String, &str)]) -> Result<Mesh, MeshError> {
+    let missing: BTreeSet<&str> = names
+        .iter()
+        .map(|(_, name)| *name)
+        .filter(|name| name.contains('|') && mesh.topology().surface(name).is_err())
+        .collect();
+    let found: Vec<_> = missing
+        .into_iter()
+        .filter_map(|name| Some((name, mesh.topology().faces_between(name).ok()?)))
+        .collect();
+    if found.is_empty() {
+        return Ok(mesh);
+    }
+    let mut topology = mesh.topology().as_ref().clone();
+    for (name, faces) in found {
+        topology = topology.with_surface(name, faces)?;
+    }
+    Mesh::new(Arc::new(topology), mesh.points().to_vec())
+}
+
+/// Every surface named that the mesh does not have, or that is empty.
+pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let surfaces: Vec<&str> = topology.surface_names().collect();
+    let mut sides: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+    sides.push(OUTSIDE);
+    let fault = |(path, name): (String, &str)| match topology.surface(name) {
+        Ok([]) => Some(source.fault(&path, format!("the surface `{name}` has no triangles"))),
+        Ok(_) => None,
+        Err(_) => Some(match topology.faces_between(name) {
+            Err(MeshError::UnknownRegion { name, .. }) => source.unknown_name(&path, "region", &name, &sides),
+            Err(MeshError::NoInterface { .. }) => source
+                .fault(&path, format!("the two sides of `{name}` have no face in common"))
+                .expected("two regions that touch, or a region that reaches the outside"),
+            _ => source.unknown_name(&path, "surface", name, &surfaces),
+        }),
+    };
+    surface_names(config).into_iter().filter_map(fault).collect()
+}
