@@ -25,7 +25,11 @@ const CASES: &[Case] = &[
         from: "frequency = \"60 Hz\"",
         to: "frequency = \"60 Hz\"\npenaltyy = 1.0",
         line: Some(1),
-        says: &["unknown key `penaltyy` in `analysis`", "did you mean `penalty`?", "known: frequency"],
+        says: &[
+            "unknown key `penaltyy` in `analysis`",
+            "did you mean `penalty`?",
+            "known: frequencies, frequency",
+        ],
     },
     Case {
         name: "unknown table",

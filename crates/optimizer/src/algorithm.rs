@@ -333,7 +333,7 @@ mod tests {
                 });
                 assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
                 let p = &best.1;
-                // From far outside CCSAQ gets inside, and then takes steps so small that it believes to be done.
+                // From far outside CCSAQ reaches a feasible design and ends there, short of the optimum.
                 if (algorithm, start) == (Algorithm::Ccsaq, 0.015) {
                     assert!(!p.is_empty(), "no feasible design");
                     continue;

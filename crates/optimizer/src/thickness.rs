@@ -1,7 +1,8 @@
-//! Thickness of the designed body behind every design node, measured along the direction of motion.
+//! Thickness of the designed body behind every design node, measured along the node's direction of motion.
 //!
-//! From each node of the design surface a ray runs against the direction of motion to the body's opposite face. That
-//! face is held (docs/theory.md), so the thickness of a design is the initial one plus the node's height.
+//! From each node of the design surface a ray runs against its direction to the body's opposite face. That face is held
+//! (docs/theory.md), so the thickness of a design is the initial one plus the node's height: exactly where one direction
+//! moves all nodes, and along normals in the same sense, each along its own. A node without direction has no thickness.
 
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
@@ -14,7 +15,8 @@ const RIM_TOLERANCE: f64 = 1e-6;
 /// Initial thickness [m] behind every design node.
 #[derive(Clone, Debug)]
 pub struct Thickness {
-    initial: Vec<f64>,
+    /// `None` where the node has no direction.
+    initial: Vec<Option<f64>>,
 }
 
 impl Thickness {
@@ -22,7 +24,6 @@ impl Thickness {
     pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
         let topology = mesh.topology();
         let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
-        let back = surface.direction().map(|d| -d);
         let faces: Vec<[Point; 3]> = topology
             .facets()
             .iter()
@@ -33,25 +34,29 @@ impl Thickness {
         let initial = surface
             .nodes()
             .iter()
-            .map(|&node: &NodeId| {
-                let origin = mesh.point(node);
-                faces.iter().filter_map(|face| distance(origin, back, face)).min_by(f64::total_cmp)
+            .zip(surface.directions())
+            .map(|(&node, direction): (&NodeId, &Point)| {
+                if *direction == [0.0; 3] {
+                    return Some(None);
+                }
+                let (origin, back) = (mesh.point(node), direction.map(|d| -d));
+                faces.iter().filter_map(|face| distance(origin, back, face)).min_by(f64::total_cmp).map(Some)
             })
-            .collect::<Option<Vec<f64>>>()?;
+            .collect::<Option<Vec<_>>>()?;
+        initial.iter().any(Option::is_some).then_some(())?;
         Some(Self { initial })
     }
 
     /// Initial thickness [m] at every design node that has one, with the node's place in the design surface.
     pub fn at_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.initial.iter().copied().enumerate()
+        self.initial.iter().enumerate().filter_map(|(i, t)| Some((i, (*t)?)))
     }
 
     /// Least and greatest thickness [m] for the heights of the design nodes [m].
     pub fn range(&self, heights: &[f64]) -> (f64, f64) {
-        self.initial
-            .iter()
-            .zip(heights)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), (t, h)| (low.min(t + h), high.max(t + h)))
+        self.at_nodes()
+            .map(|(i, t)| t + heights[i])
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
 }
 
@@ -77,6 +82,7 @@ fn distance(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::{DesignSetup, Direction};
     use fluxmorph_geometry::generate::{ShieldParameters, shield};
 
     #[test]
@@ -84,7 +90,9 @@ mod tests {
         let parameters = ShieldParameters { refinement: 0.5, ..ShieldParameters::default() };
         let mesh = shield(&parameters).expect("defaults are valid");
         let triangles = mesh.topology().surface("plate_bottom").expect("the shield has it");
-        let surface = DesignSurface::new(&mesh, triangles, [0.0, 0.0, -1.0], None);
+        let surface =
+            DesignSurface::new(&mesh, &DesignSetup::new(triangles, Direction::Along([0.0, 0.0, -1.0])))
+                .expect("every node is a variable");
         let plate = mesh.topology().region("plate").expect("the shield has it");
         let thickness = Thickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
         let (low, high) = thickness.range(&vec![0.001; surface.nodes().len()]);

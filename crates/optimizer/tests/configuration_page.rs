@@ -104,7 +104,9 @@ const FULL: [&str; 5] = [
     direction = [0, 0, 1]
     [design]
     surface = "z_max"
-    direction = [0, 0, 1]
+    direction = "normal"
+    filter_radius = 0.02
+    symmetry = [{ axis = "x", at = 0 }]
     lower = -0.005
     upper = 0.02
     [remesh]
@@ -278,6 +280,7 @@ fn every_key_that_the_reader_asks_for_is_mentioned() {
         "[[constraints]]\nkind = \"mass\"",
         "[[constraints]]\nkind = \"thickness\"",
         "[design]",
+        "[[design.symmetry]]",
         "[remesh]",
         "[[remesh.subregions]]",
         "[optimizer]",

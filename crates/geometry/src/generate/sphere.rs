@@ -13,7 +13,7 @@ use std::f64::consts::FRAC_PI_4;
 use std::sync::Arc;
 
 use crate::error::MeshError;
-use crate::generate::grading::{self, Fine, Growth, Skin};
+use crate::generate::grading::{self, LINES_LIMIT, Skin};
 use crate::generate::grid::{TETS_LIMIT, TETS_PER_CELL};
 use crate::ids::{NodeId, RegionId};
 use crate::mesh::Mesh;
@@ -37,7 +37,7 @@ pub struct SphereParameters {
     pub wall_layers: usize,
     /// Thickness of the first layer outside [m]; `None`: the length of the surface's cells.
     pub air_layer: Option<f64>,
-    /// Ratio of neighbouring layers outside, at least 1.
+    /// Ratio of neighbouring layers outside, at least 1; far out they grow as their cells do.
     pub growth: f64,
     /// Divisions are multiplied and layers divided by it; the growth ratio becomes its root.
     pub refinement: f64,
@@ -62,6 +62,9 @@ impl Default for SphereParameters {
 const AIR: RegionId = RegionId(0);
 const SPHERE: RegionId = RegionId(1);
 const CAVITY: RegionId = RegionId(2);
+
+/// Largest thickness of a layer outside over the length of its cells: thicker ones would have a quality below 0.1.
+const THICKEST: f64 = 3.5;
 
 /// Paths along the axes of a cell from its lowest to its highest corner.
 const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
@@ -237,11 +240,37 @@ fn radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
     };
     let mut radii = grading::equal_parts([0.0, wall[0]], n);
     radii.extend(&wall[1..]);
-    let along = p.radius * FRAC_PI_4 / n as f64;
-    let first = p.air_layer.map_or(along, |layer| layer / p.refinement);
-    let growth = Growth { first, ratio: p.growth.powf(1.0 / p.refinement), largest: f64::INFINITY };
-    let air = grading::growing("mesh.sphere.growth", &[p.radius, p.outer_radius], Fine::Start, growth)?;
-    radii.extend(&air[1..]);
+    radii.extend(air_radii(p, n)?);
+    Ok(radii)
+}
+
+/// Radii of the shells outside the sphere, without its own [m].
+///
+/// Layers grow by the ratio, but stay below [`THICKEST`] times the length of their cells; then all are stretched by one
+/// factor to end on the outer radius.
+fn air_radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
+    let angle = FRAC_PI_4 / n as f64;
+    let growth = p.growth.powf(1.0 / p.refinement);
+    let room = p.outer_radius - p.radius;
+    let mut layer = p.air_layer.map_or(p.radius * angle, |layer| layer / p.refinement);
+    let mut reached = Vec::new();
+    let mut sum = 0.0;
+    // The layer that would leave less than half of itself inside is not begun.
+    while reached.is_empty() || room - sum > 0.5 * layer {
+        if reached.len() == LINES_LIMIT {
+            return Err(MeshError::Parameter {
+                parameter: "mesh.sphere.air_layer",
+                value: format!("{layer} m"),
+                expected: format!("at most {LINES_LIMIT} layers are made; use thicker ones"),
+            });
+        }
+        sum += layer;
+        reached.push(sum);
+        layer = (layer * growth).min(THICKEST * angle * (p.radius + sum));
+    }
+    reached.pop();
+    let mut radii: Vec<f64> = reached.iter().map(|r| p.radius + room * (r / sum)).collect();
+    radii.push(p.outer_radius);
     Ok(radii)
 }
 
@@ -269,6 +298,9 @@ fn check(p: &SphereParameters) -> Result<(), MeshError> {
     }
     if let Some(layer) = p.air_layer.filter(|&layer| !positive(layer)) {
         return refuse("mesh.sphere.air_layer", format!("{layer} m"), "a positive thickness");
+    }
+    if !(p.growth >= 1.0 && p.growth.is_finite()) {
+        return refuse("mesh.sphere.growth", p.growth.to_string(), "a finite ratio of at least 1");
     }
     if !positive(p.refinement) {
         return refuse("mesh.sphere.refinement", p.refinement.to_string(), "a positive number");
@@ -419,16 +451,16 @@ mod tests {
 
     #[test]
     fn no_tetrahedron_is_a_sliver() {
-        for (parameters, least) in [
-            // Growing layers outside are thicker than their triangles are long.
-            (SphereParameters::default(), 0.15),
+        for parameters in [
+            SphereParameters::default(),
             // Layers of 0.2 mm on triangles of 1 mm.
-            (thin_skinned(), 0.1),
-            (hollow(), 0.2),
-            (SphereParameters { divisions: 1, growth: 2.0, ..SphereParameters::default() }, 0.1),
+            thin_skinned(),
+            hollow(),
+            SphereParameters { divisions: 1, growth: 2.0, ..SphereParameters::default() },
+            SphereParameters { divisions: 12, growth: 3.0, ..thin_skinned() },
         ] {
             let report = QualityReport::of_mesh(&sphere(&parameters).expect("valid")).expect("not empty");
-            assert!(report.worst >= least, "{parameters:?}: {report:?}");
+            assert!(report.worst >= 0.1, "{parameters:?}: {report:?}");
         }
     }
 
@@ -458,6 +490,8 @@ mod tests {
         assert_eq!(refused(&|p| p.skin = vec![0.003]), "mesh.sphere.skin");
         assert_eq!(refused(&|p| p.wall_layers = 0), "mesh.sphere.wall_layers");
         assert_eq!(refused(&|p| p.air_layer = Some(0.0)), "mesh.sphere.air_layer");
+        let countless = |p: &mut SphereParameters| (p.air_layer, p.growth) = (Some(1e-12), 1.0);
+        assert_eq!(refused(&countless), "mesh.sphere.air_layer");
         assert_eq!(refused(&|p| p.growth = 0.5), "mesh.sphere.growth");
         assert_eq!(refused(&|p| p.refinement = f64::NAN), "mesh.sphere.refinement");
     }

@@ -138,6 +138,17 @@ choice! {
     }
 }
 
+impl AxisWord {
+    /// Its coordinate: 0, 1 or 2.
+    pub fn index(self) -> usize {
+        match self {
+            Self::X => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+        }
+    }
+}
+
 /// The axis of a coil.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -152,9 +163,11 @@ impl Axis {
     /// A vector along the axis.
     pub fn vector(self) -> [f64; 3] {
         match self {
-            Self::Coordinate(AxisWord::X) => [1.0, 0.0, 0.0],
-            Self::Coordinate(AxisWord::Y) => [0.0, 1.0, 0.0],
-            Self::Coordinate(AxisWord::Z) => [0.0, 0.0, 1.0],
+            Self::Coordinate(word) => {
+                let mut vector = [0.0; 3];
+                vector[word.index()] = 1.0;
+                vector
+            }
             Self::Vector(vector) => vector,
         }
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Dimension;
 use super::choice::choice;
-use super::design::read_direction;
+use super::design::read_vector;
 use super::range::Range;
 use super::section::Section;
 
@@ -73,7 +73,7 @@ impl Functional {
         }
         let weighting = section.choice("weighting");
         let target = section.quantities("target", Dimension::FluxDensity, Range::FINITE);
-        let direction = read_direction(section);
+        let direction = read_vector(section);
         let frequency = section.quantity("frequency", Dimension::Frequency, Range::NOT_NEGATIVE);
         for (key, example, wanted) in [
             ("weighting", None, kind.sums_over_cells()),

@@ -39,7 +39,7 @@ pub use coil::{
     RegionCoil, ShapeWord,
 };
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
-pub use design::Design;
+pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use fault::{Fault, Place, nearest};
 pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use material::{Material, Region, RegionModel};
@@ -240,10 +240,10 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let optimizer =
         root.table("optimizer").map(|s| Optimizer::read(s, constraints.len())).unwrap_or_default();
     let probes = objective::read_probes(&root);
-    let surface = design.as_ref().map(|design| design.surface.as_str()).filter(|name| !name.is_empty());
+    let surfaces = design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
     let output = match root.table("output") {
-        Some(section) => Output::read(section, &source.directory, &source.stem, surface),
-        None => Output::new(&source.directory, &source.stem, surface),
+        Some(section) => Output::read(section, &source.directory, &source.stem, surfaces),
+        None => Output::new(&source.directory, &source.stem, surfaces),
     };
     root.finish();
     Some(Config {

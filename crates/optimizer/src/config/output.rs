@@ -17,7 +17,7 @@ pub struct Output {
     pub fields: FieldsKept,
     /// Whether the mesh of the optimum is written as a Gmsh file. Default `true`: it is what a user goes on with.
     pub mesh: bool,
-    /// Surfaces of the optimum that are written as STL files. Default: the design surface, where there is one.
+    /// Surfaces of the optimum that are written as STL files. Default: the design surfaces.
     pub stl: Vec<String>,
 }
 
@@ -36,18 +36,18 @@ choice! {
 }
 
 impl Output {
-    /// The defaults for a configuration called `stem` in a folder, with its design surface.
-    pub(super) fn new(directory: &Path, stem: &str, surface: Option<&str>) -> Self {
+    /// The defaults for a configuration called `stem` in a folder, with its design surfaces.
+    pub(super) fn new(directory: &Path, stem: &str, surfaces: &[String]) -> Self {
         Self {
             directory: directory.join("runs").join(stem),
             fields: FieldsKept::Every,
             mesh: true,
-            stl: surface.map(str::to_owned).into_iter().collect(),
+            stl: surfaces.iter().filter(|name| !name.is_empty()).cloned().collect(),
         }
     }
 
-    pub(super) fn read(section: Section<'_>, folder: &Path, stem: &str, surface: Option<&str>) -> Self {
-        let default = Self::new(folder, stem, surface);
+    pub(super) fn read(section: Section<'_>, folder: &Path, stem: &str, surfaces: &[String]) -> Self {
+        let default = Self::new(folder, stem, surfaces);
         let output = Self {
             directory: section.text("directory").map_or(default.directory, |path| folder.join(path)),
             fields: section.choice("fields").unwrap_or(default.fields),

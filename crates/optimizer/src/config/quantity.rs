@@ -14,6 +14,8 @@ pub enum Dimension {
     Frequency,
     /// An electric conductivity [S/m].
     Conductivity,
+    /// A mass density [kg/m³].
+    MassDensity,
     /// A current, or ampere-turns [A].
     Current,
     /// A magnetic flux density [T].
@@ -34,8 +36,6 @@ pub enum Dimension {
     Volume,
     /// A mass [kg].
     Mass,
-    /// A mass density [kg/m³].
-    MassDensity,
 }
 
 /// A unit: `value [SI] = number · factor · 10^exponent`.
@@ -73,6 +73,10 @@ const UNITS: &[Unit] = &[
     decimal("MHz", Frequency, 6),
     decimal("S/m", Conductivity, 0),
     decimal("MS/m", Conductivity, 6),
+    decimal("kg/m3", MassDensity, 0),
+    decimal("kg/m\u{b3}", MassDensity, 0),
+    decimal("g/cm3", MassDensity, 3),
+    decimal("g/cm\u{b3}", MassDensity, 3),
     decimal("A", Current, 0),
     decimal("kA", Current, 3),
     decimal("AT", Current, 0),
@@ -108,10 +112,6 @@ const UNITS: &[Unit] = &[
     decimal("kg", Mass, 0),
     decimal("g", Mass, -3),
     decimal("t", Mass, 3),
-    decimal("kg/m3", MassDensity, 0),
-    decimal("kg/m\u{b3}", MassDensity, 0),
-    decimal("g/cm3", MassDensity, 3),
-    decimal("g/cm\u{b3}", MassDensity, 3),
 ];
 
 /// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
@@ -135,6 +135,7 @@ impl Dimension {
             Length => "a length",
             Frequency => "a frequency",
             Conductivity => "a conductivity",
+            MassDensity => "a mass density",
             Current => "a current",
             FluxDensity => "a flux density",
             Angle => "an angle",
@@ -145,7 +146,6 @@ impl Dimension {
             Energy => "an energy",
             Volume => "a volume",
             Mass => "a mass",
-            MassDensity => "a mass density",
         }
     }
 
@@ -155,6 +155,7 @@ impl Dimension {
             Length => "m",
             Frequency => "Hz",
             Conductivity => "S/m",
+            MassDensity => "kg/m\u{b3}",
             Current => "A",
             FluxDensity => "T",
             Angle => "rad",
@@ -165,7 +166,6 @@ impl Dimension {
             Energy => "J",
             Volume => "m\u{b3}",
             Mass => "kg",
-            MassDensity => "kg/m\u{b3}",
         }
     }
 
@@ -175,6 +175,7 @@ impl Dimension {
             Length => "10 mm",
             Frequency => "60 Hz",
             Conductivity => "7e6 S/m",
+            MassDensity => "7850 kg/m3",
             Current => "40 kA",
             FluxDensity => "5 mT",
             Angle => "30 deg",
@@ -185,7 +186,6 @@ impl Dimension {
             Energy => "1.5 J",
             Volume => "400 cm3",
             Mass => "2.5 kg",
-            MassDensity => "7850 kg/m3",
         }
     }
 

@@ -92,6 +92,11 @@ impl<'a> Section<'a> {
         self.wrong(key, message, expected);
     }
 
+    /// Whether the key is written as a text.
+    pub(super) fn is_text(&self, key: &str) -> bool {
+        matches!(self.table.get(key).map(|node| &node.value), Some(Value::Text(_)))
+    }
+
     fn get(&self, key: &'static str) -> Option<&'a Node> {
         self.asked.borrow_mut().push(key);
         self.table.get(key)

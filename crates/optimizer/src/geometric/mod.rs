@@ -47,7 +47,6 @@ pub enum GeometricError {
 mod tests {
     use std::path::Path;
 
-    use super::*;
     use crate::config::Config;
     use crate::problem::Problem;
     use crate::setup::{Purpose, Setup, set_up};

@@ -92,12 +92,16 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         add("remesh.fixed", &remesh.fixed);
         add("remesh.free", &remesh.free);
     }
-    let design = config.design.as_ref().map(|design| design.surface.as_str());
+    let design = config.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
     // By default it is the design surface, whose own key is the better place for a fault.
-    if config.output.stl.iter().map(String::as_str).ne(design) {
+    if config.output.stl != design {
         add("output.stl", &config.output.stl);
     }
-    names.extend(design.map(|name| ("design.surface".to_owned(), name)));
+    if let [one] = design {
+        names.push(("design.surface".to_owned(), one.as_str()));
+    } else {
+        add("design.surface", design);
+    }
     names
 }
 

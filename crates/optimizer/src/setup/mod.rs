@@ -1,9 +1,10 @@
 //! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
-//! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `shape` the design
-//! surface and the elastic map.
+//! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
+//! surface, `shape` the elastic map.
 
+mod design;
 mod field;
 mod functional;
 pub(crate) mod mesh;
@@ -114,13 +115,12 @@ pub fn variable_count(config: &Config, source: &Source) -> Result<usize, Error> 
         let fault = source.fault("design", "there is no [design], so a design has no meaning");
         return Err(source.error(vec![fault]).into());
     };
-    if let Some([n, m]) = design.grid {
+    if let (Some([n, m]), []) = (design.grid, design.symmetry.as_slice()) {
         return Ok(n * m);
     }
     let mesh = build_mesh(config, source)?;
     source.check(name_faults(config, source, mesh.topology()))?;
-    let triangles = mesh.topology().surface(&design.surface)?;
-    Ok(triangles.iter().flatten().collect::<std::collections::BTreeSet<_>>().len())
+    Ok(design::surface(config, source, design, &mesh)?.variable_count())
 }
 
 /// Skin-depth audits of all conductors at all frequencies, on the mesh with all regions.

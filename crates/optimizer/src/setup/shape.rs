@@ -12,7 +12,9 @@ use fluxmorph_remesh::{
 use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
-use crate::config::{Config, Design, Fault, Motion, Remesh, RemeshExtent, Source, StiffnessLaw};
+use crate::config::{
+    Config, Design, DesignDirection, DirectionWord, Fault, Motion, Remesh, RemeshExtent, Source, StiffnessLaw,
+};
 use crate::design::DesignSurface;
 use crate::error::Error;
 use crate::problem::Shape;
@@ -37,33 +39,18 @@ pub(super) fn shape(
     warnings: &mut Vec<String>,
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
-    let on = |mesh: &Mesh| -> Result<DesignSurface, Error> {
-        let triangles = mesh.topology().surface(&design.surface)?;
-        if triangles.is_empty() {
-            let message = format!("the surface `{}` has no triangles", design.surface);
-            return Err(source.error(vec![source.fault("design.surface", message)]).into());
-        }
-        if design.grid.is_some() && !spans_a_grid(mesh, triangles, design.direction) {
-            let message =
-                format!("a control grid cannot be laid across `design.direction` on `{}`", design.surface);
-            let fault = source
-                .fault("design.direction", message)
-                .expected("the direction that stands most upright on the surface, or no design.grid");
-            return Err(source.error(vec![fault]).into());
-        }
-        Ok(DesignSurface::new(mesh, triangles, design.direction, design.grid))
-    };
-    let surface = on(mesh)?;
-    let idle = surface.gradient(&vec![surface.direction(); surface.nodes().len()]);
-    let idle = idle.iter().filter(|&&weight| weight == 0.0).count();
+    let full_surface = super::design::surface(config, source, design, full_mesh)?;
+    let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
+    let mut weights = vec![0.0; surface.variable_count()];
+    surface.rows().iter().flatten().for_each(|&(k, weight)| weights[k] += weight);
+    let idle = weights.iter().filter(|&&weight| weight == 0.0).count();
     if idle > 0 {
         warnings.push(format!(
-            "{idle} of {} design variables move no node: the control grid is finer than the mesh; refine the mesh, or take \
-             a smaller design.grid",
+            "{idle} of {} design variables move no node: the control grid is finer than the mesh, or lies on a rim that is \
+             held; refine the mesh, or take a smaller design.grid",
             surface.variable_count()
         ));
     }
-    let full_surface = on(full_mesh)?;
     let materials: BTreeSet<&str> = regions_at(full_mesh, &full_surface)
         .into_iter()
         .map(|region| {
@@ -74,7 +61,7 @@ pub(super) fn shape(
     if materials.len() < 2 {
         warnings.push(format!(
             "both sides of the design surface `{}` have the same material: moving it changes no field; check [regions]",
-            design.surface
+            design.surface.join("`, `")
         ));
     }
     let setup = remesh_setup(inputs, &surface, warnings)?;
@@ -93,16 +80,6 @@ pub(super) fn shape(
     };
     check_bounds(source, mesh, &shape, config.optimizer.minimum_quality)?;
     Ok(shape)
-}
-
-/// Whether a surface has an extent along both coordinates across the main component of a direction.
-fn spans_a_grid(mesh: &Mesh, triangles: &[[NodeId; 3]], direction: [f64; 3]) -> bool {
-    let along = (0..3).fold(0, |best, d| if direction[d].abs() > direction[best].abs() { d } else { best });
-    (0..3).filter(|&d| d != along).all(|d| {
-        let mut coordinates = triangles.iter().flatten().map(|&n| mesh.point(n)[d]);
-        let first = coordinates.next();
-        coordinates.any(|x| Some(x) != first)
-    })
 }
 
 /// Subregions, boundary kinds and design nodes of the elastic body.
@@ -204,10 +181,13 @@ fn remesh_setup(
 
 /// The axis of the design's direction where the motion is to follow it.
 fn guidance(inputs: &Inputs<'_>) -> Result<Guidance, Error> {
-    let direction = inputs.design.direction;
+    let axis = match inputs.design.direction {
+        DesignDirection::Vector(direction) => (0..3).find(|&d| direction[d].abs() == 1.0),
+        DesignDirection::Word(DirectionWord::Normal) => None,
+    };
     match inputs.remesh.motion {
         Motion::Free => Ok(Guidance::Free),
-        Motion::AlongDesign => match (0..3).find(|&d| direction[d].abs() == 1.0) {
+        Motion::AlongDesign => match axis {
             Some(axis) => Ok(Guidance::Axis(axis)),
             None => {
                 let fault = inputs
@@ -235,13 +215,19 @@ fn regions_at(mesh: &Mesh, surface: &DesignSurface) -> BTreeSet<RegionId> {
 /// The region that a positive design thickens: behind the design surface, and not air.
 fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
     let topology = mesh.topology();
-    let facet = topology
+    let direction_at = |node: &NodeId| {
+        let row = surface.nodes().binary_search(node).ok()?;
+        Some(surface.directions()[row]).filter(|direction| *direction != [0.0; 3])
+    };
+    let (facet, direction) = topology
         .facets()
         .iter()
-        .find(|f| f.outside.is_some() && f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))?;
+        .filter(|f| f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
+        .filter(|f| f.outside.is_some())
+        .find_map(|f| Some((f, f.nodes.iter().find_map(direction_at)?)))?;
     let behind = |e: &ElementId| {
         let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
-        dot(offset, surface.direction()) < 0.0
+        dot(offset, direction) < 0.0
     };
     let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
     let region = topology.region_of()[element.index()];

@@ -179,16 +179,18 @@ fn renumber(contents: &mut Contents<'_>) -> (Vec<u32>, Vec<Point>) {
     (renumbered, points)
 }
 
+/// The name of a surface and its triangles.
+type NamedSurface = (String, Vec<[NodeId; 3]>);
+
 /// Triangles of every surface, in the order of their tags.
 fn surfaces(
     contents: &mut Contents<'_>,
     renumbered: &[u32],
     topology: &Topology,
-) -> Result<Vec<(String, Vec<[NodeId; 3]>)>, MshError> {
+) -> Result<Vec<NamedSurface>, MshError> {
     contents.triangles.sort_by_key(|triangle| (triangle.group, triangle.tag));
     let (tags, names) = groups(contents, 2, contents.triangles.iter().map(|triangle| triangle.group))?;
-    let mut surfaces: Vec<(String, Vec<[NodeId; 3]>)> =
-        names.into_iter().map(|name| (name, Vec::new())).collect();
+    let mut surfaces: Vec<NamedSurface> = names.into_iter().map(|name| (name, Vec::new())).collect();
     for group in contents.triangles.chunk_by(|a, b| a.group == b.group) {
         let index = tags.binary_search(&group[0].group).expect("all groups were gathered");
         let (name, triangles) = &mut surfaces[index];

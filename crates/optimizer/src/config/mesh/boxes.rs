@@ -98,11 +98,7 @@ impl BoxesMesh {
             cells: region.cells,
         };
         let size = |size: &SizeAlong| AxisSize {
-            axis: match size.axis {
-                AxisWord::X => 0,
-                AxisWord::Y => 1,
-                AxisWord::Z => 2,
-            },
+            axis: size.axis.index(),
             limit: SizeLimit { interval: [size.from, size.to], size: size.size.unwrap_or(f64::INFINITY) },
         };
         let patch = |patch: &Patch| SurfacePatch { name: patch.name.clone(), corners: patch.corners };

@@ -192,6 +192,29 @@ const CASES: &[Case] = &[
     ("[1.0, 2.0, -2.5]", "[0, 0, 0]", "design.direction", "has no length", 27),
     ("[1.0, 2.0, -2.5]", "[0, 0, nan]", "design.direction[2]", "not a finite number", 27),
     ("[1.0, 2.0, -2.5]", "[0, 0, 0, 1]", "design.direction", "has 4 items", 27),
+    ("[1.0, 2.0, -2.5]", "\"nromal\"", "design.direction", "cannot be `nromal`", 27),
+    ("direction = [1.0, 2.0, -2.5]\n", "", "design.direction", "missing key `direction`", 25),
+    ("[7, 13]", "[7, 13]\nfilter_radius = 0.02", "design.filter_radius", "are both given", 29),
+    ("grid = [7, 13]", "filter_radius = 0", "design.filter_radius", "out of range", 28),
+    ("[7, 13]", "[7, 13]\nrim = \"loose\"", "design.rim", "cannot be `loose`", 29),
+    ("[7, 13]", "[7, 13]\nsymmetry = [{ axis = \"w\" }]", "design.symmetry[0].axis", "cannot be `w`", 29),
+    ("[7, 13]", "[7, 13]\nsymmetry = [{ at = 1 }]", "design.symmetry[0].axis", "missing key `axis`", 29),
+    (
+        "[7, 13]",
+        "[7, 13]\nsymmetry = [{ axis = \"y\" }]",
+        "design.symmetry[0].axis",
+        "leaves the symmetry plane",
+        29,
+    ),
+    (
+        "[1.0, 2.0, -2.5]",
+        "\"normal\"\nsymmetry = [{ axis = \"y\" }, { axis = \"y\", at = 1 }]",
+        "design.symmetry[1].axis",
+        "two symmetry planes along y",
+        28,
+    ),
+    ("surface = \"plate_bottom\"", "surface = []", "design.surface", "empty list", 26),
+    ("= 800", "= 800\ndensity = \"7.85 kg\"", "materials.steel.density", "7.85 kg", 9),
     ("[7, 13]", "[7, 1]", "design.grid[1]", "out of range", 28),
     ("[7, 13]", "[7.0, 13]", "design.grid[0]", "not a whole number", 28),
     ("[7, 13]", "[7, -13]", "design.grid[1]", "out of range", 28),
@@ -313,6 +336,58 @@ fn two_constraints_of_one_name_are_refused() {
     let one = "[[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper_ratio = 0.9\n";
     let shown = report(&SMALL.replace("[optimizer]", &format!("{one}{one}[optimizer]"))).to_string();
     assert!(shown.contains("two constraints are named `volume_plate`"), "{shown}");
+}
+
+#[test]
+fn faults_of_boxes_stand_at_their_keys() {
+    let text = r#"
+        [mesh]
+        generator = "boxes"
+        [mesh.boxes]
+        box = [[0, 0, 0], [1, 1, 1]]
+        growth = 1
+        [[mesh.boxes.regions]]
+        name = "plate"
+        box = [[0, 0, 0], [1, 1, "2 m"]]
+        [[mesh.boxes.regions]]
+        box = [[0, 0, 0.5], [1, 1, 0.5]]
+        size = ["1 mm", "1 mm"]
+        [[mesh.boxes.sizes]]
+        axis = "z"
+        from = 0.5
+        to = 3
+        [[mesh.boxes.surfaces]]
+        name = "top"
+        box = [[0, 0, 0.5], [1, 1, 0.4]]
+        [analysis]
+        frequency = 0
+    "#;
+    let report = report(text);
+    let paths: Vec<_> = report.faults.iter().map(|fault| fault.path.as_str()).collect();
+    let expected = [
+        "mesh.boxes.growth",
+        "mesh.boxes.regions[0].box",
+        "mesh.boxes.regions[1].box",
+        "mesh.boxes.regions[1].name",
+        "mesh.boxes.regions[1].size",
+        "mesh.boxes.sizes[0].to",
+        "mesh.boxes.surfaces[0].box",
+    ];
+    for path in expected {
+        assert!(paths.contains(&path), "{path} is not among {paths:?}");
+    }
+    assert_eq!(paths.len(), expected.len(), "{report}");
+    assert!(report.to_string().contains("which goes from z = 0 m to 1 m"), "{report}");
+}
+
+#[test]
+fn a_generator_needs_its_own_table_and_no_other() {
+    let mesh = |text: &str| report(&format!("[mesh]\n{text}\n[analysis]\nfrequency = 0\n")).to_string();
+    assert!(mesh("generator = \"boxes\"").contains("missing key `boxes`"));
+    let shown = mesh("generator = \"block\"\n[mesh.sphere]\nradius = 1");
+    assert!(shown.contains("`mesh.sphere` has no use without generator = \"sphere\""), "{shown}");
+    let shown = mesh("generator = \"sphere\"\n[mesh.sphere]\nwall_layers = 2");
+    assert!(shown.contains("divides the wall of a hollow sphere"), "{shown}");
 }
 
 #[test]

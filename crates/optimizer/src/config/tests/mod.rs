@@ -141,6 +141,10 @@ fn a_mesh_left_to_its_defaults_is_that_of_the_generator() {
     let (config, _) = Config::from_str(&text.replace("shield", "block"), "small.toml").expect("good");
     let MeshConfig::Block(block) = config.mesh else { panic!("the block's generator") };
     assert_eq!(block.parameters(), fluxmorph_geometry::generate::BlockParameters::default());
+
+    let (config, _) = Config::from_str(&text.replace("shield", "sphere"), "small.toml").expect("good");
+    let MeshConfig::Sphere(sphere) = config.mesh else { panic!("the sphere's generator") };
+    assert_eq!(sphere.parameters(), fluxmorph_geometry::generate::SphereParameters::default());
 }
 
 #[test]
@@ -179,7 +183,10 @@ fn values_are_in_si_and_defaults_filled_in() {
     assert_eq!(config.output.directory, Path::new("runs/small"));
     let remesh = config.remesh.expect("remesh");
     assert_eq!((remesh.poisson, remesh.stiffness), (0.3, StiffnessLaw::InverseSize));
-    let length: f64 = config.design.expect("design").direction.iter().map(|x| x * x).sum();
+    let DesignDirection::Vector(direction) = config.design.expect("design").direction else {
+        panic!("a vector")
+    };
+    let length: f64 = direction.iter().map(|x| x * x).sum();
     assert!((length - 1.0).abs() < 1e-15);
 }
 

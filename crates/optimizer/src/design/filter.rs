@@ -1,0 +1,150 @@
+//! The smoothing filter: the height of a node is the weighted mean of the variables within a radius `r`,
+//!
+//! `h_i = Σ_j w_ij a_j p_j / Σ_j w_ij a_j`, `w_ij = max(0, 1 − |x_i − x_j| / r)`,
+//!
+//! with the surface area `a_j` that belongs to node `j` (a third of the triangles around it). This is the vertex filter of
+//! free-form shape optimisation (M. Hojjat, E. Stavropoulou, K.-U. Bletzinger, Comput. Methods Appl. Mech. Engrg. 268
+//! (2014) 494–510) with the cone of B. Bourdin, Int. J. Numer. Methods Engrg. 50 (2001) 2143–2158.
+//!
+//! Chosen before the Helmholtz filter `(M + r²/12 K) h = M p` (B. S. Lazarov, O. Sigmund, Int. J. Numer. Methods Engrg. 86
+//! (2011) 765–781), because
+//! * rows sum to one and no weight is negative on every triangulation: the heights keep the bounds of the variables. The
+//!   Helmholtz filter has this only with a lumped mass and without obtuse triangles;
+//! * the areas make it a quadrature of a convolution: another mesh changes the surface by its error of interpolation only;
+//! * nodes that are mirror images get mirrored rows, and the transpose is that of a sparse matrix.
+//!
+//! Its price is memory, `π (r / h)²` entries a node, which is why there is a limit. Distances are straight, so a node only
+//! sees nodes of the same connected piece that move to the same side: the two faces of a thin plate do not mix. Where a
+//! symmetry plane cuts the surface, the mirror images of the nodes count too: half a model gives the surface of the whole.
+
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
+use fluxmorph_geometry::{Mesh, NodeId};
+
+use super::{DesignError, Mirror, Row};
+
+/// Most entries of the filter matrix: 0.8 GB.
+const LARGEST: usize = 50_000_000;
+
+/// What the filter needs of the design surface, by its nodes.
+pub(super) struct Surface<'a> {
+    places: Vec<Point>,
+    directions: &'a [Point],
+    /// [m²]
+    areas: Vec<f64>,
+    /// The least node of the connected piece.
+    piece: Vec<usize>,
+}
+
+/// A node or one of its mirror images.
+struct Seen {
+    node: usize,
+    place: Point,
+    direction: Point,
+}
+
+impl<'a> Surface<'a> {
+    /// The surface of `triangles` with their nodes, ascending, and the nodes' directions.
+    pub(super) fn new(
+        mesh: &Mesh,
+        nodes: &[NodeId],
+        triangles: &[[NodeId; 3]],
+        directions: &'a [Point],
+    ) -> Self {
+        let mut areas = vec![0.0; nodes.len()];
+        let mut piece: Vec<usize> = (0..nodes.len()).collect();
+        for triangle in triangles {
+            let third = norm(area_vector(triangle.map(|n| mesh.point(n)))) / 3.0;
+            let rows: Vec<usize> = triangle.iter().filter_map(|n| nodes.binary_search(n).ok()).collect();
+            for &i in &rows {
+                areas[i] += third;
+                let (a, b) = (root(&mut piece, rows[0]), root(&mut piece, i));
+                piece[a.max(b)] = a.min(b);
+            }
+        }
+        let piece = (0..nodes.len()).map(|i| root(&mut piece, i)).collect();
+        let places = nodes.iter().map(|&n| mesh.point(n)).collect();
+        Self { places, directions, areas, piece }
+    }
+
+    /// Gives mirrored nodes the same area.
+    pub(super) fn mirror_areas(&mut self, pairs: &[Vec<usize>]) {
+        for partner in pairs {
+            self.areas =
+                self.areas.iter().zip(partner).map(|(own, &other)| 0.5 * (own + self.areas[other])).collect();
+        }
+    }
+
+    /// The rows of the filter of this radius [m]; `planes` cut the surface.
+    ///
+    /// # Errors
+    /// [`DesignError::WideFilter`].
+    pub(super) fn rows(&self, radius: f64, planes: &[Mirror]) -> Result<Vec<Row>, DesignError> {
+        let cell = |x: Point| x.map(|c| (c / radius).floor() as i64);
+        let mut cells: BTreeMap<[i64; 3], Vec<Seen>> = BTreeMap::new();
+        for seen in self.with_images(radius, planes) {
+            cells.entry(cell(seen.place)).or_default().push(seen);
+        }
+        let mut entries = 0;
+        let mut rows = Vec::with_capacity(self.places.len());
+        for (i, &place) in self.places.iter().enumerate() {
+            let row = self.row(i, radius, neighbours(cell(place)).filter_map(|c| cells.get(&c)).flatten());
+            entries += row.len();
+            if entries > LARGEST {
+                return Err(DesignError::WideFilter { radius, limit: LARGEST });
+            }
+            rows.push(row);
+        }
+        Ok(rows)
+    }
+
+    fn row<'s>(&self, i: usize, radius: f64, near: impl Iterator<Item = &'s Seen>) -> Row {
+        let mut weights: BTreeMap<usize, f64> = BTreeMap::new();
+        for seen in near.filter(|seen| self.piece[seen.node] == self.piece[i]) {
+            let weight = 1.0 - norm(sub(seen.place, self.places[i])) / radius;
+            let itself = seen.node == i && seen.place == self.places[i];
+            if weight > 0.0 && (itself || dot(seen.direction, self.directions[i]) > 0.0) {
+                *weights.entry(seen.node).or_default() += weight * self.areas[seen.node];
+            }
+        }
+        let sum: f64 = weights.values().sum();
+        // Only triangles without area give none: the node then follows its own variable.
+        if sum > 0.0 { weights.into_iter().map(|(j, w)| (j, w / sum)).collect() } else { vec![(i, 1.0)] }
+    }
+
+    /// All nodes, and their images in the planes within the radius, at most one plane an axis at a time.
+    fn with_images(&self, radius: f64, planes: &[Mirror]) -> Vec<Seen> {
+        let mut all: Vec<Seen> = (0..self.places.len())
+            .map(|node| Seen { node, place: self.places[node], direction: self.directions[node] })
+            .collect();
+        for axis in 0..3 {
+            let mut images = Vec::new();
+            for plane in planes.iter().filter(|plane| plane.axis == axis) {
+                for seen in all.iter().filter(|seen| (seen.place[axis] - plane.at).abs() < radius) {
+                    let (place, direction) = (plane.image(seen.place), plane.turned(seen.direction));
+                    images.push(Seen { node: seen.node, place, direction });
+                }
+            }
+            all.extend(images);
+        }
+        all
+    }
+}
+
+/// A cell and those around it, in order.
+fn neighbours([x, y, z]: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
+    let around = |c: i64| [c.saturating_sub(1), c, c.saturating_add(1)];
+    around(x)
+        .into_iter()
+        .flat_map(move |x| around(y).into_iter().flat_map(move |y| around(z).map(move |z| [x, y, z])))
+}
+
+/// The representative of a node's piece, with path halving.
+fn root(parent: &mut [usize], mut node: usize) -> usize {
+    while parent[node] != node {
+        parent[node] = parent[parent[node]];
+        node = parent[node];
+    }
+    node
+}

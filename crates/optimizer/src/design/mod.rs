@@ -1,0 +1,332 @@
+//! Design variables: `p` moves the nodes of the design surface, every node along its own unit direction.
+//!
+//! `Δx_b = D W p`: `D` holds the directions (one for all, or the surface's normals, see `normal`), `W` the weights of the
+//! variables at every node. A variable is a node of the surface, a point of a control grid (`grid`), or a node seen through
+//! a smoothing filter (`filter`); mirrored variables may be tied to one (`ties`), and the free rim held (`rim`). In every
+//! case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node that stays. So the heights
+//! keep the bounds of the variables, and the transpose, which takes derivatives at the nodes to those with respect to `p`,
+//! is exact.
+
+mod filter;
+mod grid;
+mod normal;
+mod rim;
+mod ties;
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::{Point, dot};
+use fluxmorph_geometry::{Mesh, NodeId};
+
+pub use grid::dominant_axis;
+
+/// Weights of the variables at one node, ascending by variable.
+type Row = Vec<(usize, f64)>;
+
+/// The way a positive variable moves the nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Direction {
+    /// All along one unit vector.
+    Along(Point),
+    /// Each along the surface's normal there, to the side that the triangles' orientation points to.
+    Normal,
+}
+
+/// Where the variables sit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Control {
+    /// On every node.
+    Nodes,
+    /// On a grid with these numbers of points, both at least 2, over the two coordinates across the direction; the first
+    /// coordinate is slow in the order of the variables.
+    Grid([usize; 2]),
+    /// On every node, and a node's height is the mean of the variables within this radius [m].
+    Filter(f64),
+}
+
+/// A plane normal to a coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mirror {
+    /// 0, 1 or 2.
+    pub axis: usize,
+    /// Its place on that axis [m].
+    pub at: f64,
+}
+
+impl Mirror {
+    /// The mirror image of a point [m].
+    pub fn image(&self, mut point: Point) -> Point {
+        point[self.axis] = 2.0 * self.at - point[self.axis];
+        point
+    }
+
+    /// The mirror image of a vector.
+    pub fn turned(&self, mut vector: Point) -> Point {
+        vector[self.axis] = -vector[self.axis];
+        vector
+    }
+}
+
+/// What the nodes on the design surface's free rim do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rim {
+    /// They move like all others.
+    Free,
+    /// They stay.
+    Fixed,
+}
+
+/// What a design surface is made from.
+#[derive(Clone, Debug)]
+pub struct DesignSetup {
+    /// The surface, each triangle once; oriented where the direction is normal.
+    pub triangles: Vec<[NodeId; 3]>,
+    /// Which way the nodes move.
+    pub direction: Direction,
+    /// Where the variables sit.
+    pub control: Control,
+    /// Planes over which variables are tied to their mirror images, at most one an axis.
+    pub mirrors: Vec<Mirror>,
+    /// What the free rim does.
+    pub rim: Rim,
+    /// Faces that a node on them must not leave when it moves along a normal.
+    pub kept: Vec<[NodeId; 3]>,
+    /// Faces where the model ends, though not the device: symmetry planes. The rim on them is not free.
+    pub cuts: Vec<[NodeId; 3]>,
+}
+
+impl DesignSetup {
+    /// Variables on every node, no plane anywhere.
+    pub fn new(triangles: &[[NodeId; 3]], direction: Direction) -> Self {
+        Self {
+            triangles: triangles.to_vec(),
+            direction,
+            control: Control::Nodes,
+            mirrors: Vec::new(),
+            rim: Rim::Free,
+            kept: Vec::new(),
+            cuts: Vec::new(),
+        }
+    }
+}
+
+/// Why a surface cannot carry the design variables asked for.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DesignError {
+    /// No triangle.
+    #[error("the design surface has no triangles")]
+    Empty,
+    /// The grid's rectangle has no area.
+    #[error("a control grid cannot be laid across the direction: the surface has no extent along {axis}")]
+    NoExtent {
+        /// The coordinate without extent.
+        axis: char,
+    },
+    /// A surface that bends back cannot be seen as a height over the grid.
+    #[error("a control grid cannot be laid over the surface: at {point:?} m it turns back towards {axis}")]
+    Folded {
+        /// The first such node [m].
+        point: Point,
+        /// The coordinate across which the grid lies.
+        axis: char,
+    },
+    /// A mirrored variable has no partner.
+    #[error(
+        "the {what} at {point:?} m has no partner in the mirror {axis} = {at} m: the nearest lies {distance:e} m from its \
+         mirror image"
+    )]
+    NoPartner {
+        /// Node or control point.
+        what: &'static str,
+        /// Its place [m].
+        point: Point,
+        /// Normal of the mirror.
+        axis: char,
+        /// Place of the mirror [m].
+        at: f64,
+        /// From the image to the nearest candidate [m].
+        distance: f64,
+    },
+    /// One direction for all that the mirror turns.
+    #[error(
+        "the direction {direction:?} leaves the mirror {axis} = {at} m: mirrored nodes would not move alike"
+    )]
+    Oblique {
+        /// The direction.
+        direction: Point,
+        /// Normal of the mirror.
+        axis: char,
+        /// Place of the mirror [m].
+        at: f64,
+    },
+    /// The filter couples too many nodes.
+    #[error("the filter radius {radius} m couples more than {limit} pairs of nodes")]
+    WideFilter {
+        /// [m]
+        radius: f64,
+        /// Largest number of pairs.
+        limit: usize,
+    },
+}
+
+/// The name of a coordinate.
+fn axis_name(axis: usize) -> char {
+    ['x', 'y', 'z'][axis]
+}
+
+/// The linear map from design variables to displacements of the design surface's nodes.
+#[derive(Clone, Debug)]
+pub struct DesignSurface {
+    nodes: Vec<NodeId>,
+    /// Unit vectors, or zero at a node that cannot move; shape `(n_nodes, 3)`.
+    directions: Vec<Point>,
+    rows: Vec<Row>,
+    points: Vec<Point>,
+}
+
+impl DesignSurface {
+    /// The design surface of a set-up, on the undeformed mesh.
+    ///
+    /// # Errors
+    /// [`DesignError`] says which part of the set-up the surface does not fit.
+    pub fn new(mesh: &Mesh, setup: &DesignSetup) -> Result<Self, DesignError> {
+        let nodes: Vec<NodeId> =
+            setup.triangles.iter().flatten().copied().collect::<BTreeSet<_>>().into_iter().collect();
+        if nodes.is_empty() {
+            return Err(DesignError::Empty);
+        }
+        let places: Vec<Point> = nodes.iter().map(|&n| mesh.point(n)).collect();
+        let mut directions = match setup.direction {
+            Direction::Along(direction) => vec![direction; nodes.len()],
+            Direction::Normal => normal::directions(mesh, &nodes, &setup.triangles, &setup.kept),
+        };
+        let on_nodes = !matches!(setup.control, Control::Grid(_));
+        // Where neither normals nor variables sit on nodes, a mirror need not map nodes onto nodes.
+        let mirrors_nodes = on_nodes || setup.direction == Direction::Normal;
+        let pairs = if mirrors_nodes { ties::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
+        match setup.direction {
+            Direction::Along(direction) => ties::check_direction(direction, &setup.mirrors)?,
+            Direction::Normal => ties::mirror_directions(&mut directions, &setup.mirrors, &pairs),
+        }
+        let rim = rim::Edges::new(&setup.triangles, &setup.cuts);
+
+        let (mut rows, mut points, ties) = match setup.control {
+            Control::Nodes => {
+                let rows = (0..nodes.len()).map(|i| vec![(i, 1.0)]).collect();
+                (rows, places, ties::groups(nodes.len(), &pairs))
+            }
+            Control::Filter(radius) => {
+                let mut surface = filter::Surface::new(mesh, &nodes, &setup.triangles, &directions);
+                surface.mirror_areas(&pairs);
+                let rows = surface.rows(radius, &rim.symmetry_planes(mesh, &setup.cuts))?;
+                (rows, places, ties::groups(nodes.len(), &pairs))
+            }
+            Control::Grid(counts) => {
+                let grid = grid::Grid::new(&places, &directions, counts)?;
+                let points = grid.points(&places);
+                let pairs = ties::pairs("control point", &grid.flat(&points), &setup.mirrors)?;
+                let groups = ties::groups(points.len(), &pairs);
+                (places.iter().map(|&x| grid.row(x)).collect(), points, groups)
+            }
+        };
+        ties.apply(&mut rows, &mut points);
+        for (i, row) in rows.iter_mut().enumerate() {
+            let held = setup.rim == Rim::Fixed && rim.is_free_rim(nodes[i]);
+            if held || directions[i] == [0.0; 3] {
+                row.clear();
+            }
+        }
+        let mut surface = Self { nodes, directions, rows, points };
+        if on_nodes {
+            surface.drop_idle();
+        }
+        Ok(surface)
+    }
+
+    /// Leaves out the variables that move nothing. Those of a grid stay: its order is the users'.
+    fn drop_idle(&mut self) {
+        let mut new_of: Vec<Option<usize>> = vec![None; self.points.len()];
+        for &(k, _) in self.rows.iter().flatten() {
+            new_of[k] = Some(0);
+        }
+        let mut points = Vec::new();
+        for (new, point) in new_of.iter_mut().zip(&self.points).filter(|(new, _)| new.is_some()) {
+            *new = Some(points.len());
+            points.push(*point);
+        }
+        for (k, _) in self.rows.iter_mut().flatten() {
+            *k = new_of[*k].expect("a variable in a row is kept");
+        }
+        self.points = points;
+    }
+
+    /// The same surface where the same nodes, in the same order, have other numbers.
+    ///
+    /// # Panics
+    /// If there is not one number per node.
+    pub fn renumbered(&self, nodes: Vec<NodeId>) -> Self {
+        assert_eq!(nodes.len(), self.nodes.len(), "one number per node");
+        Self { nodes, ..self.clone() }
+    }
+
+    /// Nodes of the surface, ascending.
+    pub fn nodes(&self) -> &[NodeId] {
+        &self.nodes
+    }
+
+    /// Unit direction in which a positive height moves each node, shape `(n_nodes, 3)`; zero where a node cannot move.
+    pub fn directions(&self) -> &[Point] {
+        &self.directions
+    }
+
+    /// Weights of the variables at every node: `(variable, weight)`, ascending by variable.
+    pub fn rows(&self) -> &[Vec<(usize, f64)>] {
+        &self.rows
+    }
+
+    /// Number of design variables.
+    pub fn variable_count(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Where the variables sit on the undeformed surface [m], shape `(n_variables, 3)`.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// How far every node moves along its direction [m] for the variables `p` [m].
+    pub fn heights(&self, p: &[f64]) -> Vec<f64> {
+        self.rows.iter().map(|row| row.iter().map(|&(k, weight)| weight * p[k]).sum()).collect()
+    }
+
+    /// `Δx_b = D W p` [m], one displacement per node.
+    pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
+        let heights = self.heights(p);
+        heights
+            .iter()
+            .zip(&self.directions)
+            .map(|(height, direction)| direction.map(|d| height * d))
+            .collect()
+    }
+
+    /// `Wᵀ g`: from derivatives with respect to the nodes' heights to those with respect to the variables.
+    pub fn height_gradient(&self, heights: &[f64]) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.variable_count()];
+        for (row, g) in self.rows.iter().zip(heights) {
+            for &(k, weight) in row {
+                gradient[k] += weight * g;
+            }
+        }
+        gradient
+    }
+
+    /// `Wᵀ Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
+    pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
+        let along: Vec<f64> = self.directions.iter().zip(nodal).map(|(d, g)| dot(*d, *g)).collect();
+        self.height_gradient(&along)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,100 @@
+//! Directions along the surface's normal: area-weighted at every node, and within the planes that the node must keep.
+//!
+//! The sum of the area vectors of the triangles around a node is the gradient of the enclosed volume with respect to the
+//! node (times three), so it is the way that adds most volume. At a node on a symmetry plane, or on a face along which the
+//! mesh slides, the part that leaves the plane is taken away and the rest is made a unit vector again: on a symmetry plane
+//! this is the normal of the whole surface, of which the mesh holds one half. A face keeps a node whatever the shape of
+//! the whole surface: at an edge of two planes the node moves along it, in a corner it stays.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::{Mesh, NodeId};
+
+/// Normals closer to the span of others than this sine are in it: planes in files are flat to 6 or more digits, and
+/// different planes of a device meet at angles far above a twentieth of a degree.
+const SAME_PLANE: f64 = 1e-3;
+
+/// Shortest mean normal, as a share of the area around the node, that still gives a direction. Below it, the surface is a
+/// sheet folded back on itself or all but lies in the plane that the node keeps; then the node stays.
+const SHORTEST: f64 = 0.05;
+
+/// Largest component of a unit normal across its axis that is rounding: coordinates in files carry 6 or more digits.
+const FLAT: f64 = 1e-6;
+
+/// Unit directions of the nodes (ascending), shape `(n_nodes, 3)`; zero where there is none.
+pub(super) fn directions(
+    mesh: &Mesh,
+    nodes: &[NodeId],
+    triangles: &[[NodeId; 3]],
+    kept: &[[NodeId; 3]],
+) -> Vec<Point> {
+    let vector = |triangle: &[NodeId; 3]| area_vector(triangle.map(|n| mesh.point(n)));
+    let row = |n: &NodeId| nodes.binary_search(n).ok();
+    let mut sums = vec![[0.0; 3]; nodes.len()];
+    let mut areas = vec![0.0; nodes.len()];
+    for triangle in triangles {
+        let area = vector(triangle);
+        for i in triangle.iter().filter_map(row) {
+            for (sum, a) in sums[i].iter_mut().zip(area) {
+                *sum += a;
+            }
+            areas[i] += norm(area);
+        }
+    }
+    let own: BTreeSet<[NodeId; 3]> = triangles.iter().map(sorted).collect();
+    let mut planes = vec![Planes::default(); nodes.len()];
+    for triangle in kept.iter().filter(|t| !own.contains(&sorted(t))) {
+        let area = vector(triangle);
+        for i in triangle.iter().filter_map(row) {
+            planes[i].add(area.map(|a| a / norm(area)));
+        }
+    }
+    sums.iter()
+        .zip(&areas)
+        .zip(&planes)
+        .map(|((&sum, &area), planes)| {
+            let within = planes.project(sum);
+            let length = norm(within);
+            if length > SHORTEST * area { within.map(|c| c / length) } else { [0.0; 3] }
+        })
+        .collect()
+}
+
+fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
+    let mut nodes = *triangle;
+    nodes.sort_unstable();
+    nodes
+}
+
+/// Orthonormal span of the normals of the planes through a node.
+#[derive(Clone, Default)]
+struct Planes(Vec<Point>);
+
+impl Planes {
+    fn add(&mut self, normal: Point) {
+        // A plane of constant coordinate has exactly that normal, whatever the rounding of its triangles.
+        let axis = super::dominant_axis(normal);
+        let flat = (0..3).all(|d| d == axis || normal[d].abs() < FLAT);
+        let normal = if flat { std::array::from_fn(|d| f64::from(d == axis)) } else { normal };
+        let rest = self.project(normal);
+        let length = norm(rest);
+        if length > SAME_PLANE {
+            self.0.push(rest.map(|c| c / length));
+        }
+    }
+
+    /// The part of a vector within all the planes.
+    fn project(&self, mut vector: Point) -> Point {
+        if self.0.len() == 3 {
+            return [0.0; 3];
+        }
+        for normal in &self.0 {
+            let across = dot(vector, *normal);
+            for (c, n) in vector.iter_mut().zip(normal) {
+                *c -= across * n;
+            }
+        }
+        vector
+    }
+}

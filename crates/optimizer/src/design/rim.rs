@@ -1,0 +1,65 @@
+//! The rim of the design surface: which of its edges are free, and which lie on a plane where only the model ends.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use fluxmorph_geometry::tet4::{area_vector, centroid, norm};
+use fluxmorph_geometry::{Mesh, NodeId};
+
+use super::{Mirror, dominant_axis};
+
+/// Largest component of a unit normal across its axis for a symmetry plane: coordinates in files carry 6 or more digits.
+const PLANE_TOLERANCE: f64 = 1e-6;
+
+type Edge = [NodeId; 2];
+
+/// Edges of the design surface that belong to one of its triangles only.
+pub(super) struct Edges {
+    /// Nodes of those that lie on no cut.
+    free: BTreeSet<NodeId>,
+    /// Those that lie on a cut.
+    cut: BTreeSet<Edge>,
+}
+
+impl Edges {
+    /// The rim of `triangles`; `cuts` are the faces where the model ends.
+    pub(super) fn new(triangles: &[[NodeId; 3]], cuts: &[[NodeId; 3]]) -> Self {
+        let mut count: BTreeMap<Edge, usize> = BTreeMap::new();
+        for edge in triangles.iter().flat_map(edges) {
+            *count.entry(edge).or_default() += 1;
+        }
+        let border: BTreeSet<Edge> =
+            count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect();
+        let cut: BTreeSet<Edge> = cuts.iter().flat_map(edges).filter(|edge| border.contains(edge)).collect();
+        let free = border.difference(&cut).flatten().copied().collect();
+        Self { free, cut }
+    }
+
+    /// Whether a node lies on the rim, on an edge that is not on a symmetry plane.
+    pub(super) fn is_free_rim(&self, node: NodeId) -> bool {
+        self.free.contains(&node)
+    }
+
+    /// The planes of constant coordinate that cut the surface, each once.
+    pub(super) fn symmetry_planes(&self, mesh: &Mesh, cuts: &[[NodeId; 3]]) -> Vec<Mirror> {
+        let [lower, upper] = mesh.bounding_box();
+        let mut planes: Vec<Mirror> = Vec::new();
+        for triangle in cuts.iter().filter(|t| edges(t).iter().any(|edge| self.cut.contains(edge))) {
+            let vertices = triangle.map(|n| mesh.point(n));
+            let area = area_vector(vertices);
+            let axis = dominant_axis(area);
+            if (0..3).any(|d| d != axis && area[d].abs() > PLANE_TOLERANCE * norm(area)) {
+                continue;
+            }
+            let (at, tolerance) = (centroid(vertices)[axis], PLANE_TOLERANCE * (upper[axis] - lower[axis]));
+            if !planes.iter().any(|plane| plane.axis == axis && (plane.at - at).abs() <= tolerance) {
+                planes.push(Mirror { axis, at });
+            }
+        }
+        planes
+    }
+}
+
+fn edges(triangle: &[NodeId; 3]) -> [Edge; 3] {
+    let [a, b, c] = *triangle;
+    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
+}

@@ -1,0 +1,128 @@
+//! Symmetry pairs: variables that are mirror images of each other become one.
+//!
+//! Mirrors are normal to coordinate axes, one an axis at most; so they commute, and the images of a point are at most
+//! eight. A point on a mirror is its own partner.
+
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+
+use super::{DesignError, Mirror, Row, axis_name};
+
+/// Largest distance of a partner from the mirror image, as a share of the points' extent: coordinates in files carry 6 or
+/// more digits, and nodes lie much further apart.
+const TOLERANCE: f64 = 1e-6;
+
+/// Largest component of a unit direction across a mirror: the rounding of the digits of a configuration.
+const OBLIQUE: f64 = 1e-9;
+
+/// For every mirror the partner of every point.
+///
+/// # Errors
+/// [`DesignError::NoPartner`] for the first point without one.
+pub(super) fn pairs(
+    what: &'static str,
+    points: &[Point],
+    mirrors: &[Mirror],
+) -> Result<Vec<Vec<usize>>, DesignError> {
+    let extent = (0..3)
+        .map(|d| {
+            let (low, high) = points
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[d]), high.max(x[d])));
+            high - low
+        })
+        .fold(0.0, f64::max);
+    let tolerance = TOLERANCE * extent;
+    // Sorted along the longest way through the points a partner lies in a narrow window.
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]).then(a.cmp(&b)));
+    let nearest = |image: Point, among: &[usize]| {
+        let distance = |&i: &usize| (norm(sub(points[i], image)), i);
+        among.iter().map(distance).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+    };
+    let partner = |mirror: &Mirror, point: Point| {
+        let image = mirror.image(point);
+        let first = order.partition_point(|&i| points[i][0] < image[0] - tolerance);
+        let last = order.partition_point(|&i| points[i][0] <= image[0] + tolerance);
+        match nearest(image, &order[first..last]) {
+            Some((distance, i)) if distance <= tolerance => Ok(i),
+            _ => {
+                let distance = nearest(image, &order).map_or(f64::INFINITY, |(distance, _)| distance);
+                let (axis, at) = (axis_name(mirror.axis), mirror.at);
+                Err(DesignError::NoPartner { what, point, axis, at, distance })
+            }
+        }
+    };
+    mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
+}
+
+/// Whether one direction for all nodes lies in every mirror.
+///
+/// # Errors
+/// [`DesignError::Oblique`] for the first that it leaves.
+pub(super) fn check_direction(direction: Point, mirrors: &[Mirror]) -> Result<(), DesignError> {
+    match mirrors.iter().find(|mirror| direction[mirror.axis].abs() > OBLIQUE) {
+        None => Ok(()),
+        Some(mirror) => Err(DesignError::Oblique { direction, axis: axis_name(mirror.axis), at: mirror.at }),
+    }
+}
+
+/// Makes directions mirror images of each other: the mean of a node's own and its partner's image. They differ where the
+/// triangles are not laid symmetrically.
+pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror], pairs: &[Vec<usize>]) {
+    for (mirror, partner) in mirrors.iter().zip(pairs) {
+        *directions = directions
+            .iter()
+            .zip(partner)
+            .map(|(&own, &other)| {
+                let image = mirror.turned(directions[other]);
+                let sum: Point = std::array::from_fn(|d| own[d] + image[d]);
+                let length = norm(sum);
+                // Unit vectors that all but cancel, or a node that cannot move: neither has a symmetric direction.
+                if length > 0.1 { sum.map(|c| c / length) } else { [0.0; 3] }
+            })
+            .collect();
+    }
+}
+
+/// Which old variable goes into which new one.
+pub(super) struct Groups {
+    new_of: Vec<usize>,
+    /// The first old variable of each new one.
+    first: Vec<usize>,
+}
+
+/// The groups that partners make of `count` variables, in the order of their first members.
+pub(super) fn groups(count: usize, pairs: &[Vec<usize>]) -> Groups {
+    let mut least: Vec<usize> = (0..count).collect();
+    // A mirror each: after all of them, the least of the up to eight images has reached every one.
+    for partner in pairs {
+        least = (0..count).map(|i| least[i].min(least[partner[i]])).collect();
+    }
+    let first: Vec<usize> = (0..count).filter(|&i| least[i] == i).collect();
+    let new_of = least
+        .iter()
+        .map(|i| first.binary_search(i).expect("the least of a group is its own least"))
+        .collect();
+    Groups { new_of, first }
+}
+
+impl Groups {
+    /// Renumbers the variables in the rows, adding up weights, and leaves each group the point of its first member.
+    pub(super) fn apply(&self, rows: &mut [Row], points: &mut Vec<Point>) {
+        if self.first.len() == self.new_of.len() {
+            return;
+        }
+        for row in rows {
+            let mut tied: Row = row.iter().map(|&(k, weight)| (self.new_of[k], weight)).collect();
+            tied.sort_by_key(|&(k, _)| k);
+            row.clear();
+            for (k, weight) in tied {
+                match row.last_mut() {
+                    Some((last, sum)) if *last == k => *sum += weight,
+                    _ => row.push((k, weight)),
+                }
+            }
+        }
+        *points = self.first.iter().map(|&i| points[i]).collect();
+    }
+}

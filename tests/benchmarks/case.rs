@@ -1,0 +1,63 @@
+//! One run of a shipped configuration, and the numbers that are compared.
+
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::support::repository;
+
+/// Which mesh a configuration is solved on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MeshSize {
+    /// Cells of 1/0.6 the shipped size: a second or two.
+    Coarse,
+    /// As shipped.
+    Shipped,
+}
+
+/// What `fluxmorph solve` says of a shipped configuration, as in `result.json`.
+pub(crate) fn solved(config: &str, size: MeshSize) -> Value {
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
+    command.arg("solve").arg(repository("configs").join(config));
+    command.arg("--out").arg(folder.path().join("run")).args(["--json", "--quiet"]).stdin(Stdio::null());
+    if size == MeshSize::Coarse {
+        command.args(["--set", "mesh.boxes.refinement=0.6"]);
+    }
+    let output = command.output().expect("the binary starts");
+    assert!(output.status.success(), "{config}:\n{}", String::from_utf8_lossy(&output.stderr));
+    let result: Value = serde_json::from_slice(&output.stdout).expect("one JSON value");
+    println!(
+        "{config} ({size:?}): {} tetrahedra, {} unknowns, {:.2} GB",
+        result["mesh"]["tets"],
+        result["mesh"]["unknowns"],
+        result["peak_memory_bytes"].as_f64().unwrap_or(f64::NAN) / 1e9,
+    );
+    result
+}
+
+/// A file of `tests/reference`.
+pub(crate) fn reference(name: &str) -> Value {
+    let text = std::fs::read_to_string(repository("tests/reference").join(name)).expect("it is there");
+    serde_json::from_str(&text).expect("it is JSON")
+}
+
+/// A list of numbers.
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
+    let list = value.as_array().expect("a list");
+    list.iter().map(|number| number.as_f64().expect("a number")).collect()
+}
+
+/// One component of a list of vectors.
+pub(crate) fn component(vectors: &Value, axis: usize) -> Vec<f64> {
+    let list = vectors.as_array().expect("a list of vectors");
+    list.iter().map(|vector| vector[axis].as_f64().expect("a number")).collect()
+}
+
+/// Root mean square of the differences, over the largest measured magnitude.
+pub(crate) fn rms_of_peak(values: &[f64], measured: &[f64]) -> f64 {
+    assert_eq!(values.len(), measured.len());
+    let squares: f64 = values.iter().zip(measured).map(|(a, b)| (a - b).powi(2)).sum();
+    let peak = measured.iter().fold(0.0, |peak: f64, m| peak.max(m.abs()));
+    (squares / values.len() as f64).sqrt() / peak
+}
