@@ -49,7 +49,7 @@ const FULL: [&str; 5] = [
     ampere_turns = 1
     terminals = ["in", "out"]
     [boundaries]
-    uniform_field = { surfaces = ["outer"], b = [0, 0, 1] }
+    uniform_field = { surfaces = ["outer"], b = [0, 0, 1], center = [0, 0, 0] }
     [objective]
     kind = "uniformity"
     region = "observation"

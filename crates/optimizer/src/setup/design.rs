@@ -34,7 +34,9 @@ pub(super) fn surface(
         }
     }
     let mut kept = Vec::new();
-    let conditioned = config.boundaries.flux_parallel.iter().chain(&config.boundaries.flux_normal);
+    let applied = config.boundaries.uniform_field.iter().flat_map(|field| &field.surfaces);
+    let conditioned =
+        config.boundaries.flux_parallel.iter().chain(&config.boundaries.flux_normal).chain(applied);
     let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
     for name in conditioned.chain(slide).collect::<BTreeSet<_>>() {
         kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&sorted(*t))));

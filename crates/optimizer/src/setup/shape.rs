@@ -67,6 +67,7 @@ pub(super) fn shape(
     let setup = remesh_setup(inputs, &surface, warnings)?;
     overlap_faults(inputs, &setup, model, observed)?;
     let map = ElasticMap::new(mesh, setup)?;
+    source.check(held_node_fault(inputs, &surface, &map, model).into_iter().collect())?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
@@ -265,6 +266,28 @@ fn overlap_faults(
         );
     }
     Ok(source.check(faults)?)
+}
+
+/// Refuses a motion of nodes whose condition belongs to where they lie: on curved or oblique surfaces, and where A is
+/// prescribed.
+fn held_node_fault(
+    inputs: &Inputs<'_>,
+    surface: &DesignSurface,
+    map: &ElasticMap,
+    model: &FieldModel,
+) -> Option<Fault> {
+    let moves = |node: NodeId| {
+        surface.nodes().binary_search(&node).is_ok()
+            || (0..3).any(|component| map.is_unknown(node, component))
+    };
+    let space = model.space();
+    let node = model.unknowns().held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves))?;
+    let place = millimetres(space.position(inputs.mesh, node));
+    let message = format!(
+        "a surface with a condition that is curved, oblique or has an applied field would move at {place}"
+    );
+    let fault = inputs.source.fault("remesh", message);
+    Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"))
 }
 
 /// Tries the two extreme designs, all variables at their lower and at their upper bound, before anything is solved.
