@@ -20,6 +20,10 @@ test:
 test-long:
     cargo test --release --workspace -- --ignored
 
+# Computes the table of closed forms and benchmarks in docs/verification.md
+verify:
+    cargo test --release --test verification -- --ignored --nocapture write_the_table
+
 # The fields of fresh runs read through VTK; installs pyvista with pip below target/
 test-pyvista:
     cargo test --release --test acceptance -- --ignored --nocapture pyvista

@@ -10,7 +10,6 @@ mod manufactured;
 mod meshes;
 mod orders;
 mod plain_matrix;
-mod plate;
 mod quadrature;
 mod references;
 mod slab;

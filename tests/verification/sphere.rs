@@ -16,6 +16,7 @@ use fluxmorph_solver::{
 };
 use serde_json::Value;
 
+use crate::orders::Study;
 use crate::references::{named, number, reference};
 use crate::rows::{Case, Row, assert_rows};
 
@@ -46,50 +47,79 @@ fn setup(mesh: &Mesh, frequency: f64, material: Material, order: Order) -> Field
     }
 }
 
+/// A solid sphere of the reference file on a mesh.
+struct Solid {
+    data: Value,
+    radius: f64,
+    mesh: Mesh,
+    model: FieldModel,
+}
+
+impl Solid {
+    fn new(name: &str, order: Order, refinement: f64) -> Self {
+        let file = reference("sphere.json");
+        let data = named(&file["spheres"], name).clone();
+        let radius = number(&data, "radius_m");
+        let material = Material {
+            relative_permeability: number(&data, "relative_permeability"),
+            conductivity: number(&data, "conductivity_S_per_m"),
+        };
+        let frequency = number(&file, "frequency_Hz");
+        let skin_depth = material.skin_depth(std::f64::consts::TAU * frequency).expect("it conducts");
+        let mesh = sphere(&parameters(radius, skin_depth, refinement)).expect("a sound sphere");
+        let setup = setup(&mesh, frequency, material, order);
+        let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+        Self { data, radius, mesh, model }
+    }
+
+    fn loss(&self) -> Functional {
+        Functional::loss(&self.model, "sphere").expect("the sphere conducts")
+    }
+
+    /// `|loss − exact| / exact`, with the exact loss inside the finite outer sphere: there the dipole is mirrored, the
+    /// field is `1/(1 + 2 D/R_o³)` of that in open space.
+    fn loss_error(&self) -> f64 {
+        let (solution, _) = self.model.solve(&self.mesh).expect("it converges");
+        let value = self.loss().evaluate(&self.model, &self.mesh, &solution).expect("a finite loss").value;
+        let dipole = complex(&self.data["dipole_T_m3"]);
+        let scale = (1.0 / (1.0 + 2.0 * dipole / (BOX * self.radius).powi(3))).norm_sqr();
+        (8.0 * value / (scale * number(&self.data, "loss_W")) - 1.0).abs()
+    }
+}
+
 /// Rows of one solid sphere on a mesh: centre, outside on axis and equator, loss, and the derivative of the loss by the
 /// radius.
 pub(crate) fn solid(name: &str, order: Order, refinement: f64, bars: [f64; 3]) -> Vec<Row> {
-    let file = reference("sphere.json");
-    let sphere_data = named(&file["spheres"], name);
-    let radius = number(sphere_data, "radius_m");
-    let material = Material {
-        relative_permeability: number(sphere_data, "relative_permeability"),
-        conductivity: number(sphere_data, "conductivity_S_per_m"),
-    };
-    let frequency = number(&file, "frequency_Hz");
-    let skin_depth = material.skin_depth(std::f64::consts::TAU * frequency).expect("it conducts");
-    let mesh = sphere(&parameters(radius, skin_depth, refinement)).expect("a sound sphere");
-    let model = FieldModel::new(&mesh, setup(&mesh, frequency, material, order)).expect("a sound problem");
-    let (solution, system) = model.solve(&mesh).expect("it converges");
-    let case = Case::new(format!("sphere, {name}, {order:?}"), &mesh, &model);
-    let at =
-        |point: Point| probe(&solution, &model, &mesh, name, &[point]).expect("a point of the mesh")[0][2];
-    let dipole = complex(&sphere_data["dipole_T_m3"]);
+    let sphere = Solid::new(name, order, refinement);
+    let Solid { data, radius, mesh, model } = &sphere;
+    let (solution, system) = model.solve(mesh).expect("it converges");
+    let case = Case::new(format!("sphere, {name}, {order:?}"), mesh, model);
+    let at = |point: Point| probe(&solution, model, mesh, name, &[point]).expect("a point of the mesh")[0][2];
+    let dipole = complex(&data["dipole_T_m3"]);
     let far = 1.5 * radius;
     let [field_bar, loss_bar, derivative_bar] = bars;
-    let loss = Functional::loss(&model, "sphere").expect("the sphere conducts");
-    let value = loss.evaluate(&model, &mesh, &solution).expect("a finite loss");
+    let value = sphere.loss().evaluate(model, mesh, &solution).expect("a finite loss");
     let lambda = adjoint::solve(&system, &value.derivative).expect("it converges");
     let moving: Vec<ElementId> = mesh.topology().elements().collect();
-    let implicit = adjoint::node_gradient(&model, &mesh, &solution, &lambda, &moving);
+    let implicit = adjoint::node_gradient(model, mesh, &solution, &lambda, &moving);
     let explicit = value.explicit.expect("a loss of a region that moves");
     let derivative: f64 = mesh
         .topology()
         .nodes()
         .map(|n| {
-            let velocity = growth(mesh.point(n), radius);
+            let velocity = growth(mesh.point(n), *radius);
             (0..3).map(|d| velocity[d] * (implicit[n.index()][d] + explicit[n.index()][d])).sum::<f64>()
         })
         .sum();
     vec![
-        case.row("B at the centre [T]", at([0.0; 3]), complex(&sphere_data["centre_T"]), field_bar),
+        case.row("B at the centre [T]", at([0.0; 3]), complex(&data["centre_T"]), field_bar),
         case.row("B outside, axis [T]", at([0.0, 0.0, far]), 1.0 + 2.0 * dipole / far.powi(3), field_bar),
         case.row("B outside, equator [T]", at([far, 0.0, 0.0]), 1.0 - dipole / far.powi(3), field_bar),
-        case.row("loss [W]", (8.0 * value.value).into(), number(sphere_data, "loss_W").into(), loss_bar),
+        case.row("loss [W]", (8.0 * value.value).into(), number(data, "loss_W").into(), loss_bar),
         case.row(
             "dP/dR [W/m]",
             (8.0 * derivative).into(),
-            number(sphere_data, "loss_per_radius_W_per_m").into(),
+            number(data, "loss_per_radius_W_per_m").into(),
             derivative_bar,
         ),
     ]
@@ -225,19 +255,68 @@ pub(crate) fn magnet(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
 
 /// The rows of the table.
 pub(crate) fn rows() -> Vec<Row> {
-    let mut rows = Vec::new();
-    rows.extend(solid("aluminium-like, 50 mm", Order::Linear, 2.0, [0.02, 0.03, 0.03]));
-    rows.extend(solid("aluminium-like, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]));
-    rows.extend(solid("permeable, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]));
+    let mut rows = quick_rows();
     rows.extend(solid("steel, 10 mm", Order::Quadratic, 1.0, [0.05, 0.05, 0.03]));
     rows.extend(impedance(Order::Linear, 2.0, [0.02, 0.05]));
     rows.extend(hollow(Order::Linear, 2.0, 0.02));
+    rows
+}
+
+fn quick_rows() -> Vec<Row> {
+    let mut rows = solid("aluminium-like, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]);
+    rows.extend(solid("permeable, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]));
     rows.extend(hollow(Order::Quadratic, 1.0, 0.02));
-    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 0.03));
+    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 0.02));
     rows
 }
 
 #[test]
-fn explore() {
-    println!("{}", crate::rows::table(&rows()));
+fn fields_losses_and_their_derivative_by_the_radius_are_the_closed_forms() {
+    assert_rows(&quick_rows());
+}
+
+#[test]
+#[ignore = "minutes: just test-long"]
+fn thin_skinned_and_finer_spheres_are_the_closed_forms() {
+    assert_rows(&rows());
+}
+
+/// Facets inside a sphere leave out a volume of second order, so second order is expected of linear elements and of
+/// quadratic ones on straight sides alike.
+fn assert_convergence(name: &str, order: Order, refinements: [f64; 3], least: f64) {
+    let mut loss = Study::new(format!("sphere, {name}, {order:?}: loss"));
+    for refinement in refinements {
+        loss.add(1.0 / refinement, Solid::new(name, order, refinement).loss_error());
+    }
+    loss.assert_order(least);
+}
+
+/// Coarse meshes, whose order is still on its way to two.
+#[test]
+fn the_loss_of_a_sphere_converges() {
+    assert_convergence("aluminium-like, 50 mm", Order::Linear, [0.5, 1.0, 2.0], 1.6);
+    assert_convergence("permeable, 50 mm", Order::Linear, [0.5, 1.0, 2.0], 1.6);
+    assert_convergence("aluminium-like, 50 mm", Order::Quadratic, [1.0 / 3.0, 0.5, 1.0], 1.8);
+    assert_convergence("permeable, 50 mm", Order::Quadratic, [1.0 / 3.0, 0.5, 1.0], 1.8);
+}
+
+#[test]
+#[ignore = "minutes: just test-long"]
+fn the_loss_of_a_sphere_converges_with_second_order_on_fine_meshes() {
+    assert_convergence("aluminium-like, 50 mm", Order::Linear, [1.0, 2.0, 3.0], 1.8);
+    assert_convergence("permeable, 50 mm", Order::Linear, [1.0, 2.0, 3.0], 1.8);
+}
+
+/// On the same mesh, quadratic elements are at least four times as exact.
+#[test]
+fn quadratic_elements_are_several_times_as_exact_on_the_same_sphere() {
+    for name in ["aluminium-like, 50 mm", "permeable, 50 mm"] {
+        let of = |order| solid(name, order, 1.0, [f64::INFINITY; 3]);
+        let (linear, quadratic) = (of(Order::Linear), of(Order::Quadratic));
+        for row in [0, 3] {
+            let gain = linear[row].error() / quadratic[row].error();
+            println!("{name}: {} times", gain);
+            assert!(gain > 4.0, "{gain}: {linear:?} {quadratic:?}");
+        }
+    }
 }

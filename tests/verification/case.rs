@@ -4,6 +4,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+use crate::rows::Case;
 use crate::support::repository;
 
 /// Which mesh a configuration is solved on.
@@ -36,10 +37,10 @@ pub(crate) fn solved(config: &str, size: MeshSize) -> Value {
     result
 }
 
-/// A file of `tests/reference`.
-pub(crate) fn reference(name: &str) -> Value {
-    let text = std::fs::read_to_string(repository("tests/reference").join(name)).expect("it is there");
-    serde_json::from_str(&text).expect("it is JSON")
+/// The mesh of a result, under a name.
+pub(crate) fn case(name: String, result: &Value) -> Case {
+    let count = |key: &str| result["mesh"][key].as_u64().expect("a count") as usize;
+    Case { name, tets: count("tets"), unknowns: count("unknowns") }
 }
 
 /// A list of numbers.
