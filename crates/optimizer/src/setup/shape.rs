@@ -341,7 +341,10 @@ fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f6
                             ),
                         )
                         .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * fraction * 1e3))
-                        .help("narrow the bound, enlarge the remesh region, or take another remesh.stiffness"),
+                        .help(
+                            "narrow the bound, enlarge the remesh region, take another remesh.stiffness, or let faces between \
+                             regions beside the design follow it: they are held unless remesh.slide or remesh.free lists them",
+                        ),
                 );
             }
             Err(other) => return Err(other.into()),
