@@ -12,6 +12,7 @@ use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, m
 use support::{repository, setup};
 
 mod functionals;
+mod sources;
 
 /// Small meshes: the exactness of a discrete gradient does not depend on the mesh.
 const MESHED: [&str; 5] = [

@@ -34,6 +34,8 @@ pub struct Shape {
     pub surface: DesignSurface,
     /// Surface to mesh (Eq. 3), factored on the reference mesh.
     pub map: ElasticMap,
+    /// Elements of the elastic body, and those beside it that share a node that may move; ascending.
+    pub moving: Vec<ElementId>,
     /// Thickness of the designed body, where it has one.
     pub thickness: Option<Thickness>,
     /// Lower bound of every variable [m].
@@ -153,7 +155,7 @@ impl Problem {
 
     /// Elements of which a node may move, ascending; empty without a shape.
     pub fn moving_elements(&self) -> &[ElementId] {
-        self.shape.as_ref().map_or(&[], |shape| shape.map.elements())
+        self.shape.as_ref().map_or(&[], |shape| &shape.moving)
     }
 
     /// Bytes that an evaluation needs, about: matrices, factors, and the arrays over nodes and elements.
@@ -364,7 +366,7 @@ impl Gathered {
         let lambda = adjoint::solve(system, &right_side)?;
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
-        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.map.elements());
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, &shape.moving);
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
         Ok(())

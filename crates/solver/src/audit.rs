@@ -8,6 +8,7 @@ use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, RegionId};
 
 use crate::material::Material;
+use crate::space::Order;
 
 /// Share of the surface on which the first layer may be thicker than a skin depth before the audit warns: edges and
 /// corners of graded meshes.
@@ -38,7 +39,7 @@ impl SkinAudit {
     pub fn volume_warning(&self) -> Option<String> {
         (self.coarse_share > TOLERATED_SHARE).then(|| {
             format!(
-                "region `{}`: the first element layer is thicker than the skin depth ({:.3} mm) on {:.0} % of the \
+                "region `{}`: the first element layer is too thick for the skin depth ({:.3} mm) on {:.0} % of the \
                  surface (median {:.2} elements per skin depth): the field behind it will be wrong. Refine the skin, \
                  or use model = \"impedance\" (the region is {:.1} skin depths thick on average)",
                 self.region,
@@ -66,7 +67,15 @@ impl SkinAudit {
 }
 
 /// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced or the region is empty.
-pub fn skin_audit(mesh: &Mesh, region: RegionId, material: &Material, frequency: f64) -> Option<SkinAudit> {
+///
+/// A quadratic element counts as two: it follows the decay over twice the thickness.
+pub fn skin_audit(
+    mesh: &Mesh,
+    region: RegionId,
+    material: &Material,
+    frequency: f64,
+    order: Order,
+) -> Option<SkinAudit> {
     let skin_depth = material.skin_depth(2.0 * std::f64::consts::PI * frequency)?;
     let topology = mesh.topology();
     let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
@@ -83,7 +92,7 @@ pub fn skin_audit(mesh: &Mesh, region: RegionId, material: &Material, frequency:
         };
         let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
         let height = 3.0 * volume(mesh.vertices(element)) / area;
-        layers.push((skin_depth / height, area));
+        layers.push((order.degree() as f64 * skin_depth / height, area));
     }
     let surface: f64 = layers.iter().map(|l| l.1).sum();
     layers.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -95,10 +95,6 @@ fn field_model(
         let applied = UniformField { flux_density: field.b, centre: field.center };
         boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
     }
-    let order = match config.analysis.order {
-        config::ElementOrder::Linear => Order::Linear,
-        config::ElementOrder::Quadratic => Order::Quadratic,
-    };
     let linear_solver = LinearSolverSettings {
         tolerance: config.analysis.linear_solver.tolerance,
         ..LinearSolverSettings::default()
@@ -106,7 +102,7 @@ fn field_model(
     let setup = FieldModelSetup {
         frequency,
         penalty: config.analysis.penalty,
-        order,
+        order: order(config),
         materials,
         remanence: remanences(config, mesh.topology()),
         impedance_surfaces,
@@ -115,6 +111,14 @@ fn field_model(
         linear_solver,
     };
     Ok(FieldModel::new(mesh, setup)?)
+}
+
+/// The order of the elements.
+pub(super) fn order(config: &Config) -> Order {
+    match config.analysis.order {
+        config::ElementOrder::Linear => Order::Linear,
+        config::ElementOrder::Quadratic => Order::Quadratic,
+    }
 }
 
 /// A coil of the configuration on its mesh.

@@ -129,7 +129,7 @@ fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
         let id = mesh.topology().region(name).ok()?;
         let material = material(config, name);
         let at = |&frequency: &f64| {
-            let audit = skin_audit(mesh, id, &material, frequency)?;
+            let audit = skin_audit(mesh, id, &material, frequency, field::order(config))?;
             Some(Audited { audit, model: region.model })
         };
         Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())

@@ -65,8 +65,9 @@ pub(super) fn shape(
         ));
     }
     let setup = remesh_setup(inputs, &surface, warnings)?;
-    overlap_faults(inputs, &setup, model, observed)?;
     let map = ElasticMap::new(mesh, setup)?;
+    let moving = moving_elements(mesh, &surface, &map);
+    overlap_faults(inputs, &moving, model, observed)?;
     source.check(held_node_fault(inputs, &surface, &map, model).into_iter().collect())?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
@@ -74,6 +75,7 @@ pub(super) fn shape(
     let shape = Shape {
         surface,
         map,
+        moving,
         thickness,
         lower: vec![design.lower; n],
         upper: vec![design.upper; n],
@@ -235,18 +237,33 @@ fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionI
     config.regions.contains_key(&topology.region_names()[region.index()]).then_some(region)
 }
 
+/// Whether a node is a design node or has a component that the elastic map decides.
+fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
+    surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
+}
+
+/// Elements of the elastic body and those that share a node that may move: faces at which the body ends move too where
+/// they are listed as sliding or free.
+fn moving_elements(mesh: &Mesh, surface: &DesignSurface, map: &ElasticMap) -> Vec<ElementId> {
+    let topology = mesh.topology();
+    let mut elements: BTreeSet<ElementId> = map.elements().iter().copied().collect();
+    for node in topology.nodes().filter(|&n| may_move(surface, map, n)) {
+        elements.extend(topology.elements_around(node));
+    }
+    elements.into_iter().collect()
+}
+
 /// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
 fn overlap_faults(
     inputs: &Inputs<'_>,
-    setup: &RemeshSetup,
+    moving: &[ElementId],
     model: &FieldModel,
     observed: &[(String, Vec<ElementId>)],
 ) -> Result<(), Error> {
     let Inputs { source, mesh, .. } = *inputs;
-    let moving: BTreeSet<ElementId> =
-        setup.subregions.iter().flat_map(|s| s.elements.iter().copied()).collect();
+    let moves = |e: &ElementId| moving.binary_search(e).is_ok();
     let mut faults = Vec::new();
-    for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(|e| moving.contains(e))) {
+    for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
         faults.push(
             source
                 .fault(path, "the observation region lies inside the remesh region and would move")
@@ -254,7 +271,7 @@ fn overlap_faults(
                 .help("take the region out of remesh.region, or shrink remesh.box"),
         );
     }
-    if let Some(e) = model.source_elements().find(|e| moving.contains(e)) {
+    if let Some(e) = model.source_elements().find(moves) {
         let place = centroid(mesh.vertices(e));
         faults.push(
             source
@@ -276,10 +293,7 @@ fn held_node_fault(
     map: &ElasticMap,
     model: &FieldModel,
 ) -> Option<Fault> {
-    let moves = |node: NodeId| {
-        surface.nodes().binary_search(&node).is_ok()
-            || (0..3).any(|component| map.is_unknown(node, component))
-    };
+    let moves = |node: NodeId| may_move(surface, map, node);
     let space = model.space();
     let node = model.unknowns().held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves))?;
     let place = millimetres(space.position(inputs.mesh, node));
@@ -310,7 +324,7 @@ fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f6
         let displacement = shape.map.displacement(&shape.surface.displacement(bound));
         match check_step(mesh, &displacement) {
             Ok(moved) => {
-                let quality = QualityReport::of_elements(&moved, shape.map.elements());
+                let quality = QualityReport::of_elements(&moved, &shape.moving);
                 if let Some(quality) = quality.filter(|q| q.worst < minimum_quality) {
                     faults.push(
                         source

@@ -1,0 +1,128 @@
+//! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
+
+use fluxmorph_optimizer::config::Config;
+use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
+use fluxmorph_optimizer::verify::{Settings, certify_all};
+
+use crate::{MESHED, check, setup, wavy};
+
+/// Two directions: the chain is that of the linear elements, which are measured in five.
+const BRIEF: Settings = Settings {
+    directions: 2,
+    halvings: 5,
+    first_step: 0.02,
+    difference_step: 2e-4,
+    least_slope: 1.95,
+    largest_error: 1e-6,
+    seed: 1,
+};
+
+fn prepared(text: &str) -> Setup {
+    let (config, source) = Config::from_str(text, "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
+    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn all_hold(setup: &Setup, p: &[f64], settings: &Settings) {
+    let certificates =
+        certify_all(&setup.problem, p, settings, |_, _, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    check(&certificates.objective);
+    for constraint in &certificates.constraints {
+        println!("{}", constraint.name);
+        check(&constraint.certificate);
+    }
+}
+
+#[test]
+fn the_gradient_of_quadratic_elements_is_exact_around_an_impedance_surface() {
+    let setup = setup("shield_quick.toml", &["analysis.order=2", "mesh.shield.refinement=0.3"]);
+    all_hold(&setup, &wavy(&setup.problem), &BRIEF);
+}
+
+#[test]
+fn the_gradient_of_quadratic_elements_is_exact_in_a_conductor_and_for_its_loss() {
+    let mut overrides = MESHED.to_vec();
+    overrides.extend([
+        "analysis.order=2",
+        "analysis.penalty=0.4",
+        "mesh.shield.refinement=0.25",
+        "mesh.shield.skin=[\"2 mm\"]",
+        "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]",
+    ]);
+    let setup = setup("shield_quick.toml", &overrides);
+    all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..BRIEF });
+}
+
+/// A magnet above an iron plate; the magnet's lower face moves, and the field energy of magnet and gap with it.
+fn magnet(order: u8) -> String {
+    format!(
+        r#"
+        [mesh]
+        generator = "boxes"
+        [mesh.boxes]
+        box = [[0, 0, "-30 mm"], ["40 mm", "40 mm", "50 mm"]]
+        growth = 2
+        [[mesh.boxes.regions]]
+        name = "gap"
+        box = [[0, 0, 0], ["20 mm", "20 mm", "10 mm"]]
+        size = "5 mm"
+        [[mesh.boxes.regions]]
+        name = "magnet"
+        box = [[0, 0, "10 mm"], ["10 mm", "10 mm", "20 mm"]]
+        [[mesh.boxes.regions]]
+        name = "around"
+        box = [["10 mm", 0, "10 mm"], ["20 mm", "20 mm", "20 mm"]]
+        [[mesh.boxes.regions]]
+        name = "iron"
+        box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", 0]]
+        [[mesh.boxes.regions]]
+        name = "observation"
+        box = [[0, 0, "-20 mm"], ["20 mm", "20 mm", "-10 mm"]]
+        [analysis]
+        frequency = 0
+        order = {order}
+        [materials.iron]
+        relative_permeability = 200
+        [materials.ferrite]
+        relative_permeability = 1.05
+        [regions.iron]
+        material = "iron"
+        [regions.magnet]
+        material = "ferrite"
+        remanence = ["0.1 T", 0, "0.4 T"]
+        [boundaries]
+        flux_parallel = ["x_max", "y_max", "z_min", "z_max"]
+        [objective]
+        kind = "flux_density_squared"
+        weighting = "volume"
+        region = "observation"
+        [[constraints]]
+        kind = "energy"
+        upper_ratio = 2
+        [[constraints]]
+        kind = "energy"
+        name = "magnet_alone"
+        region = "magnet"
+        upper_ratio = 2
+        [design]
+        surface = "magnet|gap"
+        direction = [0, 0, -1]
+        lower = "-2 mm"
+        upper = "2 mm"
+        [remesh]
+        region = ["magnet", "gap"]
+        free = ["magnet|around", "gap|around"]
+        slide = ["x_min", "y_min"]
+        "#
+    )
+}
+
+#[test]
+fn the_gradient_with_a_magnet_that_moves_is_exact() {
+    for order in [1, 2] {
+        let setup = prepared(&magnet(order));
+        let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
+        let p: Vec<f64> = (0..variables).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
+        assert_eq!(setup.problem.constraints.len(), 2);
+        all_hold(&setup, &p, &BRIEF);
+    }
+}
