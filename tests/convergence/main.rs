@@ -1,5 +1,5 @@
 //! Convergence of the field solver: manufactured solutions with fitted orders, the assembled matrix against its plain
-//! weak form, and closed forms (slab, air coil, infinite plate).
+//! weak form, and closed forms (slab, air coil).
 //!
 //! `cargo test --release --test convergence -- --nocapture` prints every error and fitted order.
 

@@ -7,15 +7,9 @@ use fluxmorph_optimizer::verify::{Settings, certify_all};
 use crate::{MESHED, check, setup, wavy};
 
 /// Two directions: the chain is that of the linear elements, which are measured in five.
-const BRIEF: Settings = Settings {
-    directions: 2,
-    halvings: 5,
-    first_step: 0.02,
-    difference_step: 2e-4,
-    least_slope: 1.95,
-    largest_error: 1e-6,
-    seed: 1,
-};
+fn brief() -> Settings {
+    Settings { directions: 2, ..Settings::default() }
+}
 
 fn prepared(text: &str) -> Setup {
     let (config, source) = Config::from_str(text, "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
@@ -35,7 +29,7 @@ fn all_hold(setup: &Setup, p: &[f64], settings: &Settings) {
 #[test]
 fn the_gradient_of_quadratic_elements_is_exact_around_an_impedance_surface() {
     let setup = setup("shield_quick.toml", &["analysis.order=2", "mesh.shield.refinement=0.3"]);
-    all_hold(&setup, &wavy(&setup.problem), &BRIEF);
+    all_hold(&setup, &wavy(&setup.problem), &brief());
 }
 
 #[test]
@@ -49,7 +43,7 @@ fn the_gradient_of_quadratic_elements_is_exact_in_a_conductor_and_for_its_loss()
         "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]",
     ]);
     let setup = setup("shield_quick.toml", &overrides);
-    all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..BRIEF });
+    all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..brief() });
 }
 
 /// A magnet above an iron plate; the magnet's lower face moves, and the field energy of magnet and gap with it.
@@ -123,6 +117,103 @@ fn the_gradient_with_a_magnet_that_moves_is_exact() {
         let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
         let p: Vec<f64> = (0..variables).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
         assert_eq!(setup.problem.constraints.len(), 2);
-        all_hold(&setup, &p, &BRIEF);
+        all_hold(&setup, &p, &brief());
     }
+}
+
+/// A block of metal in a uniform field, whose upper face moves: every kind of function of the field.
+const APPLIED: &str = r#"
+    [mesh]
+    generator = "boxes"
+    [mesh.boxes]
+    box = [[0, 0, 0], ["40 mm", "40 mm", "40 mm"]]
+    growth = 2
+    [[mesh.boxes.regions]]
+    name = "around"
+    box = [[0, 0, 0], ["15 mm", "15 mm", "15 mm"]]
+    size = "5 mm"
+    [[mesh.boxes.regions]]
+    name = "block"
+    box = [[0, 0, 0], ["10 mm", "10 mm", "10 mm"]]
+    [[mesh.boxes.regions]]
+    name = "observation"
+    box = [[0, 0, "20 mm"], ["10 mm", "10 mm", "25 mm"]]
+    [analysis]
+    frequency = "200 Hz"
+    order = 2
+    [materials.metal]
+    relative_permeability = 3
+    conductivity = "1e7 S/m"
+    density = "7 g/cm3"
+    [regions.block]
+    material = "metal"
+    [boundaries]
+    flux_parallel = ["x_min", "y_min"]
+    flux_normal = ["z_min"]
+    uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = [0, 0, "0.1 T"] }
+    [objective]
+    kind = "uniformity"
+    weighting = "volume"
+    region = "observation"
+    target = [0, 0, "0.12 T"]
+    [[constraints]]
+    kind = "field_component"
+    region = "observation"
+    direction = [1, 0, 2]
+    upper_ratio = 2
+    [[constraints]]
+    kind = "energy"
+    upper_ratio = 2
+    [[constraints]]
+    kind = "loss"
+    region = "block"
+    upper_ratio = 2
+    [[constraints]]
+    kind = "mass"
+    region = "block"
+    upper_ratio = 2
+    [design]
+    surface = "block|around"
+    direction = "normal"
+    lower = "-1 mm"
+    upper = "1 mm"
+    [remesh]
+    region = ["block", "around"]
+    slide = ["x_min", "y_min", "z_min"]
+"#;
+
+#[test]
+fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
+    let setup = prepared(APPLIED);
+    let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
+    let p: Vec<f64> = (0..variables).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
+    assert_eq!(setup.problem.constraints.len(), 4);
+    all_hold(&setup, &p, &brief());
+}
+
+#[test]
+fn planes_with_a_condition_must_keep_their_nodes() {
+    // Nothing lets the nodes on z = 0 slide in it: as a free face they would leave it.
+    let text = APPLIED.replace(
+        r#"slide = ["x_min", "y_min", "z_min"]"#,
+        r#"slide = ["x_min", "y_min"]
+    free = ["z_min"]"#,
+    );
+    let (config, source) = Config::from_str(&text, "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
+    let error =
+        set_up(&config, &source, Purpose::Optimisation).err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(error.contains("at right angles to z would lose its nodes"), "{error}");
+}
+
+#[test]
+fn conditions_hold_at_the_outside_and_one_a_face() {
+    let refused = |from: &str, to: &str| {
+        let (config, source) =
+            Config::from_str(&APPLIED.replace(from, to), "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
+        set_up(&config, &source, Purpose::Analysis).err().map(|e| e.to_string()).unwrap_or_default()
+    };
+    let inner = refused(r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|around"]"#);
+    assert!(inner.contains("has faces inside the mesh") && inner.contains("flux_normal"), "{inner}");
+    let twice = refused(r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#);
+    assert!(twice.contains("share the face"), "{twice}");
 }

@@ -162,7 +162,8 @@ impl Problem {
     pub fn memory_estimate(&self) -> usize {
         let elements = self.reference.topology().tets().len();
         let nodes = self.reference.points().len();
-        let systems: usize = self.states.iter().map(FieldModel::memory_estimate).sum();
+        // One state after the other is factored.
+        let systems = self.states.iter().map(FieldModel::memory_estimate).max().unwrap_or_default();
         let elastic = self.shape.as_ref().map_or(0, |shape| shape.map.factor_entries() * size_of::<f64>());
         systems + elastic + elements * BYTES_PER_ELEMENT + nodes * BYTES_PER_NODE
     }

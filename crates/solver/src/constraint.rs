@@ -19,10 +19,12 @@ const CREASE: f64 = 40.0;
 /// Angle by which a curved surface's mean normal may miss a plane it ends at: half a facet of [`CREASE`], and some.
 const SKEW: f64 = 25.0;
 
-/// How far a unit vector may be from a coordinate axis and still count as it: rounding of generators and files.
+/// Largest component of a unit vector across a coordinate axis with which it still counts as along it: coordinates in
+/// files carry six or more digits.
 pub(crate) const AXIS_TOLERANCE: f64 = 1e-6;
 
-/// What is left of a unit vector below which it depends on the others.
+/// What is left of a unit vector below which it depends on the others: after a normal is turned into the planes it ends
+/// at, directions are either new by the sine of [`CREASE`] or old up to rounding.
 const DEPENDENT: f64 = 1e-3;
 
 /// What a face asks of `A` at its nodes.
@@ -114,7 +116,7 @@ fn unit(v: Point) -> Point {
 
 /// The coordinate axis that a unit vector is along.
 pub(crate) fn axis_of(normal: Point) -> Option<usize> {
-    (0..3).find(|&d| 1.0 - normal[d].abs() < AXIS_TOLERANCE)
+    (0..3).find(|&axis| (0..3).all(|d| d == axis || normal[d].abs() <= AXIS_TOLERANCE))
 }
 
 /// Two unit vectors at right angles to a unit normal and to each other; coordinate axes where the normal is one.

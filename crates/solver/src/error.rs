@@ -21,6 +21,18 @@ pub enum SolverError {
         /// The range, and what to do.
         expected: String,
     },
+    /// One face with two conditions.
+    #[error(
+        "the surfaces `{}` and `{}` share the face at ({:.3}, {:.3}, {:.3}) mm, with different conditions: a face takes \
+         one; take it out of one of them",
+        surfaces[0], surfaces[1], place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    TwoConditions {
+        /// Names of the surfaces.
+        surfaces: [String; 2],
+        /// Centroid of the face [m].
+        place: [f64; 3],
+    },
     /// An applied field and another condition contradict each other.
     #[error(
         "at ({:.3}, {:.3}, {:.3}) mm the applied field of boundaries.uniform_field contradicts another condition: a \

@@ -456,7 +456,11 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     if !(setup.penalty > 0.0 && setup.penalty.is_finite()) {
         return refuse("penalty", setup.penalty, "a positive factor; 1 is right for almost all cases");
     }
-    assert_eq!(setup.materials.len(), mesh.topology().region_names().len(), "one material a region");
+    let regions = mesh.topology().region_names().len();
+    if setup.materials.len() != regions || setup.remanence.len() > regions {
+        let count = setup.materials.len().max(setup.remanence.len()) as f64;
+        return refuse("number of materials", count, "one material a region, and at most one remanence");
+    }
     for (material, region) in setup.materials.iter().zip(mesh.topology().region_names()) {
         let Material { relative_permeability: mu, conductivity: sigma } = *material;
         if !(mu > 0.0 && mu.is_finite()) {

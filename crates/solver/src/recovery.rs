@@ -74,7 +74,9 @@ pub fn recovered_flux_density(
     point: Point,
 ) -> Complex3 {
     let topology = model.topology();
-    let material = |e: ElementId| model.materials()[topology.region_of()[e.index()].index()];
+    // A magnet's face is one even where its permeability is that of air.
+    let material =
+        |e: ElementId| (model.materials()[topology.region_of()[e.index()].index()], model.remanence_of(e));
     let space = model.space();
     let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {

@@ -10,16 +10,17 @@
 //! components in the node's own frame ([`crate::constraint`]), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use fluxmorph_geometry::fem::{DofMap, c64};
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
-use crate::constraint::{Constraint, Fix, Frame, constraint};
+use crate::constraint::{Constraint, Fix, Frame, axis_of, constraint};
 use crate::error::SolverError;
 use crate::space::Space;
+use crate::surface::sorted;
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
@@ -38,6 +39,8 @@ pub struct Unknowns {
     frames: BTreeMap<NodeId, Frame>,
     /// Fixed components that are not zero [T m], along the node's directions.
     prescribed: BTreeMap<NodeId, Point>,
+    /// Bit `d`: the node lies on a conditioned plane at right angles to the axis `d`.
+    planes: BTreeMap<NodeId, u8>,
 }
 
 /// What conditions say at one node.
@@ -69,10 +72,13 @@ impl Unknowns {
         let mut fixed = vec![0u8; node_count];
         let mut psi_zero = vec![false; node_count];
         let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
+        let mut planes = BTreeMap::new();
         for (node, at) in at_nodes {
             let Constraint { frame, fixed: bits } = constraint(&at.faces);
             fixed[node.index()] = bits;
             psi_zero[node.index()] = at.psi_zero;
+            let axes = at.faces.iter().filter_map(|(_, area)| axis_of(area.map(|c| c / norm(*area))));
+            planes.insert(node, axes.fold(0, |bits, axis| bits | 1 << axis));
             if frame != Frame::COORDINATES {
                 frames.insert(node, frame);
             }
@@ -98,7 +104,7 @@ impl Unknowns {
             let i = node.index();
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
-        Ok(Self { dofs, grounded, frames, prescribed })
+        Ok(Self { dofs, grounded, frames, prescribed, planes })
     }
 
     /// `A_x, A_y, A_z` and `ψ` at a node out of a vector of unknowns; zero where a component is fixed.
@@ -140,6 +146,12 @@ impl Unknowns {
         self.frames.keys().chain(self.prescribed.keys()).copied()
     }
 
+    /// Nodes on conditioned planes along the axes, and bits of the axes that these are at right angles to: along them
+    /// the nodes must not move, for the condition is that of the plane.
+    pub fn plane_nodes(&self) -> impl Iterator<Item = (NodeId, u8)> + '_ {
+        self.planes.iter().map(|(&node, &axes)| (node, axes))
+    }
+
     /// Adds `x, y, z` and ψ components at a node into a vector of unknowns; what is fixed is dropped.
     #[inline]
     pub fn scatter_add(&self, values: &mut [c64], node: NodeId, components: [c64; 4]) {
@@ -172,6 +184,7 @@ fn conditions(
     boundaries: &[(String, Boundary)],
 ) -> Result<BTreeMap<NodeId, AtNode>, SolverError> {
     let mut at_nodes: BTreeMap<NodeId, AtNode> = BTreeMap::new();
+    let mut condition_of: HashMap<[NodeId; 3], (&str, &Boundary)> = HashMap::new();
     for (surface, boundary) in boundaries {
         let applied = match boundary {
             Boundary::UniformField(field) => Some((field, boundary::centre(mesh, boundaries, field)?)),
@@ -179,7 +192,15 @@ fn conditions(
         };
         let fix = if *boundary == Boundary::FluxNormal { Fix::Normal } else { Fix::Tangential };
         for &triangle in mesh.topology().surface(surface)? {
-            let area = area_vector(triangle.map(|v| mesh.point(v)));
+            let vertices = triangle.map(|v| mesh.point(v));
+            let area = area_vector(vertices);
+            let (other, first) = condition_of.entry(sorted(&triangle)).or_insert((surface, boundary));
+            if *first != boundary {
+                return Err(SolverError::TwoConditions {
+                    surfaces: [(*other).to_owned(), surface.clone()],
+                    place: centroid(vertices),
+                });
+            }
             for node in space.triangle(triangle) {
                 let at = at_nodes.entry(node).or_default();
                 at.faces.push((fix, area));

@@ -74,21 +74,23 @@ fn isotropic(section: &Section<'_>, key: &'static str, example: &str) -> Option<
     None
 }
 
-/// Read `[regions]`, and check it against the materials and the frequency [Hz].
+/// Read `[regions]`, and check it against the materials and the frequencies [Hz].
 pub(super) fn read_regions(
     root: &Section<'_>,
     materials: &BTreeMap<String, Material>,
-    frequency: f64,
+    frequencies: &[f64],
 ) -> BTreeMap<String, Region> {
+    let least = frequencies.iter().copied().fold(f64::NAN, f64::min);
+    let largest = frequencies.iter().copied().fold(f64::NAN, f64::max);
     let known: Vec<_> = materials.keys().map(String::as_str).collect();
     let read = |(name, section): (String, Section<'_>)| {
         let material = section.text("material");
         let model = section.choice("model").unwrap_or(RegionModel::Volume);
         if let Some(material) = &material {
-            check_region(&section, material, model, materials.get(material), &known, frequency);
+            check_region(&section, material, model, materials.get(material), &known, least);
         }
         let material = section.need("material", material, "\"steel\"");
-        let remanence = read_remanence(&section, frequency);
+        let remanence = read_remanence(&section, largest);
         section.finish();
         (name, Region { material, model, remanence })
     };

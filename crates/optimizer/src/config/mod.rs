@@ -218,9 +218,8 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
     let frequencies = analysis.as_ref().map_or(&[][..], Analysis::frequencies);
     let frequencies = if frequencies.iter().any(|f| f.is_nan()) { &[] } else { frequencies };
-    let frequency = frequencies.iter().copied().fold(f64::NAN, f64::min);
     let materials = material::read_materials(&root);
-    let regions = material::read_regions(&root, &materials, frequency);
+    let regions = material::read_regions(&root, &materials, frequencies);
     let coils = coil::read_coils(&root);
     let boundaries = match root.table("boundaries") {
         Some(section) => {

@@ -171,7 +171,14 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
 pub(super) fn coil_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     let mut faults = Vec::new();
+    let is_static = config.analysis.frequencies().contains(&0.0);
     for (i, coil) in config.coils.iter().enumerate() {
+        if is_static && coil.phase != 0.0 {
+            let fault = source.fault(&format!("coils[{i}].phase"), "a static current has no phase");
+            faults.push(
+                fault.expected("no phase, or frequencies above 0 Hz; a reversed current is a negative one"),
+            );
+        }
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
         if topology.region(name).is_err() {

@@ -3,13 +3,13 @@
 //! A surface name `"a|b"` that the mesh does not have stands for the faces between the regions `a` and `b`. It is added to
 //! the mesh under that name before anything else looks for it, so that every key may use it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
 use fluxmorph_geometry::io::read_msh_file;
 use fluxmorph_geometry::topology::OUTSIDE;
-use fluxmorph_geometry::{Mesh, MeshError, Topology};
+use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source};
 use crate::error::Error;
@@ -142,5 +142,28 @@ pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topolo
             _ => source.unknown_name(&path, "surface", name, &surfaces),
         }),
     };
-    surface_names(config).into_iter().filter_map(fault).collect()
+    let mut faults: Vec<Fault> = surface_names(config).into_iter().filter_map(fault).collect();
+    faults.extend(inner_faults(config, source, topology));
+    faults
+}
+
+/// Every condition on a surface that does not lie at the outside of the mesh.
+fn inner_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let key = |triangle: &[NodeId; 3]| {
+        let mut key = *triangle;
+        key.sort_unstable();
+        key
+    };
+    let outer: HashSet<[NodeId; 3]> =
+        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| key(&f.nodes)).collect();
+    surface_names(config)
+        .into_iter()
+        .filter(|(path, _)| path.starts_with("boundaries."))
+        .filter(|(_, name)| topology.surface(name).is_ok_and(|s| s.iter().any(|t| !outer.contains(&key(t)))))
+        .map(|(path, name)| {
+            source
+                .fault(&path, format!("the surface `{name}` has faces inside the mesh"))
+                .expected("a surface at the outside of the mesh: conditions hold there")
+        })
+        .collect()
 }

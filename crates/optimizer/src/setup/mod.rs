@@ -102,6 +102,9 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
         shape = Some(made);
     }
+    if shape.is_none() && !config.constraints.is_empty() {
+        warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
+    }
     let problem = Problem { reference: mesh, states, objective, constraints, shape };
     Ok(Setup { problem, audits, warnings, full_mesh })
 }

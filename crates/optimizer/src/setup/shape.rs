@@ -293,15 +293,33 @@ fn held_node_fault(
     map: &ElasticMap,
     model: &FieldModel,
 ) -> Option<Fault> {
+    let (space, unknowns) = (model.space(), model.unknowns());
     let moves = |node: NodeId| may_move(surface, map, node);
-    let space = model.space();
-    let node = model.unknowns().held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves))?;
-    let place = millimetres(space.position(inputs.mesh, node));
+    let place = |node: NodeId| millimetres(space.position(inputs.mesh, node));
+    if let Some(node) = unknowns.held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
+        let message = format!(
+            "a surface with a condition that is curved, oblique or has an applied field would move at {}",
+            place(node)
+        );
+        let fault = inputs.source.fault("remesh", message);
+        return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
+    }
+    let leaves = |node: NodeId, axis: usize| match surface.nodes().binary_search(&node) {
+        Ok(i) => surface.directions()[i][axis] != 0.0,
+        Err(_) => map.is_unknown(node, axis),
+    };
+    let vertices = inputs.mesh.topology().node_count();
+    let (node, axis) =
+        unknowns.plane_nodes().filter(|(node, _)| node.index() < vertices).find_map(|(node, axes)| {
+            (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
+        })?;
     let message = format!(
-        "a surface with a condition that is curved, oblique or has an applied field would move at {place}"
+        "a plane with a condition at right angles to {} would lose its nodes at {}",
+        ["x", "y", "z"][axis],
+        place(node)
     );
     let fault = inputs.source.fault("remesh", message);
-    Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"))
+    Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
 }
 
 /// Tries the two extreme designs, all variables at their lower and at their upper bound, before anything is solved.

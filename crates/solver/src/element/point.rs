@@ -1,7 +1,7 @@
 //! The potentials at one point of an element, of any order: what integrands are made of.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4, dot};
+use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::lagrange::Lagrange;
 use super::quadrature::{self, Node};
@@ -218,12 +218,4 @@ pub fn magnet_shape_derivative<const N: usize>(
         tensor[d][d] += integrand;
     }
     stretched(tet, &tensor)
-}
-
-/// The barycentric coordinates of a point [m] in a tet.
-pub fn barycentric(tet: &Tet4, vertices: &[Point; 4], point: Point) -> [f64; 4] {
-    let offset = fluxmorph_geometry::tet4::sub(point, vertices[0]);
-    let mut lambda = tet.gradients.map(|g| dot(g, offset));
-    lambda[0] += 1.0;
-    lambda
 }

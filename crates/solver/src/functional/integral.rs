@@ -16,6 +16,9 @@ use crate::solution::FieldSolution;
 use crate::space::Order;
 use crate::surface::SurfaceTerm;
 
+/// Elements whose integrals are held at once: some megabytes.
+const CHUNK: usize = 8192;
+
 /// The integral of a density.
 #[derive(Clone, Debug)]
 pub enum Integral {
@@ -146,9 +149,11 @@ impl<'a> Sum<'a> {
         elements: &[ElementId],
         integral: impl Fn(ElementId) -> ElementIntegral<N, 4> + Sync,
     ) {
-        let integrals: Vec<_> = elements.par_iter().map(|&e| integral(e)).collect();
-        for (&e, integral) in elements.iter().zip(&integrals) {
-            self.add(self.model.space().nodes_of(e), &self.model.topology().tet(e), integral);
+        for chunk in elements.chunks(CHUNK) {
+            let integrals: Vec<_> = chunk.par_iter().map(|&e| integral(e)).collect();
+            for (&e, integral) in chunk.iter().zip(&integrals) {
+                self.add(self.model.space().nodes_of(e), &self.model.topology().tet(e), integral);
+            }
         }
     }
 
