@@ -363,8 +363,10 @@ fn limits_of_evaluations_and_time_end_a_run_with_valid_results() {
 fn a_converged_run_exits_with_success() {
     let home = folder();
     let out = home.path().join("out");
-    // A tenth of the objective: the cautious first step of the method changes less.
-    crate::program::on_quick("run", &out, &["--set", "optimizer.ftol_rel=0.1"]).exits_with(0);
+    // A tenth of the objective: the cautious first step of the method changes less, and is not taken for convergence.
+    let arguments = ["--set", "optimizer.ftol_rel=0.1", "--max-evaluations", "30"];
+    let finished = crate::program::on_quick("run", &out, &arguments).exits_with(0);
+    assert!(finished.stderr.contains("it goes on with 1e-2"), "{}", finished.stderr);
     let run = RunFolder(out);
     assert_eq!(run.json("result.json")["stop_reason"], "objective_converged");
     assert_eq!(run.json("manifest.json")["status"], "converged");

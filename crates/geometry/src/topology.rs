@@ -184,9 +184,12 @@ impl Topology {
     }
 
     /// Whether three different nodes make a face of some element.
-    pub fn has_face(&self, [a, b, c]: [NodeId; 3]) -> bool {
-        let holds = |e: &ElementId| self.tet(*e).contains(&b) && self.tet(*e).contains(&c);
-        a != b && b != c && c != a && self.elements_around(a).iter().any(holds)
+    pub fn has_face(&self, nodes: [NodeId; 3]) -> bool {
+        let [a, b, c] = nodes;
+        // The node with the fewest elements: a hub of many faces is not searched for each of them.
+        let least = nodes.into_iter().min_by_key(|&n| self.elements_around(n).len()).unwrap_or(a);
+        let holds = |e: &ElementId| nodes.iter().all(|n| self.tet(*e).contains(n));
+        a != b && b != c && c != a && self.elements_around(least).iter().any(holds)
     }
 
     /// Faces between two regions and at the outside, ordered by (inside element, local face).

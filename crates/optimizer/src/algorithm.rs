@@ -107,7 +107,8 @@ pub fn minimise<E>(
     let unit: Vec<f64> =
         settings.lower.iter().zip(&settings.upper).map(|(low, high)| (high - low) / SCALED_SPAN).collect();
     let factor = settings.algorithm.objective_scale();
-    let bridge = RefCell::new(Bridge { evaluate, settings, unit: &unit, last: None, interruption: None });
+    let bridge =
+        RefCell::new(Bridge { evaluate, settings, unit: &unit, last: None, asked: 0, interruption: None });
     let fill = |target: &mut [f64], factor: f64, derivative: &[f64]| {
         for ((g, d), unit) in target.iter_mut().zip(derivative).zip(&unit) {
             *g = factor * d * unit;
@@ -165,6 +166,7 @@ pub fn minimise<E>(
     let ended = library.optimize(&mut x);
     drop(library);
     match bridge.into_inner().interruption {
+        Some(Interruption::Settled) => return Outcome::Ended(Ending::Step),
         Some(Interruption::Error(error)) => return Outcome::Interrupted(error),
         Some(Interruption::Panic(panic)) => resume_unwind(panic),
         None => {}
@@ -178,8 +180,14 @@ pub fn minimise<E>(
     }
 }
 
+/// Questions for one design after which the method counts as settled there: MMA and CCSAQ, without a tolerance, ask for
+/// ever at a solution on its bounds. No method needs more than a few.
+const SETTLED: usize = 100;
+
 /// What ended the calls of the closure.
 enum Interruption<E> {
+    /// The method asks for the same design again and again.
+    Settled,
     Error(E),
     Panic(Box<dyn std::any::Any + Send>),
 }
@@ -192,6 +200,8 @@ struct Bridge<'a, F, E> {
     unit: &'a [f64],
     /// The design asked for last, as NLopt sees it, and its answer.
     last: Option<(Vec<f64>, Sample)>,
+    /// How often it has been asked for in a row.
+    asked: usize,
     interruption: Option<Interruption<E>>,
 }
 
@@ -201,7 +211,9 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
         if self.interruption.is_some() {
             return None;
         }
+        self.asked += 1;
         if self.last.as_ref().is_none_or(|(design, _)| design != x) {
+            self.asked = 1;
             // Scaling back may leave the bounds by a rounding: what is recorded must not.
             let physical: Vec<f64> = (0..x.len())
                 .map(|k| (x[k] * self.unit[k]).clamp(self.settings.lower[k], self.settings.upper[k]))
@@ -217,6 +229,10 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
                     return None;
                 }
             }
+        }
+        if self.asked > SETTLED {
+            self.interruption = Some(Interruption::Settled);
+            return None;
         }
         self.last.as_ref().map(|(_, sample)| sample)
     }
@@ -289,6 +305,22 @@ mod tests {
                 let exact = if k % 3 == 0 { 0.020 } else { 0.004 };
                 assert!((p - exact).abs() < 1e-4, "{algorithm:?}: variable {k} is {p}");
             }
+        }
+    }
+
+    #[test]
+    fn without_a_tolerance_a_method_ends_where_it_settles() {
+        for algorithm in [Algorithm::Mma, Algorithm::Ccsaq] {
+            // A linear function: the minimum is the corner of the upper bounds.
+            let settings = Minimisation { ftol_rel: 0.0, ..settings(algorithm) };
+            let outcome = minimise::<()>(&settings, &[0.0; 8], |p| {
+                Ok(Sample {
+                    value: 1.0 - p.iter().sum::<f64>(),
+                    gradient: vec![-1.0; p.len()],
+                    ..Sample::default()
+                })
+            });
+            assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
         }
     }
 

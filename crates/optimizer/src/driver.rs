@@ -23,7 +23,7 @@ use crate::constraint::Bound;
 use crate::error::Error;
 use crate::objective::Goal;
 use crate::observer::{Evaluation, Observer, column};
-use crate::output::StopReason;
+use crate::output::{RunStatus, StopReason};
 use crate::problem::{Analysis, Problem, Shape, Timings, Want};
 
 /// Share of the distance to the best design that the bounds keep after a broken mesh.
@@ -32,8 +32,15 @@ pub const SHRINK: f64 = 0.5;
 /// Restarts in a smaller box before the run ends at the mesh's limit.
 pub const MAX_RESTARTS: usize = 5;
 
-/// Factor on `ftol_rel` after a restart: a method begins with a cautious step, whose small gain is no convergence.
+/// Factor on `ftol_rel` after a restart, and where a method ends after its first steps: it begins with a cautious step,
+/// whose small gain is no convergence.
 const RESTART_TOLERANCE: f64 = 0.1;
+
+/// Evaluations within which a method has done no more than its cautious first step.
+const CAUTIOUS: usize = 3;
+
+/// How often an end after the cautious first step is not believed.
+const MAX_RENEWALS: usize = 3;
 
 /// Keeps what is computed.
 pub trait Recorder {
@@ -151,10 +158,24 @@ pub fn optimise(
         ftol_rel: settings.ftol_rel,
         xtol_rel: settings.xtol_rel,
     };
+    let mut renewals = 0;
     let stop_reason = loop {
+        let before = run.evaluations;
         let start = run.best.as_ref().map_or_else(|| shape.initial.clone(), |best| best.values.clone());
         let outcome = algorithm::minimise(&minimisation, &start, |p| run.evaluate(p));
         match outcome {
+            algorithm::Outcome::Ended(Ending::Objective)
+                if run.evaluations - before <= CAUTIOUS
+                    && minimisation.ftol_rel > 0.0
+                    && renewals < MAX_RENEWALS =>
+            {
+                renewals += 1;
+                minimisation.ftol_rel *= RESTART_TOLERANCE;
+                run.observer.warning(&format!(
+                    "the method's first step changed the objective by less than optimizer.ftol_rel: it goes on with {:.0e}",
+                    minimisation.ftol_rel
+                ));
+            }
             algorithm::Outcome::Ended(Ending::Objective) => break StopReason::ObjectiveConverged,
             algorithm::Outcome::Ended(Ending::Step) => break StopReason::StepConverged,
             algorithm::Outcome::Failed(cause) if run.best.is_some() => {
@@ -365,6 +386,10 @@ impl Run<'_> {
                 best.violation
             ));
         }
+        let stop_reason = match stop_reason.status() {
+            RunStatus::Converged if best.violation > 0.0 => StopReason::Infeasible,
+            _ => stop_reason,
+        };
         Ok(Optimised {
             stop_reason,
             evaluations: self.evaluations,

@@ -7,7 +7,7 @@
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
 //! On planes along the axes the unknowns are components of `A`; at the nodes of other conditioned surfaces they are
-//! components in the node's own frame ([`crate::constraint`]), and [`Unknowns::gather`] and
+//! components in the node's own frame (`constraint`), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
 use std::collections::{BTreeMap, HashMap};

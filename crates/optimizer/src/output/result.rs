@@ -69,6 +69,8 @@ pub enum StopReason {
     MeshLimit,
     /// The method can make no further step.
     MethodStalled,
+    /// The method has converged, but no design keeps all constraints.
+    Infeasible,
     /// A field could not be computed; the best design before it is saved.
     NumericalFailure,
     /// A single analysis is complete.
@@ -80,9 +82,11 @@ impl StopReason {
     pub fn status(self) -> RunStatus {
         match self {
             Self::ObjectiveConverged | Self::StepConverged => RunStatus::Converged,
-            Self::MaxEvaluations | Self::MaxTime | Self::MeshLimit | Self::MethodStalled => {
-                RunStatus::Stopped
-            }
+            Self::MaxEvaluations
+            | Self::MaxTime
+            | Self::MeshLimit
+            | Self::MethodStalled
+            | Self::Infeasible => RunStatus::Stopped,
             Self::NumericalFailure => RunStatus::Failed,
             Self::Interrupted => RunStatus::Interrupted,
             Self::Done => RunStatus::Done,
@@ -109,6 +113,7 @@ impl StopReason {
             Self::Interrupted => "interrupted",
             Self::MeshLimit => "the mesh allows no further step",
             Self::MethodStalled => "the method can make no further step",
+            Self::Infeasible => "no design keeps all constraints",
             Self::NumericalFailure => "a field could not be computed",
             Self::Done => "done",
         }

@@ -1,5 +1,7 @@
 //! Objective and constraints of a configuration on its states.
 
+use std::collections::BTreeSet;
+
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional};
@@ -213,6 +215,14 @@ pub(super) fn constraints(
                 }
             }
         }
+    }
+    // The suffixes of a thickness may meet another constraint's name.
+    let mut names = BTreeSet::new();
+    if let Some(twice) = constraints.iter().find(|constraint| !names.insert(constraint.name.as_str())) {
+        let message = format!("two constraints are named `{}`", twice.name);
+        return Err(source
+            .error(vec![source.fault("constraints", message).expected("a different name for each")])
+            .into());
     }
     Ok(constraints)
 }

@@ -85,6 +85,16 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
     source.check(probe_faults(config, source, &full_mesh, &mesh))?;
+    let conditions = &config.boundaries;
+    let free = conditions.flux_parallel.is_empty()
+        && conditions.flux_normal.is_empty()
+        && conditions.uniform_field.is_none();
+    if free && conductors.is_empty() {
+        let fault = source
+            .fault("boundaries", "no surface has a condition: the potential is known up to a constant only")
+            .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
+        return Err(source.error(vec![fault]).into());
+    }
     let states = field::field_models(config, &mesh, &conductors)?;
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) {

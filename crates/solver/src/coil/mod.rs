@@ -3,7 +3,7 @@
 //! Writing `J = curl T` and `T` on the right makes the discrete current exactly free of divergence, whether or not the
 //! mesh follows the coil. Lives here: the coil's place ([`frame`]), its shape and `T` ([`racetrack`]), the integral of
 //! `T` over a tetrahedron that the coil's edges cut ([`moment`], [`cut`]), the current of a coil that is a region of the
-//! mesh ([`region`], on the helpers [`patch`], [`potential`] and [`divergence`]), all of it summed over coils
+//! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), all of it summed over coils
 //! ([`terms`]), and where a coil may meet the outside of the mesh ([`planes`]). `T` and `J` are fixed in space: elements
 //! that meet them must not move.
 

@@ -84,7 +84,7 @@ fn groups(
 
 /// Whether two tetrahedra have the same four nodes.
 fn has_repetition(topology: &Topology) -> bool {
-    let sorted: Vec<[NodeId; 4]> = topology
+    let mut sorted: Vec<[NodeId; 4]> = topology
         .tets()
         .par_iter()
         .map(|tet| {
@@ -93,13 +93,8 @@ fn has_repetition(topology: &Topology) -> bool {
             nodes
         })
         .collect();
-    let repeated = |(e, nodes): (usize, &[NodeId; 4])| {
-        topology
-            .elements_around(nodes[0])
-            .iter()
-            .any(|other| other.index() > e && sorted[other.index()] == *nodes)
-    };
-    sorted.par_iter().enumerate().any(repeated)
+    sorted.par_sort_unstable();
+    sorted.par_windows(2).any(|pair| pair[0] == pair[1])
 }
 
 /// The tetrahedron with the nodes of an earlier one that comes first in the file.
