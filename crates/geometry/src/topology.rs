@@ -13,6 +13,12 @@ use crate::incidence::Incidence;
 /// What stands for the outside of the mesh in the name of an interface.
 pub const OUTSIDE: &str = "outside";
 
+/// The nodes of a triangle, ascending: the same for every order and orientation.
+pub fn face_key(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
+    nodes.sort_unstable();
+    nodes
+}
+
 /// A triangle between two regions or at the outside of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facet {

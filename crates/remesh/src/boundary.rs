@@ -12,6 +12,7 @@
 //! Design nodes are prescribed in all components, whatever faces meet there. Nodes listed as fixed come next.
 
 use fluxmorph_geometry::tet4::{FACES, area_vector, centroid, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 use rayon::prelude::*;
 
@@ -177,15 +178,10 @@ fn check_nodes(list: &str, nodes: &[NodeId], node_count: usize) -> Result<(), Re
 fn sorted_faces(topology: &Topology, elements: &[ElementId]) -> Vec<([NodeId; 3], ElementId)> {
     let mut faces: Vec<_> = elements
         .par_iter()
-        .flat_map_iter(|&e| FACES.iter().map(move |face| (sorted(face.map(|v| topology.tet(e)[v])), e)))
+        .flat_map_iter(|&e| FACES.iter().map(move |face| (face_key(face.map(|v| topology.tet(e)[v])), e)))
         .collect();
     faces.par_sort_unstable();
     faces
-}
-
-fn sorted(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
-    nodes.sort_unstable();
-    nodes
 }
 
 /// What the listed surfaces say about single faces.
@@ -209,7 +205,7 @@ impl FaceRules {
             let mut used = false;
             for &triangle in &boundary.triangles {
                 check_nodes(&list(), &triangle, mesh.topology().node_count())?;
-                let key = sorted(triangle);
+                let key = face_key(triangle);
                 if faces.binary_search_by_key(&key, |face| face.0).is_err() {
                     continue;
                 }

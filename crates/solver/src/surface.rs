@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{area_vector, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
@@ -79,7 +80,7 @@ impl Surfaces {
         for facet in topology.facets() {
             let outside = facet.outside.map_or(0.0, reluctivity);
             let jump = reluctivity(facet.inside) - outside;
-            if jump != 0.0 && !(facet.outside.is_none() && needless.contains(&sorted(&facet.nodes))) {
+            if jump != 0.0 && !(facet.outside.is_none() && needless.contains(&face_key(facet.nodes))) {
                 surfaces.triangles.push(facet.nodes);
                 surfaces.terms.push(SurfaceTerm::Interface(jump));
             }
@@ -124,17 +125,10 @@ fn faces_without_term(
             let area = area_vector(triangle.map(|n| mesh.point(n)));
             let plane = axis_of(area.map(|c| c / norm(area))).is_some();
             let applied = matches!(boundary, Boundary::UniformField(_));
-            (if plane && !applied { &mut faces } else { &mut needed }).insert(sorted(triangle));
+            (if plane && !applied { &mut faces } else { &mut needed }).insert(face_key(*triangle));
         }
     }
     // A face that two surfaces name keeps its term where one of them needs it.
     faces.retain(|face| !needed.contains(face));
     Ok(faces)
-}
-
-/// The nodes of a triangle, ascending: the same for both orientations.
-pub(crate) fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
-    let mut key = *triangle;
-    key.sort_unstable();
-    key
 }

@@ -14,13 +14,13 @@ use std::collections::{BTreeMap, HashMap};
 
 use fluxmorph_geometry::fem::{DofMap, c64};
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
 use crate::constraint::{Constraint, Fix, Frame, axis_of, constraint};
 use crate::error::SolverError;
 use crate::space::Space;
-use crate::surface::sorted;
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
@@ -194,7 +194,7 @@ fn conditions(
         for &triangle in mesh.topology().surface(surface)? {
             let vertices = triangle.map(|v| mesh.point(v));
             let area = area_vector(vertices);
-            let (other, first) = condition_of.entry(sorted(&triangle)).or_insert((surface, boundary));
+            let (other, first) = condition_of.entry(face_key(triangle)).or_insert((surface, boundary));
             if *first != boundary {
                 return Err(SolverError::TwoConditions {
                     surfaces: [(*other).to_owned(), surface.clone()],

@@ -9,6 +9,7 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
 
 /// Normals closer to the span of others than this sine are in it: planes in files are flat to 6 or more digits, and
@@ -42,9 +43,9 @@ pub(super) fn directions(
             areas[i] += norm(area);
         }
     }
-    let own: BTreeSet<[NodeId; 3]> = triangles.iter().map(sorted).collect();
+    let own: BTreeSet<[NodeId; 3]> = triangles.iter().copied().map(face_key).collect();
     let mut planes = vec![Planes::default(); nodes.len()];
-    for triangle in kept.iter().filter(|t| !own.contains(&sorted(t))) {
+    for triangle in kept.iter().filter(|t| !own.contains(&face_key(**t))) {
         let area = vector(triangle);
         for i in triangle.iter().filter_map(row) {
             planes[i].add(area.map(|a| a / norm(area)));
@@ -59,12 +60,6 @@ pub(super) fn directions(
             if length > SHORTEST * area { within.map(|c| c / length) } else { [0.0; 3] }
         })
         .collect()
-}
-
-fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
-    let mut nodes = *triangle;
-    nodes.sort_unstable();
-    nodes
 }
 
 /// Orthonormal span of the normals of the planes through a node.

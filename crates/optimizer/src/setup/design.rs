@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
 
 use super::millimetres;
@@ -18,15 +19,15 @@ pub(super) fn surface(
 ) -> Result<DesignSurface, Error> {
     let topology = mesh.topology();
     let facets: BTreeMap<[NodeId; 3], &Facet> =
-        topology.facets().iter().map(|facet| (sorted(facet.nodes), facet)).collect();
+        topology.facets().iter().map(|facet| (face_key(facet.nodes), facet)).collect();
     let mut triangles = Vec::new();
     let mut own = BTreeSet::new();
     for name in &design.surface {
-        for &triangle in topology.surface(name)?.iter().filter(|t| own.insert(sorted(**t))) {
+        for &triangle in topology.surface(name)?.iter().filter(|t| own.insert(face_key(**t))) {
             triangles.push(match design.direction {
                 DesignDirection::Vector(_) => triangle,
                 DesignDirection::Word(DirectionWord::Normal) => {
-                    let facet = facets.get(&sorted(triangle)).copied();
+                    let facet = facets.get(&face_key(triangle)).copied();
                     out_of_body(config, topology, name, facet)
                         .ok_or_else(|| unclear_side(source, mesh, name, triangle))?
                 }
@@ -39,9 +40,9 @@ pub(super) fn surface(
         config.boundaries.flux_parallel.iter().chain(&config.boundaries.flux_normal).chain(applied);
     let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
     for name in conditioned.chain(slide).collect::<BTreeSet<_>>() {
-        kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&sorted(*t))));
+        kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&face_key(*t))));
     }
-    let outer = |t: &[NodeId; 3]| facets.get(&sorted(*t)).is_some_and(|facet| facet.outside.is_none());
+    let outer = |t: &[NodeId; 3]| facets.get(&face_key(*t)).is_some_and(|facet| facet.outside.is_none());
     let setup = DesignSetup {
         direction: match design.direction {
             DesignDirection::Vector(direction) => Direction::Along(direction),
@@ -176,9 +177,4 @@ fn fault(source: &Source, design: &config::Design, error: DesignError) -> Error 
             .help("take a smaller radius, or a coarser mesh on the surface"),
     };
     source.error(vec![fault]).into()
-}
-
-fn sorted(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
-    nodes.sort_unstable();
-    nodes
 }

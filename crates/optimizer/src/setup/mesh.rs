@@ -9,6 +9,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
 use fluxmorph_geometry::io::read_msh_file;
 use fluxmorph_geometry::topology::OUTSIDE;
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source};
@@ -149,17 +150,14 @@ pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topolo
 
 /// Every condition on a surface that does not lie at the outside of the mesh.
 fn inner_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
-    let key = |triangle: &[NodeId; 3]| {
-        let mut key = *triangle;
-        key.sort_unstable();
-        key
-    };
     let outer: HashSet<[NodeId; 3]> =
-        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| key(&f.nodes)).collect();
+        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
     surface_names(config)
         .into_iter()
         .filter(|(path, _)| path.starts_with("boundaries."))
-        .filter(|(_, name)| topology.surface(name).is_ok_and(|s| s.iter().any(|t| !outer.contains(&key(t)))))
+        .filter(|(_, name)| {
+            topology.surface(name).is_ok_and(|s| s.iter().any(|t| !outer.contains(&face_key(*t))))
+        })
         .map(|(path, name)| {
             source
                 .fault(&path, format!("the surface `{name}` has faces inside the mesh"))

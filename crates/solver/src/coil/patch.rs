@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use fluxmorph_geometry::tet4::{FACES, Point, Tet4, area_vector, dot, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 /// A face of the region's elements.
@@ -118,7 +119,7 @@ fn faces(mesh: &Mesh, elements: &[ElementId]) -> Vec<PatchFace> {
             FACES.map(|face| {
                 let nodes = face.map(|v| tet[v]);
                 PatchFace {
-                    key: sorted(&nodes),
+                    key: face_key(nodes),
                     area: area_vector(nodes.map(|n| mesh.point(n))),
                     inside: position,
                     outside: None,
@@ -130,13 +131,6 @@ fn faces(mesh: &Mesh, elements: &[ElementId]) -> Vec<PatchFace> {
     all.chunk_by(|a, b| a.key == b.key)
         .map(|same| PatchFace { outside: same.get(1).map(|f| f.inside), ..same[0] })
         .collect()
-}
-
-/// The nodes of a triangle, ascending: the same for both orientations.
-pub(super) fn sorted(triangle: &[NodeId; 3]) -> [NodeId; 3] {
-    let mut key = *triangle;
-    key.sort_unstable();
-    key
 }
 
 /// Which nodes hang together through elements.

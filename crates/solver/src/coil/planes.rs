@@ -13,10 +13,10 @@
 use std::collections::HashMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::fault::PlaneFault;
-use super::patch::sorted;
 use super::racetrack::Racetrack;
 use super::region::RegionCurrent;
 use super::{Coil, CoilShape};
@@ -66,14 +66,14 @@ pub fn check(mesh: &Mesh, coils: &[Coil], surfaces: &[ConditionedSurface<'_>]) -
     let mut surface_of: HashMap<[NodeId; 3], usize> = HashMap::new();
     for (i, surface) in surfaces.iter().enumerate() {
         for triangle in surface.triangles {
-            surface_of.entry(sorted(triangle)).or_insert(i);
+            surface_of.entry(face_key(*triangle)).or_insert(i);
         }
     }
     let open: Vec<[NodeId; 3]> = mesh
         .topology()
         .facets()
         .iter()
-        .filter(|f| f.outside.is_none() && !surface_of.contains_key(&sorted(&f.nodes)))
+        .filter(|f| f.outside.is_none() && !surface_of.contains_key(&face_key(f.nodes)))
         .map(|f| f.nodes)
         .collect();
     let rest = ConditionedSurface { name: "", condition: Condition::Open, triangles: &open };
@@ -221,7 +221,7 @@ fn wall_fault(
         let (normal, magnitude) = (area_vector(vertices), norm(j));
         let area = norm(normal);
         let across = if magnitude > 0.0 { dot(j, normal).abs() / (magnitude * area) } else { 0.0 };
-        let surface = surface_of.get(&sorted(&facet.nodes)).copied().unwrap_or(surfaces.len());
+        let surface = surface_of.get(&face_key(facet.nodes)).copied().unwrap_or(surfaces.len());
         walls[surface].push(Wall {
             place: centroid(vertices),
             area,

@@ -16,12 +16,13 @@
 use std::f64::consts::{PI, TAU};
 
 use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use super::divergence::{CurrentReport, Section, report};
 use super::fault::RegionFault;
 use super::frame::Frame;
-use super::patch::{Patch, direction, sorted};
+use super::patch::{Patch, direction};
 use super::potential::Potential;
 use crate::error::SolverError;
 
@@ -199,7 +200,8 @@ fn terminal_faces(patch: &Patch, from: &Terminal, to: &Terminal) -> Result<Vec<T
         let mut nodes: Vec<[NodeId; 3]> = terminal
             .triangles
             .iter()
-            .map(sorted)
+            .copied()
+            .map(face_key)
             .filter(|key| {
                 let found = patch.faces.binary_search_by_key(key, |f| f.key);
                 found.is_ok_and(|i| patch.faces[i].outside.is_none())
