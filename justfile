@@ -24,6 +24,10 @@ test-long:
 verify:
     cargo test --release --test verification -- --ignored --nocapture write_the_table
 
+# Computes the tables of mesh motion in docs/torture.md
+torture:
+    cargo test --release -p fluxmorph-remesh --test torture -- --ignored --nocapture write_the_table
+
 # The fields of fresh runs read through VTK; installs pyvista with pip below target/
 test-pyvista:
     cargo test --release --test acceptance -- --ignored --nocapture pyvista

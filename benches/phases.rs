@@ -36,19 +36,20 @@ fn phases(name: &str) {
     let (cpu, wall, setup) = least(|| set_up(&config, &source, Purpose::Optimisation).expect("it is valid"));
     let problem: Problem = setup.problem;
     let (model, shape) = (&problem.states[0], problem.shape.as_ref().expect("it has a design"));
-    let topology = problem.reference.topology();
+    let topology = problem.original.topology();
     println!(
         "{name}: {} tets, {} unknowns, {} elastic equations",
         topology.tets().len(),
         model.unknown_count(),
-        shape.map.equation_count()
+        shape.motion.map().equation_count()
     );
     println!("  {:<28}{:>10}{:>10}", "part", "CPU ms", "wall ms");
     show("set-up (once a run)", cpu, wall);
 
     let p: Vec<f64> = (0..shape.surface.variable_count()).map(|k| 2e-3 * (k as f64).sin()).collect();
-    let (cpu, wall, (mesh, displacement)) = least(|| problem.mesh_of(&p).expect("a small motion"));
+    let (cpu, wall, moved) = least(|| problem.moved(&p).expect("a small motion"));
     show("remesh, forward", cpu, wall);
+    let mesh = moved.mesh.clone();
     let (cpu, wall, matrix) = least(|| model.assemble(&mesh));
     show("assembly", cpu, wall);
     let load = model.load(&mesh);
@@ -62,12 +63,20 @@ fn phases(name: &str) {
     show(&format!("adjoint, {} iterations", lambda.report().iterations), cpu, wall);
     let (cpu, wall, nodal) = least(|| adjoint::node_gradient(model, &mesh, &state, &lambda, &shape.moving));
     show("gradient at nodes", cpu, wall);
-    let (cpu, wall, _) = least(|| shape.surface.gradient(&shape.map.gradient(&nodal)));
+    let (cpu, wall, _) =
+        least(|| shape.surface.gradient(&shape.motion.map().gradient(&nodal).expect("it converges")));
     show("remesh, transposed", cpu, wall);
-    let (cpu, wall, analysis) = least(|| {
-        problem.analyse(&p, mesh.clone(), displacement.clone(), Want::Gradient).expect("it converges")
-    });
+    let (cpu, wall, analysis) =
+        least(|| problem.analyse(&p, moved.clone(), Want::Gradient).expect("it converges"));
     show("one evaluation, all", cpu, wall);
+    let evaluation = cpu;
+    let step = shape.motion.step(&shape.displacement(&p)).expect("it converges");
+    let (guard, wall, _) = least(|| shape.motion.inversion(&step));
+    show("step to inversion", guard, wall);
+    let (quality, wall, _) = least(|| problem.quality(&mesh));
+    show("quality", quality, wall);
+    let share = (guard + quality).as_secs_f64() / evaluation.as_secs_f64();
+    println!("  step to inversion and quality: {:.2} % of an evaluation", 100.0 * share);
     let (cpu, wall, bytes) = least(|| fields::vtu(&problem, &analysis).expect("it is finite"));
     show(&format!("VTU, {:.1} MB", bytes.len() as f64 * 1e-6), cpu, wall);
 }

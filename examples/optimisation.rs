@@ -11,12 +11,12 @@ use fluxmorph_optimizer::setup::{Purpose, set_up};
 pub(crate) fn main() -> Result<(), Error> {
     let (config, source) =
         Config::from_str(include_str!("../configs/shield_quick.toml"), "shield_quick.toml")?;
-    let problem = set_up(&config, &source, Purpose::Optimisation)?.problem;
+    let mut problem = set_up(&config, &source, Purpose::Optimisation)?.problem;
 
     // Seven evaluations are enough to see the frame; `session::run` would also write a run directory.
     let settings = Optimizer { max_evaluations: 7, ..config.optimizer };
     let mut console = Console::new(std::io::stdout());
-    let optimised = optimise(&problem, &settings, &mut console, &mut Unrecorded, &|| false)?;
+    let optimised = optimise(&mut problem, &settings, &mut console, &mut Unrecorded, &|| false)?;
 
     let ratio = optimised.best.objective / optimised.initial;
     println!("F/F0 = {ratio:.4} at evaluation {}", optimised.best.evaluation);

@@ -7,6 +7,7 @@ mod determinism;
 mod folders;
 mod interruption;
 mod mesh_files;
+mod morph;
 mod program;
 mod pyvista;
 mod run_files;

@@ -55,11 +55,11 @@ fn with(
     changes: &[(&str, &str)],
     settings: impl Fn(Optimizer) -> Optimizer,
 ) -> (Optimised, Vec<Evaluation>) {
-    let (problem, own) = changed(name, changes);
-    run(&problem, &settings(own))
+    let (mut problem, own) = changed(name, changes);
+    run(&mut problem, &settings(own))
 }
 
-fn run(problem: &Problem, settings: &Optimizer) -> (Optimised, Vec<Evaluation>) {
+fn run(problem: &mut Problem, settings: &Optimizer) -> (Optimised, Vec<Evaluation>) {
     let mut rows = Rows::default();
     let result = optimise(problem, settings, &mut Silent, &mut rows, &|| false);
     (result.unwrap_or_else(|e| panic!("{e}")), rows.0)
@@ -288,9 +288,9 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
         ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
         ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
     ];
-    let (problem, settings) = changed("shield_quick.toml", &changes);
-    let error =
-        optimise(&problem, &settings, &mut Silent, &mut Rows::default(), &|| false).expect_err("no share");
+    let (mut problem, settings) = changed("shield_quick.toml", &changes);
+    let error = optimise(&mut problem, &settings, &mut Silent, &mut Rows::default(), &|| false)
+        .expect_err("no share");
     let text = error.to_string();
     assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
 }

@@ -9,6 +9,7 @@ use fluxmorph_optimizer::config::Config;
 use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
+use fluxmorph_remesh::Moved;
 use support::{repository, setup};
 
 mod functionals;
@@ -47,23 +48,24 @@ fn check_in_five(certificate: &Certificate) {
 /// dF/dx against the motion of every node that the elastic map may move, each on its own.
 fn node_gradient_holds(problem: &Problem) {
     let shape = problem.shape.as_ref().expect("a shape");
-    let (mesh, displacement) = problem.mesh_of(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
-    let base = problem
-        .analyse(&wavy(problem), mesh.clone(), displacement, Want::Gradient)
-        .unwrap_or_else(|e| panic!("{e}"));
+    let at = problem.moved(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
+    let mesh = at.mesh.clone();
+    let base = problem.analyse(&wavy(problem), at.clone(), Want::Gradient).unwrap_or_else(|e| panic!("{e}"));
     let objective = base.objective.expect("an objective");
     let gradient: Vec<f64> = base.sensitivity.expect("it was asked for").into_iter().flatten().collect();
     // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
     let moves = |k: usize| {
         let node = NodeId::new(k / 3);
-        shape.map.is_unknown(node, k % 3) || shape.surface.nodes().binary_search(&node).is_ok()
+        shape.motion.map().is_unknown(node, k % 3) || shape.surface.nodes().binary_search(&node).is_ok()
     };
     let span: Vec<f64> = (0..gradient.len()).map(|k| if moves(k) { 1e-5 } else { 0.0 }).collect();
     let settings = Settings { first_step: 1.0, difference_step: 0.01, ..Settings::default() };
     let value = |v: &[f64]| -> Result<f64, Error> {
         let moved = mesh.moved(v.as_chunks::<3>().0)?;
-        let still = vec![[0.0; 3]; moved.points().len()];
-        Ok(problem.analyse(&wavy(problem), moved, still, Want::Value)?.objective.expect("an objective"))
+        Ok(problem
+            .analyse(&wavy(problem), Moved { mesh: moved, ..at.clone() }, Want::Value)?
+            .objective
+            .expect("an objective"))
     };
     let zero = vec![0.0; gradient.len()];
     let certificate = measure(&value, &zero, objective, &gradient, &span, &settings, |_, _| {});
@@ -174,7 +176,7 @@ fn the_gradient_is_exact_with_tied_nodes_and_a_fixed_rim() {
 fn normals_of_the_flat_plate_are_its_direction() {
     let (along, normal) = (designed("direction = [0, 0, -1]", &[]), designed("direction = \"normal\"", &[]));
     let p = wavy(&along);
-    let meshes = [&along, &normal].map(|problem| problem.mesh_of(&p).expect("inside the bounds").0);
+    let meshes = [&along, &normal].map(|problem| problem.moved(&p).expect("inside the bounds").mesh);
     for (a, b) in meshes[0].points().iter().zip(meshes[1].points()) {
         // Normals of flat triangles, carried through the elastic system: rounding of points below a metre.
         assert!((0..3).all(|d| (a[d] - b[d]).abs() < 1e-14), "{a:?} {b:?}");

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::ids::ElementId;
 use crate::mesh::Mesh;
 use crate::tet4::{self, EDGES, Point};
+use crate::topology::Topology;
 
 /// The constant of Eq. 4, as printed.
 pub const NORMALISATION: f64 = 8.47967;
@@ -68,7 +69,18 @@ impl QualityReport {
 
     /// The report of some elements, such as those of a remesh region; `None` if there are none.
     pub fn of_elements(mesh: &Mesh, elements: &[ElementId]) -> Option<Self> {
-        let values: Vec<f64> = elements.par_iter().map(|&e| quality(mesh.vertices(e))).collect();
+        Self::of_points(mesh.topology(), mesh.points(), elements)
+    }
+
+    /// The report of some elements at any places of the nodes [m], shape `(n_nodes, 3)`: elements may be inverted, which
+    /// no [`Mesh`] has.
+    ///
+    /// # Panics
+    /// If there is not one point per node.
+    pub fn of_points(topology: &Topology, points: &[Point], elements: &[ElementId]) -> Option<Self> {
+        assert_eq!(points.len(), topology.node_count(), "one point per node");
+        let vertices = |e: ElementId| topology.tet(e).map(|n| points[n.index()]);
+        let values: Vec<f64> = elements.par_iter().map(|&e| quality(vertices(e))).collect();
         let (&first, &worst_element) = (values.first()?, elements.first()?);
         let mut report = Self {
             elements: elements.len(),
@@ -92,7 +104,7 @@ impl QualityReport {
                 _ => report.poor += 1,
             }
         }
-        report.worst_centroid = tet4::centroid(mesh.vertices(report.worst_element));
+        report.worst_centroid = tet4::centroid(vertices(report.worst_element));
         Some(report)
     }
 

@@ -10,6 +10,12 @@
 /// A point or vector in space [m].
 pub type Point = [f64; 3];
 
+/// `a + b`.
+#[inline]
+pub fn add(a: Point, b: Point) -> Point {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
 /// `a − b`.
 #[inline]
 pub fn sub(a: Point, b: Point) -> Point {

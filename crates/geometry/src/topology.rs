@@ -144,6 +144,14 @@ impl Topology {
         &self.region_names
     }
 
+    /// Name of the region of an element.
+    ///
+    /// # Panics
+    /// If there is no such element.
+    pub fn region_name_at(&self, element: ElementId) -> &str {
+        &self.region_names[self.region_of[element.index()].index()]
+    }
+
     /// The region of a name.
     ///
     /// # Errors

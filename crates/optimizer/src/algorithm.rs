@@ -1,4 +1,4 @@
-//! NLopt's gradient methods behind one function; the only file that names the library.
+//! NLopt's gradient methods behind one function; beside [`crate::bobyqa`] the only file that names the library.
 //!
 //! NLopt knows bounds, inequality constraints, values and gradients. It asks for objective and constraints of one design
 //! one after the other, in an order of its own: the first question evaluates the design, the others are answered from
@@ -107,8 +107,17 @@ pub fn minimise<E>(
     let unit: Vec<f64> =
         settings.lower.iter().zip(&settings.upper).map(|(low, high)| (high - low) / SCALED_SPAN).collect();
     let factor = settings.algorithm.objective_scale();
-    let bridge =
-        RefCell::new(Bridge { evaluate, settings, unit: &unit, last: None, asked: 0, interruption: None });
+    let scaled =
+        |values: &[f64]| -> Vec<f64> { values.iter().zip(&unit).map(|(v, unit)| v / unit).collect() };
+    let bridge = RefCell::new(Bridge {
+        evaluate,
+        settings,
+        unit: &unit,
+        start: (start, scaled(start)),
+        last: None,
+        asked: 0,
+        interruption: None,
+    });
     let fill = |target: &mut [f64], factor: f64, derivative: &[f64]| {
         for ((g, d), unit) in target.iter_mut().zip(derivative).zip(&unit) {
             *g = factor * d * unit;
@@ -142,8 +151,6 @@ pub fn minimise<E>(
         }
     };
     let mut library = Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
-    let scaled =
-        |values: &[f64]| -> Vec<f64> { values.iter().zip(&unit).map(|(v, unit)| v / unit).collect() };
     let mut accepted = library
         .set_lower_bounds(&scaled(&settings.lower))
         .and_then(|_| library.set_upper_bounds(&scaled(&settings.upper)))
@@ -198,6 +205,8 @@ struct Bridge<'a, F, E> {
     settings: &'a Minimisation,
     /// Length of a scaled unit of every variable.
     unit: &'a [f64],
+    /// The start, in metres and as NLopt sees it.
+    start: (&'a [f64], Vec<f64>),
     /// The design asked for last, as NLopt sees it, and its answer.
     last: Option<(Vec<f64>, Sample)>,
     /// How often it has been asked for in a row.
@@ -214,10 +223,12 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
         self.asked += 1;
         if self.last.as_ref().is_none_or(|(design, _)| design != x) {
             self.asked = 1;
-            // Scaling back may leave the bounds by a rounding: what is recorded must not.
-            let physical: Vec<f64> = (0..x.len())
-                .map(|k| (x[k] * self.unit[k]).clamp(self.settings.lower[k], self.settings.upper[k]))
-                .collect();
+            // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
+            // mesh that is known.
+            let (start, scaled_start) = &self.start;
+            let back = |k: usize| if x[k] == scaled_start[k] { start[k] } else { x[k] * self.unit[k] };
+            let physical: Vec<f64> =
+                (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
             match catch_unwind(AssertUnwindSafe(|| (self.evaluate)(&physical))) {
                 Ok(Ok(sample)) => self.last = Some((x.to_vec(), sample)),
                 Ok(Err(error)) => {
@@ -336,6 +347,19 @@ mod tests {
                 assert!(matches!(outcome, Outcome::Interrupted("enough")), "{algorithm:?}: {outcome:?}");
                 assert_eq!(calls, last, "{algorithm:?}");
             }
+        }
+    }
+
+    #[test]
+    fn the_first_design_asked_for_is_the_start_to_the_last_bit() {
+        let start: Vec<f64> = (0..8).map(|k| 1e-3 * (f64::from(k)).sqrt()).collect();
+        for algorithm in ALL {
+            let mut first = None;
+            minimise::<()>(&settings(algorithm), &start, |p| {
+                first.get_or_insert_with(|| p.to_vec());
+                Ok(quadratic(p))
+            });
+            assert_eq!(first.as_ref(), Some(&start), "{algorithm:?}");
         }
     }
 

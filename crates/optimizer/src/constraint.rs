@@ -4,6 +4,7 @@
 //! itself, so `c` is the relative distance from it. Quantities of the field are computed by [`crate::problem`].
 
 use fluxmorph_geometry::Mesh;
+use fluxmorph_remesh::RemeshError;
 
 use crate::algorithm::CONSTRAINT_TOLERANCE;
 use crate::error::Error;
@@ -60,17 +61,25 @@ pub struct Bound {
 
 impl Constraint {
     /// Value and gradient of a quantity of the shape alone; `None` for one of the field.
-    pub fn of_shape(&self, p: &[f64], mesh: &Mesh, shape: &Shape) -> Option<(f64, Vec<f64>)> {
-        match &self.quantity {
+    ///
+    /// # Errors
+    /// [`RemeshError::NotConverged`].
+    pub fn of_shape(
+        &self,
+        p: &[f64],
+        mesh: &Mesh,
+        shape: &Shape,
+    ) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
+        Ok(match &self.quantity {
             Quantity::Field(_) => None,
-            Quantity::Volume(body) => Some(body.evaluate(mesh, shape)),
+            Quantity::Volume(body) => Some(body.evaluate(mesh, shape)?),
             Quantity::Thickness { measure, bound } => {
                 // Beyond a minimum is below it, beyond a maximum above.
                 let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
                 let (beyond, gradient) = measure.evaluate(shape, p);
                 Some((bound + sign * beyond, gradient.iter().map(|g| sign * g).collect()))
             }
-        }
+        })
     }
 
     /// The bound, given the value at the initial design.

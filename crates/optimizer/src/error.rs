@@ -40,6 +40,16 @@ pub enum Error {
         /// What it said.
         cause: &'static str,
     },
+    /// The mesh cannot be taken to a design.
+    #[error(
+        "the mesh can be taken {:.1} % of the way to the design only; take one nearer to the undeformed shape, enlarge the \
+         remesh region or change its stiffness",
+        100.0 * reached
+    )]
+    DesignUnreached {
+        /// Share of the way that can be taken.
+        reached: f64,
+    },
     /// A constraint that cannot be what the configuration says.
     #[error("the constraint `{name}` has the value {value:e} at the initial design: expected {expected}")]
     Constraint {
@@ -82,9 +92,11 @@ impl Error {
                 _ => ExitCode::Configuration,
             },
             Self::Solver(SolverError::NotConverged { .. } | SolverError::NotFinite { .. })
+            | Self::Remesh(RemeshError::NotConverged { .. })
             | Self::Optimisation { .. }
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
+            | Self::DesignUnreached { .. }
             | Self::Config(_)
             | Self::Solver(_)
             | Self::Remesh(_)

@@ -1,6 +1,8 @@
 //! Everything above field and mesh: the configuration, the files, the optimisation and the command line.
 
 pub mod algorithm;
+mod approach;
+pub mod bobyqa;
 pub mod cli;
 pub mod config;
 pub mod constraint;
@@ -11,10 +13,12 @@ mod error;
 mod exports;
 pub mod fields;
 pub mod geometric;
+pub mod morph;
 pub mod objective;
 pub mod observer;
 pub mod output;
 pub mod problem;
+pub mod rounds;
 pub mod session;
 pub mod setup;
 pub mod thickness;

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::output::{ConstraintResult, RunResult};
+use crate::rounds::RoundEvent;
 
 /// One evaluation of objective, constraints and gradients; a row of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,7 +34,13 @@ pub struct Evaluation {
     pub linear_iterations: usize,
     /// Wall time of the evaluation [s].
     pub seconds: f64,
-    /// Restarts of the method so far, each in a smaller box (see [`crate::driver`]).
+    /// Multiple of the motion from the round's reference at which the first element inverts; `None` if none ever does.
+    pub step_to_inversion: Option<f64>,
+    /// That element.
+    pub inversion_element: Option<usize>,
+    /// Its region.
+    pub inversion_region: Option<String>,
+    /// Rounds of the mesh motion begun so far (see [`crate::driver`]).
     pub round: usize,
     /// Relative distance of every constraint from its bound, satisfied where ≤ 0, by column (see [`column`]).
     #[serde(flatten)]
@@ -47,7 +54,7 @@ pub fn column(constraint: &str) -> String {
 
 impl Evaluation {
     /// The columns of `history.csv` before those of the constraints.
-    pub const COLUMNS: [&'static str; 12] = [
+    pub const COLUMNS: [&'static str; 15] = [
         "evaluation",
         "iteration",
         "objective",
@@ -59,6 +66,9 @@ impl Evaluation {
         "max_thickness_m",
         "linear_iterations",
         "seconds",
+        "step_to_inversion",
+        "inversion_element",
+        "inversion_region",
         "round",
     ];
 }
@@ -97,6 +107,11 @@ pub trait Observer {
     /// An evaluation is complete.
     fn evaluation(&mut self, evaluation: &Evaluation) {
         let _ = evaluation;
+    }
+
+    /// The mesh has a new reference, or a remedy was taken.
+    fn round(&mut self, event: &RoundEvent) {
+        let _ = event;
     }
 
     /// Something the user should know; the run goes on.
@@ -217,6 +232,10 @@ impl<W: Write> Observer for Console<W> {
         ));
     }
 
+    fn round(&mut self, event: &RoundEvent) {
+        self.line(&event.describe());
+    }
+
     fn warning(&mut self, message: &str) {
         show_warning(&mut self.writer, message);
     }
@@ -270,6 +289,9 @@ mod tests {
             max_thickness_m: Some(0.03),
             linear_iterations: 40,
             seconds: 1.0,
+            step_to_inversion: Some(1.25),
+            inversion_element: Some(17),
+            inversion_region: Some("plate".to_owned()),
             round: 0,
             constraints: BTreeMap::new(),
         }

@@ -1,7 +1,8 @@
 //! The optimisation problem as a function: design variables in, objective, constraints and exact gradients out.
 //!
-//! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. The reference mesh and
-//! the elastic factor are fixed, so `F(p)` is one function and not a path. A problem owns one state a frequency; the
+//! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. Within a round the
+//! reference mesh and the elastic factor are fixed, so `F(p)` is one function and not a path; [`Shape::motion`] holds the
+//! round. A problem owns one state a frequency; the
 //! objective costs one adjoint solve a state whatever the number of its terms, each constraint of the field another.
 //! Nothing here knows an optimiser, a file or a terminal.
 
@@ -11,7 +12,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
-use fluxmorph_remesh::{ElasticMap, RemeshError, check_step};
+use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
 use fluxmorph_solver::linear::PreparedSystem;
 use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, SolverError, adjoint};
 
@@ -32,8 +33,10 @@ const BYTES_PER_NODE: usize = 1000;
 pub struct Shape {
     /// Design variables to surface.
     pub surface: DesignSurface,
-    /// Surface to mesh (Eq. 3), factored on the reference mesh.
-    pub map: ElasticMap,
+    /// Surface to mesh (Eq. 3) in the present round.
+    pub motion: Motion,
+    /// How far a design may lie from the reference of its round, and how many rounds there may be.
+    pub limits: Limits,
     /// Elements of the elastic body, and those beside it that share a node that may move; ascending.
     pub moving: Vec<ElementId>,
     /// Thickness of the designed body, where it has one.
@@ -50,7 +53,7 @@ pub struct Shape {
 #[derive(Debug)]
 pub struct Problem {
     /// The undeformed mesh.
-    pub reference: Mesh,
+    pub original: Mesh,
     /// One field problem per state, in the order of the analysis' frequencies; at least one.
     pub states: Vec<FieldModel>,
     /// What is optimised; `None` for a field analysis without objective.
@@ -94,8 +97,10 @@ impl std::ops::AddAssign for Timings {
 pub struct Analysis {
     /// The moved mesh.
     pub mesh: Mesh,
-    /// Displacement of every node from the reference mesh [m], shape `(n_nodes, 3)`.
+    /// Displacement of every node from the undeformed mesh [m], shape `(n_nodes, 3)`.
     pub displacement: Vec<Point>,
+    /// First inversion along the motion from the round's reference, as a multiple of it.
+    pub inversion: StepToInversion,
     /// One solution per state.
     pub solutions: Vec<FieldSolution>,
     /// The objective, if the problem has one.
@@ -137,20 +142,22 @@ pub enum Want {
 }
 
 impl Problem {
-    /// The mesh of a design, and the displacement that leads to it.
+    /// The mesh of a design in the present round; the undeformed one where nothing moves.
     ///
     /// # Errors
     /// [`RemeshError::Inverted`] says which element breaks and how far the step may go.
     ///
     /// # Panics
     /// If `p` has another length than there are variables.
-    pub fn mesh_of(&self, p: &[f64]) -> Result<(Mesh, Vec<Point>), RemeshError> {
-        let Some(shape) = &self.shape else {
-            return Ok((self.reference.clone(), vec![[0.0; 3]; self.reference.points().len()]));
-        };
-        assert_eq!(p.len(), shape.surface.variable_count(), "one value a variable");
-        let displacement = shape.map.displacement(&shape.surface.displacement(p));
-        Ok((check_step(&self.reference, &displacement)?, displacement))
+    pub fn moved(&self, p: &[f64]) -> Result<Moved, RemeshError> {
+        match &self.shape {
+            Some(shape) => shape.motion.moved(&shape.displacement(p)),
+            None => Ok(Moved {
+                mesh: self.original.clone(),
+                displacement: vec![[0.0; 3]; self.original.points().len()],
+                inversion: StepToInversion { step: f64::INFINITY, element: None },
+            }),
+        }
     }
 
     /// Elements of which a node may move, ascending; empty without a shape.
@@ -160,11 +167,11 @@ impl Problem {
 
     /// Bytes that an evaluation needs, about: matrices, factors, and the arrays over nodes and elements.
     pub fn memory_estimate(&self) -> usize {
-        let elements = self.reference.topology().tets().len();
-        let nodes = self.reference.points().len();
+        let elements = self.original.topology().tets().len();
+        let nodes = self.original.points().len();
         // One state after the other is factored.
         let systems = self.states.iter().map(FieldModel::memory_estimate).max().unwrap_or_default();
-        let elastic = self.shape.as_ref().map_or(0, |shape| shape.map.factor_entries() * size_of::<f64>());
+        let elastic = self.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
         systems + elastic + elements * BYTES_PER_ELEMENT + nodes * BYTES_PER_NODE
     }
 
@@ -183,9 +190,9 @@ impl Problem {
     /// [`Error::Remesh`] when the mesh would break, [`Error::Solver`] when the field cannot be computed.
     pub fn evaluate(&self, p: &[f64], want: Want) -> Result<Analysis, Error> {
         let clock = Instant::now();
-        let (mesh, displacement) = self.mesh_of(p)?;
+        let moved = self.moved(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.analyse(p, mesh, displacement, want)?;
+        let mut analysis = self.analyse(p, moved, want)?;
         analysis.timings.remesh += remesh;
         Ok(analysis)
     }
@@ -193,14 +200,9 @@ impl Problem {
     /// As [`Problem::evaluate`] on a mesh made before for the variables `p`.
     ///
     /// # Errors
-    /// [`Error::Solver`] when the field cannot be computed.
-    pub fn analyse(
-        &self,
-        p: &[f64],
-        mesh: Mesh,
-        displacement: Vec<Point>,
-        want: Want,
-    ) -> Result<Analysis, Error> {
+    /// [`Error::Solver`] when the field cannot be computed, [`Error::Remesh`] when the elastic gradient cannot.
+    pub fn analyse(&self, p: &[f64], moved: Moved, want: Want) -> Result<Analysis, Error> {
+        let Moved { mesh, displacement, inversion } = moved;
         let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default() };
         let shape = self.shape.as_ref().filter(|_| want == Want::Gradient);
         let mut solutions = Vec::with_capacity(self.states.len());
@@ -229,8 +231,9 @@ impl Problem {
         let Work { mut timings, report, .. } = work;
         let mut clock = Lap::start();
         let value = terms.iter().zip(&objective.values).map(|(term, value)| term.weight * value).sum();
-        let gradient = shape.filter(|_| !terms.is_empty()).map(|shape| shape.pull_back(&objective.nodal));
-        let constraints = self.measure_constraints(p, &mesh, shape, &fields, &constrained);
+        let gradient =
+            shape.filter(|_| !terms.is_empty()).map(|shape| shape.pull_back(&objective.nodal)).transpose()?;
+        let constraints = self.measure_constraints(p, &mesh, shape, &fields, &constrained)?;
         timings.remesh += clock.lap();
         let all_gradients = gradient.iter().chain(constraints.iter().filter_map(|c| c.gradient.as_ref()));
         if let Some(value) = all_gradients.flatten().copied().find(|g| !g.is_finite()) {
@@ -241,6 +244,7 @@ impl Problem {
         Ok(Analysis {
             mesh,
             displacement,
+            inversion,
             solutions,
             objective: (!terms.is_empty()).then_some(value),
             terms: objective.values,
@@ -289,24 +293,44 @@ impl Problem {
         wanted: Option<&Shape>,
         fields: &[(usize, &Term)],
         gathered: &[Gathered],
-    ) -> Vec<Measured> {
-        let Some(shape) = &self.shape else { return Vec::new() };
+    ) -> Result<Vec<Measured>, RemeshError> {
+        let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let of = |(k, constraint): (usize, &Constraint)| {
-            if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape) {
-                return Measured { value, gradient: wanted.map(|_| gradient) };
+            if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape)? {
+                return Ok(Measured { value, gradient: wanted.map(|_| gradient) });
             }
             let position = fields.iter().position(|(number, _)| *number == k);
             let own = &gathered[position.expect("every constraint of the field was gathered")];
-            Measured { value: own.values[0], gradient: wanted.map(|shape| shape.pull_back(&own.nodal)) }
+            let gradient = wanted.map(|shape| shape.pull_back(&own.nodal)).transpose()?;
+            Ok(Measured { value: own.values[0], gradient })
         };
         self.constraints.iter().enumerate().map(of).collect()
     }
 }
 
 impl Shape {
+    /// Displacement of the design nodes from the undeformed mesh [m], shape `(n_design, 3)`.
+    ///
+    /// # Panics
+    /// If `p` has another length than there are variables.
+    pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
+        assert_eq!(p.len(), self.surface.variable_count(), "one value a variable");
+        self.surface.displacement(p)
+    }
+
+    /// The round that begins at an analysed design.
+    ///
+    /// # Errors
+    /// As [`Motion::rebased`].
+    pub fn next_round(&self, p: &[f64], analysis: &Analysis) -> Result<Motion, RemeshError> {
+        let Analysis { mesh, displacement, .. } = analysis;
+        let policy = self.motion.policy();
+        self.motion.rebased(mesh.clone(), displacement.clone(), self.displacement(p), policy)
+    }
+
     /// dF/dp from dF/dx at the nodes, shape `(n_nodes, 3)`.
-    fn pull_back(&self, nodal: &[Point]) -> Vec<f64> {
-        self.surface.gradient(&self.map.gradient(nodal))
+    fn pull_back(&self, nodal: &[Point]) -> Result<Vec<f64>, RemeshError> {
+        Ok(self.surface.gradient(&self.motion.map().gradient(nodal)?))
     }
 }
 
@@ -390,7 +414,7 @@ fn moved_only(shape: &Shape, mut nodal: Vec<Point>) -> Vec<Point> {
             continue;
         }
         for (component, g) in g.iter_mut().enumerate() {
-            if !shape.map.is_unknown(node, component) {
+            if !shape.motion.map().is_unknown(node, component) {
                 *g = 0.0;
             }
         }

@@ -58,7 +58,7 @@ pub fn run(
             kept: config.output.fields,
             written: Vec::new(),
         };
-        let problem = &session.setup.problem;
+        let problem = &mut session.setup.problem;
         let optimised =
             driver::optimise(problem, &config.optimizer, observer, &mut recorder, options.interrupted)?;
         let best = &optimised.best;
@@ -77,6 +77,7 @@ pub fn run(
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
+            rounds: optimised.rounds.clone(),
             linear_solver: LinearSolverResult { worst_residual: optimised.worst_residual },
             ..session.result(
                 optimised.stop_reason,
@@ -103,7 +104,7 @@ pub fn solve(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let setup = set_up(config, source, Purpose::Analysis)?;
+    let mut setup = set_up(config, source, Purpose::Analysis)?;
     let values = match (&setup.problem.shape, design) {
         (Some(shape), given) => {
             let values = given.unwrap_or_else(|| shape.initial.clone());
@@ -119,13 +120,15 @@ pub fn solve(
         (None, _) => None,
     };
     // A design that breaks the mesh is refused before an earlier run is replaced.
-    let (mesh, displacement) = setup.problem.mesh_of(values.as_deref().unwrap_or_default())?;
+    let p = values.as_deref().unwrap_or_default();
+    setup.problem.approach(p)?;
+    let moved = setup.problem.moved(p)?;
     let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
-        let analysis = problem.analyse(p, mesh, displacement, Want::Gradient)?;
+        let analysis = problem.analyse(p, moved, Want::Gradient)?;
         let bounds = problem.bounds(p, &analysis)?;
         if config.output.fields != FieldsKept::Nothing {
             write_field(&session.directory, 0, problem, &analysis)?;
@@ -133,7 +136,7 @@ pub fn solve(
         }
         exports::write(config, &session.directory, &analysis.mesh, observer)?;
         let value = analysis.objective;
-        let initial_quality = problem.quality(&problem.reference).worst;
+        let initial_quality = problem.quality(&problem.original).worst;
         Ok(RunResult {
             evaluations: 1,
             objective: value.map(|value| ObjectiveResult {
@@ -189,7 +192,7 @@ impl<'a> Session<'a> {
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.write(&directory)?;
 
-        let mesh = setup.problem.reference.topology();
+        let mesh = setup.problem.original.topology();
         observer.started(&Started {
             title: &config.title,
             algorithm: (command == "run").then(|| config.optimizer.algorithm.name()),
@@ -209,12 +212,13 @@ impl<'a> Session<'a> {
     fn conclude(
         mut self,
         observer: &mut dyn Observer,
-        work: impl FnOnce(&Self, &mut dyn Observer) -> Result<RunResult, Error>,
+        work: impl FnOnce(&mut Self, &mut dyn Observer) -> Result<RunResult, Error>,
     ) -> Result<RunResult, Error> {
-        let outcome = self.write_configuration().and_then(|()| work(&self, observer)).and_then(|result| {
-            result.write(&self.directory)?;
-            Ok(result)
-        });
+        let outcome =
+            self.write_configuration().and_then(|()| work(&mut self, observer)).and_then(|result| {
+                result.write(&self.directory)?;
+                Ok(result)
+            });
         let status = outcome.as_ref().map_or(RunStatus::Failed, |result| result.status);
         self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
         let completed = self.manifest.write(&self.directory);
@@ -264,6 +268,7 @@ impl<'a> Session<'a> {
             iterations: 0,
             objective: None,
             constraints: Vec::new(),
+            rounds: Vec::new(),
             design,
             mesh: MeshResult {
                 nodes: topology.node_count(),
@@ -421,7 +426,7 @@ fn write_collection(directory: &RunDirectory, evaluations: &[usize]) -> Result<(
 }
 
 /// Origin and content hash of the mesh with all its regions.
-fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
+pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
     let origin = match &config.mesh {
         MeshConfig::Shield(_) => "shield".to_owned(),
         MeshConfig::Block(_) => "block".to_owned(),

@@ -173,8 +173,8 @@ pub fn certify_all(
         let function = |p: &[f64]| match (&constraint.quantity, &problem.shape) {
             (Quantity::Field(_), _) | (_, None) => value(p, k + 1),
             (_, Some(shape)) => {
-                let (mesh, _) = problem.mesh_of(p)?;
-                Ok(constraint.of_shape(p, &mesh, shape).map_or(f64::NAN, |(value, _)| value))
+                let mesh = problem.moved(p)?.mesh;
+                Ok(constraint.of_shape(p, &mesh, shape)?.map_or(f64::NAN, |(value, _)| value))
             }
         };
         let gradient = measured.gradient.as_ref().expect("the gradient was asked for");

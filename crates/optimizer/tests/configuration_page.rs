@@ -6,7 +6,7 @@ use std::path::Path;
 use fluxmorph_optimizer::config::{Config, ConfigError, resolved_toml};
 
 /// Configurations that together write every table, each with the alternatives that exclude one another.
-const FULL: [&str; 5] = [
+const FULL: [&str; 6] = [
     r#"
     [mesh]
     generator = "shield"
@@ -89,9 +89,41 @@ const FULL: [&str; 5] = [
     force = [0, 0, 0]
     [optimizer]
     max_time = "1 h"
+    minimum_quality = 0
     [[probes]]
     name = "here"
     points = [[0, 0, 0]]
+    [[morph.motion]]
+    design = "upper"
+    "#,
+    r#"
+    [mesh]
+    generator = "block"
+    [remesh]
+    region = "block"
+    [[morph.motion]]
+    surface = "z_max"
+    displacement = [0, 0, 1]
+    rotation = { angle = 1 }
+    scale = { factor = 2 }
+    [[morph.motion]]
+    line = [[0, 0, 0], [1, 0, 0]]
+    displacement = [0, 0, 1]
+    [[morph.motion]]
+    nodes = [[0, 0, 0]]
+    displacement = [0, 0, 1]
+    [[morph.motion]]
+    box = [[0, 0, 0], [1, 0, 0]]
+    displacement = [0, 0, 1]
+    [[morph.case]]
+    name = "one"
+    [morph.case.paper]
+    worst_quality = 0.1
+    poor = 1
+    share_poor_percent = 1
+    share_fair_percent = 1
+    share_good_percent = 1
+    equations = 1
     "#,
     r#"
     [mesh]
@@ -283,6 +315,13 @@ fn every_key_that_the_reader_asks_for_is_mentioned() {
         "[[design.symmetry]]",
         "[remesh]",
         "[[remesh.subregions]]",
+        "[morph]",
+        "[[morph.motion]]",
+        "[[morph.motion]]\n[morph.motion.rotation]",
+        "[[morph.motion]]\n[morph.motion.scale]",
+        "[morph.tune]",
+        "[[morph.case]]",
+        "[[morph.case]]\n[morph.case.paper]",
         "[optimizer]",
         "[[probes]]",
         "[output]",

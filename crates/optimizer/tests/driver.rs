@@ -8,8 +8,10 @@ use fluxmorph_optimizer::config::{Algorithm, Config, Optimizer};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::observer::{Evaluation, Observer, Silent};
 use fluxmorph_optimizer::output::StopReason;
-use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
+use fluxmorph_optimizer::rounds::{RoundEvent, RoundKind};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify_all};
 
 fn quick() -> (Problem, Optimizer) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/shield_quick.toml");
@@ -27,7 +29,11 @@ impl Recorder for Rows {
     }
 }
 
-fn run(problem: &Problem, settings: &Optimizer, observer: &mut dyn Observer) -> (Optimised, Vec<Evaluation>) {
+fn run(
+    problem: &mut Problem,
+    settings: &Optimizer,
+    observer: &mut dyn Observer,
+) -> (Optimised, Vec<Evaluation>) {
     let mut rows = Rows::default();
     let optimised = optimise(problem, settings, observer, &mut rows, &|| false).unwrap();
     (optimised, rows.0)
@@ -35,7 +41,7 @@ fn run(problem: &Problem, settings: &Optimizer, observer: &mut dyn Observer) -> 
 
 #[test]
 fn every_algorithm_improves_the_shield_within_its_bounds() {
-    let (problem, settings) = quick();
+    let (mut problem, settings) = quick();
     for algorithm in [
         Algorithm::Mma,
         Algorithm::Ccsaq,
@@ -45,7 +51,7 @@ fn every_algorithm_improves_the_shield_within_its_bounds() {
         Algorithm::Var2,
     ] {
         let settings = Optimizer { algorithm, max_evaluations: 8, ..settings.clone() };
-        let (optimised, rows) = run(&problem, &settings, &mut Silent);
+        let (optimised, rows) = run(&mut problem, &settings, &mut Silent);
         let ratio = optimised.best.objective / optimised.initial;
         println!("{algorithm:?}: F/F0 {ratio:.4} after {} evaluations", rows.len());
         // The slowest, truncated Newton, reaches 0.89: anything that moves at all is below 0.97.
@@ -57,47 +63,124 @@ fn every_algorithm_improves_the_shield_within_its_bounds() {
     }
 }
 
-/// Warnings told.
+/// Rounds and remedies told.
 #[derive(Default)]
-struct Warnings(Vec<String>);
+struct Told(Vec<RoundEvent>);
 
-impl Observer for Warnings {
-    fn warning(&mut self, message: &str) {
-        self.0.push(message.to_owned());
+impl Observer for Told {
+    fn round(&mut self, event: &RoundEvent) {
+        self.0.push(event.clone());
     }
 }
 
-#[test]
-fn a_mesh_below_the_quality_is_never_evaluated_and_the_run_goes_on_in_a_smaller_box() {
-    let (problem, settings) = quick();
-    // The free run falls to 0.094: at 0.15 it must restart.
-    let settings = Optimizer { minimum_quality: 0.15, max_evaluations: 40, ..settings };
-    let mut warnings = Warnings::default();
-    let (optimised, rows) = run(&problem, &settings, &mut warnings);
-    let last = rows.last().unwrap();
-    println!("{:?} after {} rows and {} restarts", optimised.stop_reason, rows.len(), last.round);
-    assert!(last.round >= 1);
-    assert!(warnings.0.len() >= last.round && warnings.0[0].contains("minimum_quality"), "{:?}", warnings.0);
-    for row in &rows {
-        assert!(row.worst_quality >= 0.15, "{row:?}");
+/// What holds of every run, however its rounds went.
+fn check_rows(optimised: &Optimised, rows: &[Evaluation], least_quality: f64) {
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!(row.evaluation, k, "attempts without an objective are no evaluations");
+        assert!(row.worst_quality >= least_quality, "{row:?}");
         assert!(row.objective.is_finite() && row.gradient_norm.is_finite(), "{row:?}");
+        assert!(k == 0 || row.round >= rows[k - 1].round, "{row:?}");
     }
-    assert!(
-        (0..rows.len()).all(|k| rows[k].evaluation == k),
-        "attempts without an objective are no evaluations"
-    );
-    let least = rows.iter().map(|row| row.objective).fold(f64::INFINITY, f64::min);
-    assert_eq!(optimised.best.objective, least);
-    assert!(least / optimised.initial < 0.9, "restarts keep what was reached");
+    let best = &optimised.best;
+    assert_eq!(best.objective, rows[best.evaluation].objective);
+}
+
+fn shape(problem: &mut Problem) -> &mut Shape {
+    problem.shape.as_mut().unwrap()
 }
 
 #[test]
-fn a_quality_that_no_step_keeps_ends_at_the_mesh_limit_with_the_best_design() {
-    let (problem, settings) = quick();
-    let initial = problem.quality(&problem.reference).worst;
+fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
+    let (mut problem, settings) = quick();
+    let (free, free_rows) = run(&mut problem, &settings, &mut Silent);
+    assert_eq!(free_rows.last().unwrap().round, 0, "the shipped case needs one reference");
+    let (mut problem, settings) = quick();
+    let used = free_rows.iter().filter_map(|row| row.step_to_inversion).fold(f64::INFINITY, f64::min);
+    // Half of the way that the free run took.
+    shape(&mut problem).limits.inversion_share = 0.5 / used;
+    let settings = Optimizer { max_evaluations: 60, ..settings };
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &settings, &mut told);
+    check_rows(&optimised, &rows, 0.0);
+    println!("{:?}", told.0.iter().map(RoundEvent::describe).collect::<Vec<_>>());
+    let rounds: Vec<_> = told.0.iter().filter(|event| event.kind == RoundKind::Round).collect();
+    assert!(!rounds.is_empty());
+    for round in rounds {
+        let start = rows.iter().find(|row| row.round == round.round).unwrap();
+        let reference = &rows[round.evaluation.unwrap()];
+        assert_eq!(start.objective, reference.objective, "a round starts on the mesh of its reference");
+        assert_eq!(start.step_to_inversion, None);
+    }
+    let (ratio, free) = (rows[optimised.best.evaluation].ratio, free.best.objective / free.initial);
+    println!("F/F0 {ratio:.5} in rounds, {free:.5} in one, {} evaluations", rows.len());
+    assert!(ratio < free + 0.01, "rounds reach what one reference reaches: {ratio} against {free}");
+}
+
+#[test]
+fn the_gradient_is_exact_in_a_later_round() {
+    let (mut problem, settings) = quick();
+    shape(&mut problem).limits.inversion_share = 0.3;
+    let (optimised, _) = run(&mut problem, &Optimizer { max_evaluations: 12, ..settings }, &mut Silent);
+    assert!(shape(&mut problem).motion.round() >= 1);
+    let certificates =
+        certify_all(&problem, &optimised.best.values, &Settings::default(), |_, _, _| {}).unwrap();
+    let Certificate { holds, least_slope, largest_error, .. } = certificates.objective;
+    assert!(holds, "slope {least_slope}, error {largest_error}");
+}
+
+#[test]
+fn a_quality_that_stops_the_search_is_never_passed() {
+    let (mut problem, settings) = quick();
+    // The free run falls to 0.094.
+    shape(&mut problem).limits.least_quality = 0.15;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    check_rows(&optimised, &rows, 0.15);
+    assert!(!told.0.is_empty() && told.0[0].cause.contains("minimum_quality"), "{:?}", told.0);
+    assert!(rows[optimised.best.evaluation].ratio < 0.9, "what was reached is kept");
+}
+
+#[test]
+fn without_rounds_the_box_shrinks_and_the_reference_stays() {
+    let (mut problem, settings) = quick();
+    shape(&mut problem).limits.least_quality = 0.15;
+    shape(&mut problem).limits.rounds = 0;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
+    check_rows(&optimised, &rows, 0.15);
+    assert!(!told.0.is_empty());
+    assert!(
+        told.0.iter().all(|event| event.kind == RoundKind::SmallerSteps && event.round == 0),
+        "{:?}",
+        told.0
+    );
+    assert!(rows[optimised.best.evaluation].ratio < 0.9);
+}
+
+#[test]
+fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
+    let (mut problem, settings) = quick();
+    let initial = problem.quality(&problem.original).worst;
     // A millionth below the initial quality: the first real step is refused, and every smaller one of note too.
-    let settings = Optimizer { minimum_quality: initial * (1.0 - 1e-6), max_evaluations: 40, ..settings };
-    let (optimised, rows) = run(&problem, &settings, &mut Silent);
+    let least = initial * (1.0 - 1e-6);
+    shape(&mut problem).limits.least_quality = least;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut told);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    check_rows(&optimised, &rows, least);
     assert_eq!(optimised.stop_reason, StopReason::MeshLimit, "{} rows", rows.len());
-    assert!(optimised.best.analysis.quality.worst >= settings.minimum_quality);
+    assert!(told.0.len() >= 3);
+}
+
+#[test]
+fn a_first_design_far_away_is_approached_in_steps() {
+    let (mut problem, settings) = quick();
+    let far = shape(&mut problem).upper.clone();
+    shape(&mut problem).initial = far;
+    shape(&mut problem).limits.inversion_share = 0.1;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut told);
+    check_rows(&optimised, &rows, 0.0);
+    assert!(told.0.len() > 1 && told.0.iter().all(|event| event.kind == RoundKind::Approach), "{:?}", told.0);
 }

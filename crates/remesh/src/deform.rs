@@ -6,9 +6,7 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::fem::{
-    BlockPattern, BoundGroup, Cholesky, CholeskyAnalysis, Coupling, CsrMatrix, DofMap, ElementGroup,
-};
+use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup};
 use fluxmorph_geometry::tet4::{Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
@@ -16,8 +14,10 @@ use crate::boundary::{Boundary, Constraints};
 use crate::elasticity::{Isotropic, Stiffness, stiffness};
 use crate::error::RemeshError;
 use crate::force::nodal_force;
+use crate::policy::StiffnessPolicy;
 use crate::restraint;
-use crate::subregion::{StiffnessPolicy, Subregion};
+use crate::solver::{ElasticSolver, SolverAnalysis, SolverChoice};
+use crate::subregion::Subregion;
 
 /// Which way the nodes of the elastic body may move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Guidance {
 pub struct RemeshSetup {
     /// The parts of the remesh region; their elements together are the region, and they do not overlap.
     pub subregions: Vec<Subregion>,
-    /// How stiffness follows element size, over the whole region.
+    /// How stiffness follows element size, over the whole region, on the first reference mesh; a rebase may take another.
     pub policy: StiffnessPolicy,
     /// Which way nodes may move; design nodes move as the design says.
     pub guidance: Guidance,
@@ -55,6 +55,8 @@ pub struct RemeshSetup {
     pub boundaries: Vec<Boundary>,
     /// Further nodes that do not move.
     pub fixed_nodes: Vec<NodeId>,
+    /// How the elastic system is solved.
+    pub solver: SolverChoice,
 }
 
 /// What follows from topology and set-up alone, and outlives a new reference mesh.
@@ -70,8 +72,9 @@ struct Plan {
     prescribed: DofMap<3>,
     stiffness: (BlockPattern<3>, BoundGroup<4>),
     coupling: (BlockPattern<3>, BoundGroup<4>),
-    /// `None` when there is no unknown.
-    analysis: Option<Arc<CholeskyAnalysis>>,
+    /// Positions in `elements` of the elements of `coupling`.
+    coupled: Vec<u32>,
+    analysis: SolverAnalysis,
     force: Option<Vec<f64>>,
 }
 
@@ -79,7 +82,8 @@ struct Plan {
 #[derive(Debug)]
 pub struct ElasticMap {
     plan: Arc<Plan>,
-    factor: Option<Cholesky>,
+    policy: StiffnessPolicy,
+    solver: ElasticSolver,
     /// `K_db`, shape `(n_unknowns, 3 n_design)`.
     coupling: CsrMatrix<f64>,
     offset: Vec<Point>,
@@ -89,45 +93,48 @@ impl ElasticMap {
     /// Assembles and factors the elastic system on the reference mesh.
     ///
     /// # Errors
-    /// Any set-up fault of [`RemeshError`], and [`fluxmorph_geometry::MeshError::Factorisation`].
+    /// Any set-up fault of [`RemeshError`], [`fluxmorph_geometry::MeshError::Factorisation`], and
+    /// [`RemeshError::NotConverged`] for a fictitious force.
     pub fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
-        Self::assembled(reference, Arc::new(Plan::new(reference, setup)?))
+        let policy = setup.policy;
+        Self::assembled(reference, Arc::new(Plan::new(reference, setup)?), policy)
     }
 
-    /// The map of the same set-up on a moved mesh of the same topology: a new reference. Pattern and symbolic factor are
-    /// kept, stiffness and numeric factor are new.
+    /// The map of the same set-up on a moved mesh of the same topology, a new reference, with this or another stiffness
+    /// policy. Pattern and symbolic factor are kept, stiffness and numeric factor are new.
     ///
     /// # Errors
-    /// [`fluxmorph_geometry::MeshError::Factorisation`].
+    /// [`fluxmorph_geometry::MeshError::Factorisation`], and [`RemeshError::NotConverged`] for a fictitious force.
     ///
     /// # Panics
     /// If the mesh has another topology.
-    pub fn rebased(&self, reference: &Mesh) -> Result<Self, RemeshError> {
+    pub fn rebased(&self, reference: &Mesh, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
         assert!(Arc::ptr_eq(reference.topology(), &self.plan.topology), "a rebase keeps the topology");
-        Self::assembled(reference, Arc::clone(&self.plan))
+        Self::assembled(reference, Arc::clone(&self.plan), policy)
     }
 
-    fn assembled(reference: &Mesh, plan: Arc<Plan>) -> Result<Self, RemeshError> {
-        let weights = plan.setup.policy.weights(reference, &plan.elements);
-        let element_matrix = |e: ElementId| -> Stiffness {
-            let i = e.index();
+    fn assembled(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
+        let weighting = policy.weighting(reference, &plan.elements);
+        let element_matrix = |i: usize| -> Stiffness {
             let law = plan.setup.subregions[plan.subregion_of[i] as usize].law();
-            let law = Isotropic { young: law.young * weights[i], ..law };
-            stiffness(&Tet4::new(reference.vertices(plan.elements[i])), &law)
+            let vertices = reference.vertices(plan.elements[i]);
+            let (factor, tensor) = weighting.of(vertices);
+            let law = Isotropic { young: law.young * factor, ..law };
+            stiffness(&Tet4::new(vertices), &law, &tensor)
         };
-        let assemble = |(pattern, group): &(BlockPattern<3>, BoundGroup<4>)| {
+        let stiffness_matrix = || {
+            let (pattern, group) = &plan.stiffness;
             let mut matrix = CsrMatrix::zeros(pattern.structure());
-            pattern.assemble(group, &mut matrix.values, element_matrix);
+            pattern.assemble(group, &mut matrix.values, |e| element_matrix(e.index()));
             matrix
         };
-        let coupling = assemble(&plan.coupling);
-        let factor = match &plan.analysis {
-            Some(analysis) => Some(Cholesky::new(analysis, &assemble(&plan.stiffness))?),
-            None => None,
-        };
-        let mut map = Self { plan, factor, coupling, offset: Vec::new() };
+        let (pattern, group) = &plan.coupling;
+        let mut coupling = CsrMatrix::zeros(pattern.structure());
+        pattern.assemble(group, &mut coupling.values, |e| element_matrix(plan.coupled[e.index()] as usize));
+        let solver = ElasticSolver::new(&plan.analysis, stiffness_matrix)?;
+        let mut map = Self { plan, policy, solver, coupling, offset: Vec::new() };
         map.offset = match map.plan.force.clone() {
-            Some(force) => map.solved(force),
+            Some(force) => map.solved(force)?,
             None => vec![[0.0; 3]; map.plan.topology.node_count()],
         };
         Ok(map)
@@ -136,23 +143,29 @@ impl ElasticMap {
     /// `Δx` of every mesh node [m] for the displacement `Δx_b` of the design nodes [m], shapes `(n_nodes, 3)` and
     /// `(n_design, 3)`: `offset + linear(Δx_b)`. Zero outside the remesh region.
     ///
+    /// # Errors
+    /// As [`ElasticMap::linear`].
+    ///
     /// # Panics
     /// If there is not one displacement per design node.
-    pub fn displacement(&self, design: &[Point]) -> Vec<Point> {
-        let mut displacement = self.linear(design);
+    pub fn displacement(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
+        let mut displacement = self.linear(design)?;
         for (u, o) in displacement.iter_mut().zip(&self.offset) {
             for d in 0..3 {
                 u[d] += o[d];
             }
         }
-        displacement
+        Ok(displacement)
     }
 
     /// The linear part: `Δx_d = −K_dd⁻¹ K_db Δx_b`, and `Δx_b` itself at the design nodes; shape `(n_nodes, 3)` [m].
     ///
+    /// # Errors
+    /// [`RemeshError::NotConverged`] when the iterative solver fails.
+    ///
     /// # Panics
     /// If there is not one displacement per design node.
-    pub fn linear(&self, design: &[Point]) -> Vec<Point> {
+    pub fn linear(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
         let plan = &self.plan;
         assert_eq!(design.len(), plan.design_nodes.len(), "one displacement per design node");
         let mut prescribed = vec![0.0; plan.prescribed.count()];
@@ -161,11 +174,11 @@ impl ElasticMap {
         }
         let mut right_side = vec![0.0; plan.unknowns.count()];
         self.coupling.mul(&prescribed, &mut right_side);
-        let mut displacement = self.solved(right_side);
+        let mut displacement = self.solved(right_side)?;
         for (node, u) in plan.design_nodes.iter().zip(design) {
             displacement[node.index()] = *u;
         }
-        displacement
+        Ok(displacement)
     }
 
     /// The constant part, `Δx_d = K_dd⁻¹ f_d`: what the fictitious force alone does; zero for `f = 0`. Shape
@@ -175,16 +188,14 @@ impl ElasticMap {
     }
 
     /// Solves for the unknowns and spreads them over the mesh nodes.
-    fn solved(&self, mut unknowns: Vec<f64>) -> Vec<Point> {
-        self.solve_in_place(&mut unknowns);
+    fn solved(&self, mut unknowns: Vec<f64>) -> Result<Vec<Point>, RemeshError> {
+        self.solver.solve_in_place(&mut unknowns)?;
         let topology = &self.plan.topology;
-        topology.nodes().map(|node| self.plan.unknowns.gather(&unknowns, node)).collect()
+        Ok(topology.nodes().map(|node| self.plan.unknowns.gather(&unknowns, node)).collect())
     }
 
-    pub(crate) fn solve_in_place(&self, right_side: &mut [f64]) {
-        if let Some(factor) = &self.factor {
-            factor.solve_in_place(right_side);
-        }
+    pub(crate) fn solver(&self) -> &ElasticSolver {
+        &self.solver
     }
 
     /// `K_db`.
@@ -202,6 +213,21 @@ impl ElasticMap {
         &self.plan.prescribed
     }
 
+    /// The stiffness policy of this reference.
+    pub fn policy(&self) -> StiffnessPolicy {
+        self.policy
+    }
+
+    /// What is remeshed and how, as given.
+    pub fn setup(&self) -> &RemeshSetup {
+        &self.plan.setup
+    }
+
+    /// Which way the nodes may move.
+    pub fn guidance(&self) -> Guidance {
+        self.plan.setup.guidance
+    }
+
     /// The design nodes, in the order of their displacements.
     pub fn design_nodes(&self) -> &[NodeId] {
         &self.plan.design_nodes
@@ -217,9 +243,9 @@ impl ElasticMap {
         self.plan.unknowns.count()
     }
 
-    /// Entries of the Cholesky factor: its memory is 8 bytes each.
-    pub fn factor_entries(&self) -> usize {
-        self.plan.analysis.as_ref().map_or(0, |analysis| analysis.factor_entries())
+    /// Bytes of the solver at most: the factors, and the matrix where it is kept.
+    pub fn solver_bytes(&self) -> usize {
+        self.plan.analysis.solver_bytes(self.plan.stiffness.0.structure())
     }
 
     /// Whether a displacement component at a node is an unknown of Eq. 3.
@@ -240,18 +266,21 @@ impl Plan {
         let prescribed = DofMap::<3>::new(node_count, |node, _| constraints.is_design[node.index()]);
         restraint::check(reference, &elements, &unknowns)?;
 
-        let connectivity = elements.iter().map(|&e| topology.tet(e)).collect();
-        let group = ElementGroup::new(node_count, connectivity, vec![Coupling::full(3); elements.len()]);
-        let bound = |columns| {
+        // Positions in `elements` of those at a design node: no other couples to the design.
+        let at_design = |e: ElementId| topology.tet(e).iter().any(|n| constraints.is_design[n.index()]);
+        let coupled: Vec<u32> =
+            (0..).zip(&elements).filter(|&(_, &e)| at_design(e)).map(|(position, _)| position).collect();
+        let bound = |columns, connectivity: Vec<[NodeId; 4]>| {
+            let couplings = vec![Coupling::full(3); connectivity.len()];
+            let group = ElementGroup::new(node_count, connectivity, couplings);
             let pattern = BlockPattern::rectangular(&unknowns, columns, &group);
             let group = pattern.bind(&group);
             (pattern, group)
         };
-        let (stiffness, coupling) = (bound(&unknowns), bound(&prescribed));
-        let analysis = match unknowns.count() {
-            0 => None,
-            _ => Some(CholeskyAnalysis::new(stiffness.0.structure())?),
-        };
+        let stiffness = bound(&unknowns, elements.iter().map(|&e| topology.tet(e)).collect());
+        let at_coupled = coupled.iter().map(|&position| topology.tet(elements[position as usize]));
+        let coupling = bound(&prescribed, at_coupled.collect());
+        let analysis = SolverAnalysis::new(setup.solver, &unknowns, stiffness.0.structure())?;
         let force = nodal_force(&topology, &setup.subregions, &unknowns);
         let design_nodes = constraints.design_nodes;
         Ok(Self {
@@ -264,6 +293,7 @@ impl Plan {
             prescribed,
             stiffness,
             coupling,
+            coupled,
             analysis,
             force,
         })

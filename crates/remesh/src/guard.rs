@@ -11,6 +11,9 @@ use rayon::prelude::*;
 
 use crate::error::RemeshError;
 
+/// Elements that one task looks at: within it, what cannot come before the first inversion so far is passed over.
+const CHUNK: usize = 1024;
+
 /// The first inversion along a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepToInversion {
@@ -29,17 +32,20 @@ pub struct StepToInversion {
 pub fn step_to_inversion(mesh: &Mesh, displacement: &[Point]) -> StepToInversion {
     assert_eq!(displacement.len(), mesh.points().len(), "one displacement per node");
     let never = (f64::INFINITY, None);
-    let (step, element) = mesh
-        .topology()
-        .tets()
-        .par_iter()
-        .enumerate()
-        .map(|(e, tet)| {
-            let element = ElementId::new(e);
-            let step = first_root(mesh.vertices(element), tet.map(|n| displacement[n.index()]));
-            (step, step.is_finite().then_some(element))
+    let earlier = |a: (f64, Option<ElementId>), b: (f64, Option<ElementId>)| {
+        if (b.0, b.1.is_none(), b.1) < (a.0, a.1.is_none(), a.1) { b } else { a }
+    };
+    let chunks = mesh.topology().tets().par_chunks(CHUNK).enumerate().map(|(chunk, tets)| {
+        tets.iter().enumerate().fold(never, |first, (i, tet)| {
+            let element = ElementId::new(chunk * CHUNK + i);
+            let moved = tet.map(|n| displacement[n.index()]);
+            match first_root(mesh.vertices(element), moved, first.0) {
+                Some(step) => earlier(first, (step, step.is_finite().then_some(element))),
+                None => first,
+            }
         })
-        .reduce(|| never, |a, b| if (b.0, b.1.is_none(), b.1) < (a.0, a.1.is_none(), a.1) { b } else { a });
+    });
+    let (step, element) = chunks.reduce(|| never, earlier);
     StepToInversion { step, element }
 }
 
@@ -54,10 +60,9 @@ pub fn check_step(mesh: &Mesh, displacement: &[Point]) -> Result<Mesh, RemeshErr
             let first = step_to_inversion(mesh, displacement);
             // Rounding may put the root of an element that ends up flat just beyond the step.
             let element = first.element.filter(|_| first.step <= 1.0).unwrap_or(worst);
-            let region = mesh.topology().region_of()[element.index()];
             Err(RemeshError::Inverted {
                 element,
-                region: mesh.topology().region_names()[region.index()].clone(),
+                region: mesh.topology().region_name_at(element).to_owned(),
                 centroid: tet4::centroid(mesh.vertices(element)),
                 fraction: first.step.min(1.0),
             })
@@ -66,12 +71,13 @@ pub fn check_step(mesh: &Mesh, displacement: &[Point]) -> Result<Mesh, RemeshErr
     }
 }
 
-/// Smallest positive `s` at which the tetrahedron `x + s u` has no volume; infinite if there is none.
-fn first_root(vertices: [Point; 4], displacement: [Point; 4]) -> f64 {
+/// Smallest positive `s` at which the tetrahedron `x + s u` has no volume, infinite if there is none; `None` where it is
+/// known without solving to lie beyond `known`.
+fn first_root(vertices: [Point; 4], displacement: [Point; 4], known: f64) -> Option<f64> {
     let edges = [1, 2, 3].map(|v| sub(vertices[v], vertices[0]));
     let changes = [1, 2, 3].map(|v| sub(displacement[v], displacement[0]));
     if changes == [[0.0; 3]; 3] {
-        return f64::INFINITY;
+        return Some(f64::INFINITY);
     }
     let ([e1, e2, e3], [u1, u2, u3]) = (edges, changes);
     let determinant = |a, b, c| dot(a, cross(b, c));
@@ -80,18 +86,25 @@ fn first_root(vertices: [Point; 4], displacement: [Point; 4]) -> f64 {
     let c2 = determinant(e1, u2, u3) + determinant(u1, e2, u3) + determinant(u1, u2, e3);
     let c3 = determinant(u1, u2, u3);
     let monic = [c1 / c0, c2 / c0, c3 / c0];
-    if monic.iter().all(|c| c.is_finite()) { 1.0 / largest_positive_root(monic) } else { 0.0 }
+    if !monic.iter().all(|c| c.is_finite()) {
+        return Some(0.0);
+    }
+    let bound = root_bound(monic);
+    (bound * known >= 1.0 || known.is_infinite()).then(|| 1.0 / largest_positive_root(monic, bound))
 }
 
-/// Largest positive root of `q(t) = t³ + a t² + b t + c`; zero if there is none.
-fn largest_positive_root([a, b, c]: [f64; 3]) -> f64 {
-    // Beyond 1.84 r no cubic with these coefficients has a root: 1 − x − x² − x³ > 0 for x = r/t < 1/1.8393.
-    let radius = a.abs().max(b.abs().sqrt()).max(c.abs().cbrt());
-    if radius == 0.0 {
+/// No root of `t³ + a t² + b t + c` is larger: with `r` the largest of `|a|`, `|b|^½`, `|c|^⅓` and `x = r/t`, a root needs
+/// `1 − x − x² − x³ ≤ 0`, that is `t ≤ 1.8393 r`.
+fn root_bound([a, b, c]: [f64; 3]) -> f64 {
+    1.84 * a.abs().max(b.abs().sqrt()).max(c.abs().cbrt())
+}
+
+/// Largest positive root of `q(t) = t³ + a t² + b t + c`, of which `bound` is an upper bound; zero if there is none.
+fn largest_positive_root([a, b, c]: [f64; 3], bound: f64) -> f64 {
+    if bound == 0.0 {
         return 0.0;
     }
     let q = |t: f64| ((t + a) * t + b) * t + c;
-    let bound = 1.84 * radius;
     // Local minimum and maximum of q, where they exist, without cancellation.
     let discriminant = a * a - 3.0 * b;
     if discriminant > 0.0 {
@@ -126,6 +139,10 @@ fn bisected(q: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn root(coefficients: [f64; 3]) -> f64 {
+        largest_positive_root(coefficients, root_bound(coefficients))
+    }
+
     #[test]
     fn roots_of_cubics_in_every_arrangement_are_found() {
         // (t − r0)(t − r1)(t − r2)
@@ -136,15 +153,15 @@ mod tests {
             [[1.0, 2.0, 3.0], [-1.0, 2.0, 0.5], [-3.0, -2.0, 0.25], [1e-6, 1.0, 1e3], [-1e3, 7.0, -1.0]]
         {
             let largest = roots.iter().copied().fold(0.0, f64::max);
-            let found = largest_positive_root(cubic(roots));
+            let found = root(cubic(roots));
             assert!((found / largest - 1.0).abs() < 1e-9, "{roots:?}: {found}");
         }
-        assert_eq!(largest_positive_root(cubic([-1.0, -2.0, -3.0])), 0.0);
+        assert_eq!(root(cubic([-1.0, -2.0, -3.0])), 0.0);
         // t³ − 2 t² + 2 t − 1 = (t − 1)(t² − t + 1); a monotone one: t³ + t − 2 = (t − 1)(t² + t + 2).
-        assert!((largest_positive_root([-2.0, 2.0, -1.0]) - 1.0).abs() < 1e-12);
-        assert!((largest_positive_root([0.0, 1.0, -2.0]) - 1.0).abs() < 1e-12);
+        assert!((root([-2.0, 2.0, -1.0]) - 1.0).abs() < 1e-12);
+        assert!((root([0.0, 1.0, -2.0]) - 1.0).abs() < 1e-12);
         // Quadratic and linear volumes: c = 0, b = 0.
-        assert!((largest_positive_root([-0.5, 0.0, 0.0]) - 0.5).abs() < 1e-12);
-        assert_eq!(largest_positive_root([0.5, 0.0, 0.0]), 0.0);
+        assert!((root([-0.5, 0.0, 0.0]) - 0.5).abs() < 1e-12);
+        assert_eq!(root([0.5, 0.0, 0.0]), 0.0);
     }
 }

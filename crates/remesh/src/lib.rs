@@ -3,8 +3,10 @@
 //! The design nodes move by `Δx_b`; a fictitious elastic body, frozen on the reference mesh, carries the motion to all
 //! other nodes of the remesh region: `K_dd Δx_d = f_d − K_db Δx_b`. [`ElasticMap`] is that affine map and its
 //! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Who moves freely, slides or stays is decided
-//! in [`boundary`], the stiffness in [`subregion`], the fictitious force `f` in [`force`]. [`guard`] says how far a
-//! motion may go before the first element inverts, and refuses an inverted mesh.
+//! in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
+//! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,
+//! each frozen on its own reference mesh, [`travel`] takes a given motion in as many of them as needed, and [`rescue`] is
+//! what is tried when one cannot move on; [`smoothing`] is its last remedy.
 
 pub mod boundary;
 pub mod deform;
@@ -12,13 +14,25 @@ pub mod elasticity;
 pub mod error;
 pub mod force;
 pub mod guard;
+pub mod motion;
+pub mod policy;
+pub mod rescue;
 mod restraint;
 mod sensitivity;
+pub mod smoothing;
+mod solver;
 pub mod subregion;
+pub mod travel;
 
 pub use boundary::{Boundary, BoundaryKind};
 pub use deform::{ElasticMap, Guidance, RemeshSetup};
 pub use elasticity::Isotropic;
 pub use error::RemeshError;
 pub use guard::{StepToInversion, check_step, step_to_inversion};
-pub use subregion::{StiffnessPolicy, Subregion};
+pub use motion::{Motion, Moved};
+pub use policy::StiffnessPolicy;
+pub use rescue::{Rescue, Rescued, Rung};
+pub use smoothing::{Smoothed, SmoothingSettings, least_shape, smooth, smooth_points};
+pub use solver::SolverChoice;
+pub use subregion::Subregion;
+pub use travel::{Event, Limits, Travelled};

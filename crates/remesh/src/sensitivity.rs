@@ -4,6 +4,7 @@ use fluxmorph_geometry::NodeId;
 use fluxmorph_geometry::tet4::Point;
 
 use crate::deform::ElasticMap;
+use crate::error::RemeshError;
 
 impl ElasticMap {
     /// `dF/dΔx_b = g_b − K_bd K_dd⁻¹ g_d` at the design nodes, shape `(n_design, 3)`, from `g = ∂F/∂x` at all mesh
@@ -12,22 +13,25 @@ impl ElasticMap {
     /// One solve, whatever the number of design nodes. It is the exact transpose of [`ElasticMap::linear`]; the constant
     /// part of the map has no say in the gradient. Values of `g` where nothing moves are not used.
     ///
+    /// # Errors
+    /// [`RemeshError::NotConverged`] when the iterative solver fails.
+    ///
     /// # Panics
     /// If `nodal` does not have one entry per mesh node.
-    pub fn gradient(&self, nodal: &[Point]) -> Vec<Point> {
+    pub fn gradient(&self, nodal: &[Point]) -> Result<Vec<Point>, RemeshError> {
         let (unknowns, prescribed) = (self.unknowns(), self.prescribed());
         assert_eq!(nodal.len(), unknowns.node_count(), "one derivative per mesh node");
         let mut adjoint = vec![0.0; unknowns.count()];
         for (node, &g) in (0..).map(NodeId).zip(nodal) {
             unknowns.scatter_add(&mut adjoint, node, g);
         }
-        self.solve_in_place(&mut adjoint);
+        self.solver().solve_in_place(&mut adjoint)?;
         let mut carried = vec![0.0; prescribed.count()];
         self.coupling().mul_transposed(&adjoint, &mut carried);
         let at = |&node: &NodeId| {
             let (own, carried) = (nodal[node.index()], prescribed.gather(&carried, node));
             std::array::from_fn(|d| own[d] - carried[d])
         };
-        self.design_nodes().iter().map(at).collect()
+        Ok(self.design_nodes().iter().map(at).collect())
     }
 }

@@ -5,12 +5,10 @@ mod support;
 
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshSetup, StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy,
+    Subregion,
 };
 use support::{Point, at, largest_difference, nodes_where, noise, outer_design, random, unit_cells, whole};
-
-const POLICIES: [StiffnessPolicy; 3] =
-    [StiffnessPolicy::Uniform, StiffnessPolicy::InverseSize, StiffnessPolicy::InverseVolume];
 
 /// A distorted block, one mesh region, cut into two subregions of different law across x.
 fn two_laws(mesh: &Mesh, young: [f64; 2], poisson: [f64; 2]) -> Vec<Subregion> {
@@ -41,7 +39,7 @@ fn mixed(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> Re
         guidance: Guidance::Free,
         design_nodes: nodes_where(mesh, |p| p[2] == top && (2.0..=3.0).contains(&p[0])),
         boundaries: kinds.map(boundary).to_vec(),
-        fixed_nodes: Vec::new(),
+        ..RemeshSetup::default()
     }
 }
 
@@ -58,7 +56,7 @@ fn affine_motion_of_the_boundary_is_reproduced_by_any_one_law() {
     for (young, poisson) in [(1.0, 0.3), (1e8, 0.3), (2.0, 0.0), (2.0, 0.45)] {
         let subregions = vec![Subregion { young, poisson, ..whole(&mesh).remove(0) }];
         let map = ElasticMap::new(&mesh, outer_design(&mesh, subregions, StiffnessPolicy::Uniform)).unwrap();
-        let u = map.displacement(&at(&mesh, map.design_nodes(), affine));
+        let u = map.displacement(&at(&mesh, map.design_nodes(), affine)).unwrap();
         // Displacements of up to 3 m on a mesh of 6 m: 1e-12 is rounding.
         assert!(largest_difference(&u, &at(&mesh, &all(&mesh), affine)) < 1e-12);
     }
@@ -67,29 +65,29 @@ fn affine_motion_of_the_boundary_is_reproduced_by_any_one_law() {
 #[test]
 fn translation_and_rotation_are_reproduced_by_any_law() {
     let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
-    for policy in POLICIES {
+    for policy in StiffnessPolicy::ALL {
         let subregions = two_laws(&mesh, [1.0, 40.0], [0.0, 0.45]);
         let map = ElasticMap::new(&mesh, outer_design(&mesh, subregions, policy)).unwrap();
         // A linearised rotation has no strain in any law; a finite one is affine, and needs one law.
         let turn =
             |x: Point| [0.3 - 0.2 * x[1] + 0.1 * x[2], 0.2 * x[0] - 0.4 * x[2], 0.4 * x[1] - 0.1 * x[0]];
-        let u = map.displacement(&at(&mesh, map.design_nodes(), turn));
+        let u = map.displacement(&at(&mesh, map.design_nodes(), turn)).unwrap();
         assert!(largest_difference(&u, &at(&mesh, &all(&mesh), turn)) < 1e-12, "{policy:?}");
     }
     let map = ElasticMap::new(&mesh, outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform)).unwrap();
     let turn = support::rotation(1.0);
-    let u = map.displacement(&at(&mesh, map.design_nodes(), &turn));
+    let u = map.displacement(&at(&mesh, map.design_nodes(), &turn)).unwrap();
     assert!(largest_difference(&u, &at(&mesh, &all(&mesh), &turn)) < 1e-12);
 }
 
 #[test]
 fn without_force_the_motion_is_independent_of_young() {
     let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
-    for policy in POLICIES {
+    for policy in StiffnessPolicy::ALL {
         let motion = |scale: f64| {
             let subregions = two_laws(&mesh, [0.5 * scale, 3.0 * scale], [0.3, 0.1]);
             let map = ElasticMap::new(&mesh, mixed(&mesh, subregions, policy)).unwrap();
-            map.displacement(&random(map.design_nodes().len(), 1))
+            map.displacement(&random(map.design_nodes().len(), 1)).unwrap()
         };
         assert!(largest_difference(&motion(1.0), &motion(1e9)) < 1e-12);
     }
@@ -106,13 +104,14 @@ fn motion_depends_on_force_over_young_and_force_is_the_constant_part() {
     };
     let (one, large) = (map(1.0), map(1e6));
     let design = random(one.design_nodes().len(), 2);
-    let (u, v) = (one.displacement(&design), large.displacement(&design));
+    let (u, v) = (one.displacement(&design).unwrap(), large.displacement(&design).unwrap());
     assert!(largest_difference(&u, &v) < 1e-12);
 
     assert!(largest_difference(one.offset(), &vec![[0.0; 3]; u.len()]) > 1e-3);
-    assert_eq!(one.displacement(&vec![[0.0; 3]; design.len()]), one.offset());
+    assert_eq!(one.displacement(&vec![[0.0; 3]; design.len()]).unwrap(), one.offset());
     let sum: Vec<Point> = one
         .linear(&design)
+        .unwrap()
         .iter()
         .zip(one.offset())
         .map(|(a, b)| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
@@ -126,7 +125,7 @@ fn the_gradient_is_the_transposed_map() {
     let inner = |a: &[Point], b: &[Point]| -> f64 {
         a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| x * y).sum()
     };
-    for policy in POLICIES {
+    for policy in StiffnessPolicy::ALL {
         let mut setup = mixed(&mesh, two_laws(&mesh, [0.5, 30.0], [0.3, 0.1]), policy);
         setup.subregions[0].force = [0.0, 0.0, -1.0];
         setup.design_nodes.reverse();
@@ -134,7 +133,8 @@ fn the_gradient_is_the_transposed_map() {
         for seed in 0..5 {
             let x = random(map.design_nodes().len(), 2 * seed + 1);
             let y = random(mesh.points().len(), 2 * seed + 2);
-            let (forward, transposed) = (inner(&map.linear(&x), &y), inner(&x, &map.gradient(&y)));
+            let (forward, transposed) =
+                (inner(&map.linear(&x).unwrap(), &y), inner(&x, &map.gradient(&y).unwrap()));
             assert!((forward - transposed).abs() <= 1e-12 * forward.abs().max(1.0), "{forward} {transposed}");
         }
     }
@@ -149,16 +149,16 @@ fn guided_motion_stays_on_its_axis_and_keeps_patch_test_and_transpose() {
     let map = ElasticMap::new(&mesh, setup).unwrap();
     let free = ElasticMap::new(&mesh, outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform)).unwrap();
     assert_eq!(3 * map.equation_count(), free.equation_count());
-    let u = map.displacement(&at(&mesh, map.design_nodes(), affine));
+    let u = map.displacement(&at(&mesh, map.design_nodes(), affine)).unwrap();
     assert!(largest_difference(&u, &at(&mesh, &all(&mesh), affine)) < 1e-12);
 
-    for policy in POLICIES {
+    for policy in StiffnessPolicy::ALL {
         let map = ElasticMap::new(&mesh, guided(mixed(&mesh, whole(&mesh), policy))).unwrap();
         let along =
             |points: Vec<Point>| -> Vec<Point> { points.into_iter().map(|p| [0.0, 0.0, p[2]]).collect() };
         let x = along(random(map.design_nodes().len(), 5));
         let y = random(mesh.points().len(), 6);
-        let (tx, ty) = (map.linear(&x), map.gradient(&y));
+        let (tx, ty) = (map.linear(&x).unwrap(), map.gradient(&y).unwrap());
         assert!(tx.iter().all(|u| u[0] == 0.0 && u[1] == 0.0));
         let product = |a: &[Point], b: &[Point]| -> f64 {
             a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
@@ -176,8 +176,8 @@ fn map_and_transpose_have_the_same_bits_for_any_number_of_threads() {
         pool.install(|| {
             let setup = mixed(&mesh, two_laws(&mesh, [0.5, 30.0], [0.3, 0.1]), StiffnessPolicy::InverseSize);
             let map = ElasticMap::new(&mesh, setup).unwrap();
-            let u = map.displacement(&random(map.design_nodes().len(), 3));
-            let g = map.gradient(&random(u.len(), 4));
+            let u = map.displacement(&random(map.design_nodes().len(), 3)).unwrap();
+            let g = map.gradient(&random(u.len(), 4)).unwrap();
             u.iter().chain(&g).flatten().map(|v| v.to_bits()).collect::<Vec<_>>()
         })
     };
@@ -193,10 +193,66 @@ fn a_rebase_onto_the_moved_mesh_equals_a_new_map_there() {
     let first = ElasticMap::new(&mesh, setup()).unwrap();
     let mut noise = noise(5);
     let design: Vec<Point> = first.design_nodes().iter().map(|_| [0.0, 0.0, 0.2 * noise()]).collect();
-    let moved = mesh.moved(&first.displacement(&design)).unwrap();
-    let (rebased, new) = (first.rebased(&moved).unwrap(), ElasticMap::new(&moved, setup()).unwrap());
-    assert_eq!(rebased.displacement(&design), new.displacement(&design));
-    assert_ne!(rebased.displacement(&design), first.displacement(&design));
+    let moved = mesh.moved(&first.displacement(&design).unwrap()).unwrap();
+    let (rebased, new) = (
+        first.rebased(&moved, StiffnessPolicy::InverseSize).unwrap(),
+        ElasticMap::new(&moved, setup()).unwrap(),
+    );
+    assert_eq!(rebased.displacement(&design).unwrap(), new.displacement(&design).unwrap());
+    assert_ne!(rebased.displacement(&design).unwrap(), first.displacement(&design).unwrap());
+}
+
+/// The iterative solver stands in for the direct one: map and transpose agree to its tolerance times the condition.
+#[test]
+fn component_blocks_give_the_direct_solution_and_its_transpose() {
+    let mesh = support::shaken(&unit_cells([8, 7, 6]), 0.15);
+    for policy in StiffnessPolicy::ALL {
+        // Sliding sides split the patterns of the components; the outer design leaves them one.
+        let split = mixed(&mesh, two_laws(&mesh, [0.5, 30.0], [0.3, 0.1]), policy);
+        let alike = outer_design(&mesh, two_laws(&mesh, [0.5, 30.0], [0.0, 0.45]), policy);
+        for setup in [split, alike] {
+            let solved = |solver| {
+                let map = ElasticMap::new(&mesh, RemeshSetup { solver, ..setup.clone() }).unwrap();
+                let u = map.displacement(&random(map.design_nodes().len(), 3)).unwrap();
+                (u, map.gradient(&random(mesh.points().len(), 4)).unwrap())
+            };
+            let (u, g) = solved(SolverChoice::Direct);
+            let (v, h) = solved(SolverChoice::ComponentBlocks);
+            // Values of order one, a condition of some hundred.
+            assert!(largest_difference(&u, &v) < 1e-10, "{policy:?}");
+            assert!(largest_difference(&g, &h) < 1e-10, "{policy:?}");
+        }
+    }
+}
+
+#[test]
+fn a_system_that_cannot_be_solved_iteratively_is_an_error() {
+    let mesh = unit_cells([4, 4, 4]);
+    let setup = outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform);
+    let map = ElasticMap::new(&mesh, RemeshSetup { solver: SolverChoice::ComponentBlocks, ..setup }).unwrap();
+    let design = vec![[f64::NAN; 3]; map.design_nodes().len()];
+    let error = map.displacement(&design).unwrap_err();
+    assert!(matches!(error, RemeshError::NotConverged { unknowns: 81, .. }));
+    assert!(error.to_string().starts_with("the elastic system of 81 unknowns did not converge"), "{error}");
+}
+
+#[test]
+fn component_blocks_have_the_same_bits_for_any_number_of_threads() {
+    let mesh = support::shaken(&unit_cells([12, 11, 10]), 0.15);
+    let bits = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let setup = mixed(&mesh, whole(&mesh), StiffnessPolicy::Directional);
+            let setup = RemeshSetup { solver: SolverChoice::ComponentBlocks, ..setup };
+            let map = ElasticMap::new(&mesh, setup).unwrap();
+            let u = map.displacement(&random(map.design_nodes().len(), 3)).unwrap();
+            let g = map.gradient(&random(u.len(), 4)).unwrap();
+            u.iter().chain(&g).flatten().map(|v| v.to_bits()).collect::<Vec<_>>()
+        })
+    };
+    let one = bits(1);
+    assert_eq!(one, bits(2));
+    assert_eq!(one, bits(4));
 }
 
 /// Table 2: a block with a free top, bottom and sides fixed, and a line of five nodes on the top prescribed.

@@ -74,7 +74,7 @@ fn outcomes(policy: StiffnessPolicy, poisson: f64) -> [Outcome; 3] {
     let map =
         ElasticMap::new(&mesh, support::shield_setup(&mesh, &["plate", "remesh"], policy, poisson)).unwrap();
     SHAPES.map(|(name, shape)| {
-        let displacement = map.displacement(&thickened(&mesh, map.design_nodes(), shape));
+        let displacement = map.displacement(&thickened(&mesh, map.design_nodes(), shape)).unwrap();
         let step = step_to_inversion(&mesh, &displacement).step;
         let moved = check_step(&mesh, &displacement).ok();
         assert_eq!(moved.is_some(), step > 1.0);
@@ -120,6 +120,26 @@ fn stiffness_inverse_to_volume_inverts_at_the_usual_poisson_ratio() {
     assert!(thick.step < 1.0, "{}", thick.step);
 }
 
+/// What neither of the two others can: both keep two layers, or hold at every Poisson's ratio, not both.
+#[test]
+fn directional_stiffness_keeps_two_layers_at_every_usual_poisson_ratio() {
+    for poisson in [0.0, 0.2, 0.3] {
+        let directional = outcomes(StiffnessPolicy::Directional, poisson);
+        assert_protected(&directional, 2);
+        assert!(directional.iter().all(|outcome| outcome.step > 1.1));
+        let protected = |policy| {
+            outcomes(policy, poisson).iter().all(|outcome| {
+                let Some(kept) = outcome.layers else { return false };
+                outcome.step > 1.05 && [0, 1, 6, 7].iter().all(|&layer: &usize| kept[layer] >= 0.7)
+            })
+        };
+        assert!(!protected(StiffnessPolicy::Uniform));
+        assert!(!protected(StiffnessPolicy::InverseSize));
+        // Only just not at 0: the second layer keeps 0.69.
+        assert_eq!(protected(StiffnessPolicy::InverseVolume), poisson == 0.2);
+    }
+}
+
 /// The counterpart: why `uniform` is not the default.
 #[test]
 fn uniform_stiffness_loses_the_skin() {
@@ -135,7 +155,7 @@ fn the_hollow_shield_of_the_impedance_model_keeps_its_quality() {
         ElasticMap::new(&mesh, support::shield_setup(&mesh, &["remesh"], StiffnessPolicy::InverseSize, 0.3))
             .unwrap();
     for (name, shape) in SHAPES {
-        let displacement = map.displacement(&thickened(&mesh, map.design_nodes(), shape));
+        let displacement = map.displacement(&thickened(&mesh, map.design_nodes(), shape)).unwrap();
         let moved = check_step(&mesh, &displacement).unwrap();
         let q = QualityReport::of_elements(&moved, map.elements()).unwrap().worst;
         let step = step_to_inversion(&mesh, &displacement).step;

@@ -1,6 +1,6 @@
 //! Sparse Cholesky factorisation of real symmetric positive definite matrices: faer's supernodal `LLᵀ`.
 //!
-//! The analysis (ordering, elimination tree, supernodes) depends on the pattern only and is made once a run; the
+//! The factor is in double precision, or in single where it only preconditions. The analysis (ordering, elimination tree, supernodes) depends on the pattern only and is made once a run; the
 //! numbers are factored as often as they change.
 
 use std::num::NonZeroUsize;
@@ -14,6 +14,7 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::traits::RealField;
 use faer::{Conj, Par, Side};
 
 use crate::error::MeshError;
@@ -39,9 +40,20 @@ impl CholeskyAnalysis {
     /// # Errors
     /// [`MeshError::Factorisation`] when the factor does not fit the index type or the memory.
     pub fn new(structure: &Arc<CsrStructure>) -> Result<Arc<Self>, MeshError> {
+        Self::with_order(structure, ordering::nested_dissection(structure))
+    }
+
+    /// Analyses a structurally symmetric pattern in a given postordered elimination order, `order[new] = old`; by minimum
+    /// degree without one.
+    ///
+    /// # Errors
+    /// [`MeshError::Factorisation`] when the factor does not fit the index type or the memory.
+    pub(super) fn with_order(
+        structure: &Arc<CsrStructure>,
+        order: Option<Vec<u32>>,
+    ) -> Result<Arc<Self>, MeshError> {
         let n = structure.row_count();
         let symbolic_matrix = symbolic_matrix(structure);
-        let order = ordering::nested_dissection(structure);
         let inverse = order.as_ref().map(|forward| ordering::inverted(forward));
         let ordering = match (&order, &inverse) {
             (Some(forward), Some(inverse)) => {
@@ -61,14 +73,14 @@ impl CholeskyAnalysis {
     }
 }
 
-/// A numeric factor `P A Pᵀ = L Lᵀ`.
+/// A numeric factor `P A Pᵀ = L Lᵀ`, in `f64` or `f32`.
 #[derive(Debug)]
-pub struct Cholesky {
+pub struct Cholesky<T = f64> {
     analysis: Arc<CholeskyAnalysis>,
-    values: Vec<f64>,
+    values: Vec<T>,
 }
 
-impl Cholesky {
+impl<T: RealField> Cholesky<T> {
     /// Factors a matrix whose pattern was analysed.
     ///
     /// # Errors
@@ -76,7 +88,7 @@ impl Cholesky {
     ///
     /// # Panics
     /// If the matrix has another structure than the analysis.
-    pub fn new(analysis: &Arc<CholeskyAnalysis>, matrix: &CsrMatrix<f64>) -> Result<Self, MeshError> {
+    pub fn new(analysis: &Arc<CholeskyAnalysis>, matrix: &CsrMatrix<T>) -> Result<Self, MeshError> {
         assert!(
             Arc::ptr_eq(&analysis.structure, &matrix.structure),
             "the matrix has the structure that was analysed"
@@ -85,13 +97,13 @@ impl Cholesky {
         let failed = |cause: String| MeshError::Factorisation { unknowns: n, cause };
         let symbolic = &analysis.symbolic;
         let a = SparseColMatRef::new(symbolic_matrix(&matrix.structure), matrix.values.as_slice());
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(parallel(), Default::default());
+        let scratch = symbolic.factorize_numeric_llt_scratch::<T>(parallel(), Default::default());
         let mut memory = MemBuffer::try_new(scratch).map_err(|_| failed("out of memory".to_owned()))?;
         let mut values = Vec::new();
         values
             .try_reserve_exact(symbolic.len_val())
             .map_err(|_| failed("out of memory for the factor".to_owned()))?;
-        values.resize(symbolic.len_val(), 0.0);
+        values.resize(symbolic.len_val(), T::zero_impl());
         symbolic
             .factorize_numeric_llt(
                 &mut values,
@@ -115,7 +127,7 @@ impl Cholesky {
     ///
     /// # Panics
     /// If the length of `columns` is not a multiple of the size.
-    pub fn solve_in_place(&self, columns: &mut [f64]) {
+    pub fn solve_in_place(&self, columns: &mut [T]) {
         let n = self.size();
         if n == 0 {
             return;
@@ -123,7 +135,7 @@ impl Cholesky {
         assert_eq!(columns.len() % n, 0, "whole columns");
         let count = columns.len() / n;
         let right_sides = MatMut::from_column_major_slice_mut(columns, n, count);
-        let scratch = self.analysis.symbolic.solve_in_place_scratch::<f64>(count, Par::Seq);
+        let scratch = self.analysis.symbolic.solve_in_place_scratch::<T>(count, Par::Seq);
         let mut memory = MemBuffer::new(scratch);
         LltRef::new(&self.analysis.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,

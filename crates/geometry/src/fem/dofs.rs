@@ -36,6 +36,12 @@ impl<const C: usize> DofMap<C> {
         self.count
     }
 
+    /// Number of components that are unknown at some node.
+    pub fn component_count(&self) -> usize {
+        let unknown = |c: &usize| self.equations.iter().any(|equations| equations[*c] != NOT_AN_UNKNOWN);
+        (0..C).filter(unknown).count()
+    }
+
     /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.equations.len()

@@ -2,12 +2,15 @@
 //!
 //! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
 //! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`])
-//! and the sparse Cholesky factor ([`cholesky`]). Does not live here: any weak form, any material, any boundary
+//! the sparse Cholesky factor ([`cholesky`]) and, for systems too large for one, conjugate gradients
+//! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here: any weak form, any material, any boundary
 //! condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
 //! further nodes on their edges and use the same code with longer connectivity rows.
 
 pub mod assemble;
 pub mod cholesky;
+pub mod components;
+pub mod conjugate_gradients;
 pub mod csr;
 pub mod dofs;
 pub mod ordering;
@@ -16,6 +19,8 @@ pub mod scalar;
 
 pub use assemble::LocalMatrix;
 pub use cholesky::{Cholesky, CholeskyAnalysis};
+pub use components::{ComponentAnalysis, ComponentPreconditioner};
+pub use conjugate_gradients::{IterationReport, IterationStatus, conjugate_gradients};
 pub use csr::CsrMatrix;
 pub use dofs::DofMap;
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};

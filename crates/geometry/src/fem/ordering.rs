@@ -10,15 +10,15 @@ use faer::sparse::linalg::{cholesky::simplicial, qr};
 
 use crate::fem::csr::CsrStructure;
 
-/// A permutation: `forward[new] = old`.
+/// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
-    let dissection = metis_order(structure)?;
+    let dissection = dissection(structure)?;
     Some(postordered(structure, dissection))
 }
 
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
 #[cfg(feature = "metis")]
-fn metis_order(structure: &CsrStructure) -> Option<Vec<u32>> {
+pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
     use std::sync::Mutex;
 
     /// METIS draws from a random generator of the process: one caller at a time gets the same numbers every time.
@@ -63,7 +63,7 @@ fn metis_order(structure: &CsrStructure) -> Option<Vec<u32>> {
 
 /// Without METIS there is no dissection, and the factorisation falls back to minimum degree.
 #[cfg(not(feature = "metis"))]
-fn metis_order(_: &CsrStructure) -> Option<Vec<u32>> {
+pub fn dissection(_: &CsrStructure) -> Option<Vec<u32>> {
     None
 }
 
@@ -77,7 +77,7 @@ pub fn inverted(forward: &[u32]) -> Vec<u32> {
 }
 
 /// An ordering with the same fill whose elimination tree is postordered.
-fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
+pub fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
     let n = forward.len();
     let inverse = inverted(&forward);
     let mut starts = vec![0u32];

@@ -10,4 +10,6 @@ pub mod vtu;
 pub use msh::{MshEncoding, MshError, MshMesh, MshNotices, msh_bytes, read_msh, read_msh_file};
 pub use pvd::pvd_text;
 pub use stl::stl_bytes;
-pub use vtu::{ArrayData, Field, VtuArray, VtuContents, read_vtu, vtu_bytes, vtu_contents, write_vtu};
+pub use vtu::{
+    ArrayData, Field, VtuArray, VtuContents, read_vtu, vtu_bytes, vtu_bytes_at, vtu_contents, write_vtu,
+};

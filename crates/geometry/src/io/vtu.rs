@@ -22,6 +22,7 @@ use crate::error::MeshError;
 use crate::ids::NodeId;
 use crate::mesh::Mesh;
 use crate::tet4::Point;
+use crate::topology::Topology;
 
 /// Bytes of one compressed block in the library.
 const BLOCK_BYTES: usize = 32_768;
@@ -84,12 +85,25 @@ pub fn vtu_bytes(
     point_data: &[Field<'_>],
     cell_data: &[Field<'_>],
 ) -> Result<Vec<u8>, MeshError> {
-    let topology = mesh.topology();
+    vtu_bytes_at(mesh.topology(), mesh.points(), point_data, cell_data)
+}
+
+/// The same for any places of the nodes [m], shape `(n_nodes, 3)`: to look at elements that a motion inverts.
+///
+/// # Errors
+/// As [`vtu_bytes`].
+pub fn vtu_bytes_at(
+    topology: &Topology,
+    points: &[Point],
+    point_data: &[Field<'_>],
+    cell_data: &[Field<'_>],
+) -> Result<Vec<u8>, MeshError> {
+    check(&[Field { name: "points", data: ArrayData::Vector(points) }], topology.node_count())?;
     check(point_data, topology.node_count())?;
     check(cell_data, topology.tets().len())?;
 
     let piece = UnstructuredGridPiece {
-        points: IOBuffer::F64(mesh.points().as_flattened().to_vec()),
+        points: IOBuffer::F64(points.as_flattened().to_vec()),
         cells: Cells {
             cell_verts: VertexNumbers::XML {
                 connectivity: topology.tets().iter().flatten().map(|n| u64::from(n.0)).collect(),
@@ -102,8 +116,11 @@ pub fn vtu_bytes(
             cell: cell_data.iter().map(attribute).collect(),
         },
     };
-    let compressor =
-        if fills_blocks(mesh, point_data, cell_data) { Compressor::None } else { Compressor::ZLib };
+    let compressor = if fills_blocks(topology, points, point_data, cell_data) {
+        Compressor::None
+    } else {
+        Compressor::ZLib
+    };
     let vtk = Vtk {
         version: Version::new_xml(1, 0),
         title: String::new(),
@@ -178,8 +195,13 @@ pub fn vtu_contents(bytes: &[u8]) -> Result<VtuContents, MeshError> {
 }
 
 /// Whether an array's bytes fill whole blocks of the library (see the module).
-fn fills_blocks(mesh: &Mesh, point_data: &[Field<'_>], cell_data: &[Field<'_>]) -> bool {
-    let (nodes, elements) = (mesh.points().len(), mesh.topology().tets().len());
+fn fills_blocks(
+    topology: &Topology,
+    points: &[Point],
+    point_data: &[Field<'_>],
+    cell_data: &[Field<'_>],
+) -> bool {
+    let (nodes, elements) = (points.len(), topology.tets().len());
     let topology = [24 * nodes, 32 * elements, 8 * elements, elements];
     let fields = point_data.iter().chain(cell_data).map(|field| match field.data {
         ArrayData::Scalar(values) => 8 * values.len(),

@@ -26,6 +26,8 @@ pub enum Command {
     Run(RunArgs),
     /// One field analysis of the initial design, or of a given one
     Solve(SolveArgs),
+    /// Move the mesh as [morph] prescribes, without a field; print the quality before and after
+    Morph(MorphArgs),
     /// Read the configuration and build the mesh, without solving; print what they are
     Check(CheckArgs),
     /// Gradient certificate: Taylor remainders and central differences in random directions
@@ -90,6 +92,18 @@ pub struct SolveArgs {
     /// Design to analyse: a result.json, or a JSON array of lengths in metres
     #[arg(long, value_name = "FILE")]
     pub design: Option<PathBuf>,
+}
+
+/// Options of `morph`.
+#[derive(Debug, Args)]
+pub struct MorphArgs {
+    /// The common options.
+    #[command(flatten)]
+    pub common: CommonArgs,
+
+    /// Search for the elastic parameters that keep the worst element best, and write them to tuned.toml
+    #[arg(long)]
+    pub tune: bool,
 }
 
 /// Options of `check`.

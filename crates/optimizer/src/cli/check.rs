@@ -8,6 +8,7 @@ use super::exit::ExitCode;
 use super::{stdout, with_threads};
 use crate::config::{Config, MeshConfig, RegionModel, Source};
 use crate::error::Error;
+use crate::morph::{self, MotionSummary};
 use crate::setup::{Purpose, Setup, set_up};
 
 /// Set the problem up and print what it is, as a table or JSON.
@@ -43,6 +44,7 @@ struct Summary {
     surfaces: Vec<SurfaceSummary>,
     quality: QualitySummary,
     skin: Vec<SkinSummary>,
+    motions: Vec<MotionSummary>,
     memory_estimate_bytes: usize,
     warnings: Vec<String>,
 }
@@ -103,7 +105,8 @@ fn model_name(model: RegionModel) -> &'static str {
 }
 
 fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
-    let setup: Setup = set_up(config, source, Purpose::Analysis)?;
+    let setup: Setup = set_up(config, source, Purpose::Inspection)?;
+    let motions = morph::inspected(config, source)?;
     let mesh = &setup.full_mesh;
     let topology = mesh.topology();
     let mut regions: Vec<RegionSummary> = topology
@@ -142,7 +145,7 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
         })
         .collect::<Result<_, Error>>()?;
     let problem = &setup.problem;
-    let quality = problem.quality(&problem.reference);
+    let quality = problem.quality(&problem.original);
     let [poor, fair, good] = quality.shares();
     let skin = setup
         .audits
@@ -156,7 +159,7 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
             thickness_in_skin_depths: audited.audit.thickness_in_skin_depths,
         })
         .collect();
-    let reference = problem.reference.topology();
+    let reference = problem.original.topology();
     Ok(Summary {
         title: config.title.clone(),
         mesh_file: match &config.mesh {
@@ -168,7 +171,7 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
         nodes: reference.node_count(),
         tets: reference.tets().len(),
         unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
-        elastic_equations: problem.shape.as_ref().map_or(0, |shape| shape.map.equation_count()),
+        elastic_equations: problem.shape.as_ref().map_or(0, |shape| shape.motion.map().equation_count()),
         design_variables: problem.shape.as_ref().map_or(0, |shape| shape.surface.variable_count()),
         bounding_box_m: mesh.bounding_box(),
         regions,
@@ -183,6 +186,7 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
             from_0_6: good,
         },
         skin,
+        motions,
         memory_estimate_bytes: problem.memory_estimate(),
         warnings: setup.warnings,
     })
@@ -251,6 +255,22 @@ fn table(summary: &Summary) -> String {
             s.skin_depth_m * 1e3,
             format!("{:.2} (least {:.2})", s.median_elements_per_skin_depth, s.least_elements_per_skin_depth),
             s.thickness_in_skin_depths
+        );
+    }
+    if !summary.motions.is_empty() {
+        text += &format!(
+            "\n{:<18}{:>12}{:>14}{:>18}{:>12}\n",
+            "motion", "moved nodes", "largest mm", "elements of body", "equations"
+        );
+    }
+    for m in &summary.motions {
+        text += &format!(
+            "{:<18}{:>12}{:>14.3}{:>18}{:>12}\n",
+            m.name,
+            m.moved_nodes,
+            m.largest_displacement_m * 1e3,
+            m.elements,
+            m.equations
         );
     }
     for warning in &summary.warnings {

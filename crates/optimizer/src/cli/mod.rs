@@ -5,6 +5,7 @@ mod check;
 mod exit;
 mod gradient;
 mod interrupt;
+mod morph;
 mod run;
 mod solve;
 pub mod stdout;
@@ -35,6 +36,7 @@ pub fn main() -> std::process::ExitCode {
     let outcome = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Solve(args) => solve::solve(args),
+        Command::Morph(args) => morph::morph(args),
         Command::Check(args) => check::check(args),
         Command::Gradient(args) => gradient::gradient(args),
     };

@@ -65,6 +65,18 @@ impl Default for LinearSolver {
     }
 }
 
+/// What a motion of the mesh alone is read with: magnetostatic.
+impl Default for Analysis {
+    fn default() -> Self {
+        Self {
+            frequencies: Frequencies::One(0.0),
+            penalty: 1.0,
+            order: ElementOrder::Linear,
+            linear_solver: LinearSolver::default(),
+        }
+    }
+}
+
 impl Analysis {
     pub(super) fn read(section: &Section<'_>) -> Self {
         let frequencies = Frequencies::read(section);

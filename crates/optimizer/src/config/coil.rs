@@ -307,7 +307,7 @@ fn read_path(section: &Section<'_>) -> CoilPath {
 }
 
 /// `axis`: the name of a coordinate, or a vector.
-fn read_axis(section: &Section<'_>) -> Axis {
+pub(super) fn read_axis(section: &Section<'_>) -> Axis {
     let default = Axis::Coordinate(AxisWord::Z);
     if !section.is_list("axis") {
         return section.choice("axis").map_or(default, Axis::Coordinate);

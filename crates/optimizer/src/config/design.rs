@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Dimension;
 use super::choice::choice;
 use super::coil::AxisWord;
+use super::initial::InitialDesign;
 use super::range::Range;
 use super::section::Section;
 
@@ -26,8 +27,8 @@ pub struct Design {
     pub lower: f64,
     /// Greatest displacement [m].
     pub upper: f64,
-    /// Displacement that the optimisation starts from [m]. Default 0: the mesh as it is.
-    pub initial: f64,
+    /// Where the optimisation starts.
+    pub initial: InitialDesign,
     /// Planes over which mirrored variables are tied. Default none.
     pub symmetry: Vec<SymmetryPlane>,
 }
@@ -85,10 +86,7 @@ impl Design {
         }
         let rim = section.choice("rim").unwrap_or(RimMotion::Free);
         let (lower, upper) = (length("lower", Range::FINITE), length("upper", Range::FINITE));
-        let initial = length("initial", Range::FINITE);
-        if let (Some(lower), Some(upper)) = (lower, upper) {
-            check_bounds(&section, lower, upper, initial);
-        }
+        let initial = InitialDesign::read(&section, lower, upper);
         let symmetry = read_symmetry(&section, direction);
         if direction.is_none() && !section.has("direction") {
             section.missing("direction", "direction = [0.0, 0.0, -1.0], or direction = \"normal\"");
@@ -101,7 +99,7 @@ impl Design {
             rim,
             lower: section.need("lower", lower, "\"-5 mm\""),
             upper: section.need("upper", upper, "\"20 mm\""),
-            initial: initial.unwrap_or(0.0),
+            initial,
             symmetry,
         };
         section.finish();
@@ -139,36 +137,6 @@ fn read_symmetry(section: &Section<'_>, direction: Option<DesignDirection>) -> V
 /// Whether a direction has more than rounding across a plane normal to an axis.
 fn leaves(direction: &DesignDirection, axis: usize) -> bool {
     matches!(direction, DesignDirection::Vector(direction) if direction[axis].abs() > 1e-9)
-}
-
-fn check_bounds(section: &Section<'_>, lower: f64, upper: f64, initial: Option<f64>) {
-    if lower >= upper {
-        section.wrong(
-            "upper",
-            format!("the bounds cross: design.lower is {lower} m, design.upper is {upper} m"),
-            format!("design.upper above {lower} m"),
-        );
-        return;
-    }
-    let start = initial.unwrap_or(0.0);
-    if (lower..=upper).contains(&start) {
-        return;
-    }
-    let expected = format!("from {lower} m to {upper} m");
-    match initial {
-        Some(initial) => {
-            section.wrong(
-                "initial",
-                format!("design.initial is {initial} m, outside of the bounds"),
-                expected,
-            );
-        }
-        None => section.wrong(
-            if lower > 0.0 { "lower" } else { "upper" },
-            "the bounds leave out 0 m, where the design starts",
-            format!("bounds around 0 m, or design.initial {expected}"),
-        ),
-    }
 }
 
 fn read_direction(section: &Section<'_>) -> Option<DesignDirection> {

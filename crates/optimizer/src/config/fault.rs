@@ -56,9 +56,14 @@ impl Faults {
     /// All faults in the order of the text they stand in.
     pub(super) fn into_sorted(self) -> Vec<Fault> {
         let mut faults = self.0.into_inner();
-        faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
+        sort(&mut faults);
         faults
     }
+}
+
+/// Brings faults into the order of the text they stand in.
+pub(super) fn sort(faults: &mut [Fault]) {
+    faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
 }
 
 /// The candidate that `name` was probably meant to be, if one is near enough.

@@ -12,8 +12,10 @@ mod constraint;
 mod design;
 mod fault;
 mod functional;
+mod initial;
 mod material;
 mod mesh;
+mod morph;
 mod objective;
 mod optimizer;
 mod output;
@@ -42,10 +44,15 @@ pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use fault::{Fault, Place, nearest};
 pub use functional::{Functional, ObjectiveKind, Weighting};
+pub use initial::InitialDesign;
 pub use material::{Material, Region, RegionModel};
 pub use mesh::{
     BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,
     SphereMesh,
+};
+pub use morph::{
+    AutoWord, Case, DesignMotion, DesignWord, Increments, Morph, Paper, PrescribedMotion, Rotation, Scale,
+    Target, Tune, TunedParameter,
 };
 pub use objective::{Goal, Objective, Probe, Sum, Term};
 pub use optimizer::{Algorithm, Optimizer};
@@ -81,10 +88,12 @@ pub struct Config {
     pub objective: Option<Objective>,
     /// What must keep within bounds meanwhile.
     pub constraints: Vec<Constraint>,
-    /// What moves; needed by `run`, `gradient` and `morph`.
+    /// What moves; needed by `run` and `gradient`.
     pub design: Option<Design>,
-    /// How the mesh follows; given when `design` is.
+    /// How the mesh follows; given when `design` or `morph` is.
     pub remesh: Option<Remesh>,
+    /// A prescribed motion; needed by `morph`.
+    pub morph: Option<Morph>,
     /// The algorithm.
     pub optimizer: Optimizer,
     /// Points at which the flux density is reported.
@@ -149,6 +158,33 @@ impl Config {
         };
         Err(source.error(tables.iter().filter(|(_, missing)| *missing).map(fault).collect()))
     }
+
+    /// The tables a prescribed motion needs.
+    ///
+    /// # Errors
+    /// A fault with an example when they are missing.
+    pub fn morphing(&self, source: &Source) -> Result<Morphing<'_>, ConfigError> {
+        if let (Some(morph), Some(remesh)) = (&self.morph, &self.remesh) {
+            return Ok(Morphing { morph, remesh });
+        }
+        let example = match self.design {
+            Some(_) => "design = \"upper\": the design of [design] with all variables at the upper bound",
+            None => "surface = \"top\" and displacement = [\"0 mm\", \"0 mm\", \"5 mm\"]",
+        };
+        let fault = source
+            .fault("morph", "missing table `morph`: there is no motion to prescribe without it")
+            .help(format!("add a table [morph], and a table [[morph.motion]] with {example}"));
+        Err(source.error(vec![fault]))
+    }
+}
+
+/// The tables a prescribed motion needs.
+#[derive(Debug, Clone, Copy)]
+pub struct Morphing<'a> {
+    /// What moves, and the cases.
+    pub morph: &'a Morph,
+    /// How the mesh follows.
+    pub remesh: &'a Remesh,
 }
 
 /// The configuration as TOML with every default written out, in SI; it reads back as the same [`Config`].
@@ -180,20 +216,45 @@ fn read(
 ) -> Result<(Config, Source), ConfigError> {
     let mut documents = vec![Document { name, text }];
     documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
-    let mut source = Source { documents, places: BTreeMap::new(), directory, stem: stem.to_owned() };
+    let (places, cases) = (BTreeMap::new(), Vec::new());
+    let mut source = Source { documents, places, directory, stem: stem.to_owned(), cases };
 
     let root = parse_documents(&source).map_err(|faults| source.error(faults))?;
     source.places = tree::places(&root);
 
-    let faults = Faults::default();
-    let place = Place { document: 0, span: 0..0 };
-    let section = Section::new(String::new(), &root, place, &faults);
-    let config = read_root(section, &source);
-    let faults = faults.into_sorted();
+    let (mut config, mut faults) = read_tree(&root, &source);
+    for (index, tree) in morph::case_trees(&root).into_iter().enumerate() {
+        let (tree, overlay) = match tree {
+            Ok(tree) => tree,
+            Err(fault) => {
+                faults.push(*fault);
+                continue;
+            }
+        };
+        let (case, own) = read_tree(&tree, &source);
+        // What is wrong without the case has been said.
+        faults.extend(own.into_iter().filter(|fault| !faults.contains(fault)).collect::<Vec<_>>());
+        source.cases.push(Source { places: tree::places(&tree), cases: Vec::new(), ..source.clone() });
+        let slot = config.as_mut().and_then(|config| config.morph.as_mut()?.cases.get_mut(index));
+        if let (Some(slot), Some(case)) = (slot, case) {
+            slot.complete(overlay, case);
+        }
+    }
     match config {
         Some(config) if faults.is_empty() => Ok((config, source)),
-        _ => Err(source.error(faults)),
+        _ => {
+            fault::sort(&mut faults);
+            Err(source.error(faults))
+        }
     }
+}
+
+/// The configuration of one tree, and its faults in the order of the text.
+fn read_tree(tree: &tree::Table, source: &Source) -> (Option<Config>, Vec<Fault>) {
+    let faults = Faults::default();
+    let place = Place { document: 0, span: 0..0 };
+    let config = read_root(Section::new(String::new(), tree, place, &faults), source);
+    (config, faults.into_sorted())
 }
 
 /// Parse the file and lay the overrides over it.
@@ -214,7 +275,11 @@ fn parse_documents(source: &Source) -> Result<tree::Table, Vec<Fault>> {
 fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let title = root.text("title").unwrap_or_else(|| source.stem.clone());
     let mesh = required(&root, "mesh", |section| MeshConfig::read(section, &source.directory));
-    let analysis = required(&root, "analysis", Analysis::read);
+    let analysis = if root.has("morph") && !root.has("analysis") {
+        Some(Analysis::default())
+    } else {
+        required(&root, "analysis", Analysis::read)
+    };
     // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
     let frequencies = analysis.as_ref().map_or(&[][..], Analysis::frequencies);
     let frequencies = if frequencies.iter().any(|f| f.is_nan()) { &[] } else { frequencies };
@@ -233,9 +298,13 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let constraints = constraint::read_constraints(&root, frequencies);
     let design = root.table("design").map(Design::read);
     let remesh = root.table("remesh").map(Remesh::read);
-    if root.has("design") && !root.has("remesh") {
-        root.missing("remesh", "[remesh] with region = \"remesh\": the mesh must follow the design");
+    if let Some(mover) = ["design", "morph"].into_iter().find(|key| root.has(key))
+        && !root.has("remesh")
+    {
+        let why = if mover == "design" { "the design" } else { "the motion" };
+        root.missing("remesh", &format!("[remesh] with region = \"remesh\": the mesh must follow {why}"));
     }
+    let morph = root.table("morph").map(Morph::read);
     let optimizer =
         root.table("optimizer").map(|s| Optimizer::read(s, constraints.len())).unwrap_or_default();
     let probes = objective::read_probes(&root);
@@ -257,6 +326,7 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
         constraints,
         design,
         remesh,
+        morph,
         optimizer,
         probes,
         output,

@@ -22,9 +22,9 @@ pub struct Optimizer {
     /// Stop when all variables change by less than this fraction. Default 0, off: the variables of a
     /// bang-bang design reach their bounds long before the rest has settled.
     pub xtol_rel: f64,
-    /// Least quality (Eq. 4) of an element that a design may have, 0 to 1. Default 0: only flat and inverted
-    /// elements are refused, since layered meshes start with a low quality.
-    pub minimum_quality: f64,
+    /// Least quality (Eq. 4) of an element that a design may have, 0 to 1. Default: a twentieth of the worst quality of
+    /// the undeformed mesh, since layered meshes start with a low one.
+    pub minimum_quality: Option<f64>,
 }
 
 choice! {
@@ -53,7 +53,7 @@ impl Default for Optimizer {
             max_time: None,
             ftol_rel: 1e-3,
             xtol_rel: 0.0,
-            minimum_quality: 0.0,
+            minimum_quality: None,
         }
     }
 }
@@ -78,7 +78,7 @@ impl Optimizer {
             max_time: section.quantity("max_time", Dimension::Duration, Range::POSITIVE),
             ftol_rel: tolerance("ftol_rel").unwrap_or(default.ftol_rel),
             xtol_rel: tolerance("xtol_rel").unwrap_or(default.xtol_rel),
-            minimum_quality: tolerance("minimum_quality").unwrap_or(default.minimum_quality),
+            minimum_quality: tolerance("minimum_quality"),
         };
         if constraints > 0 && !optimizer.algorithm.takes_constraints() {
             let message = format!("`{}` cannot keep constraints", optimizer.algorithm.name());

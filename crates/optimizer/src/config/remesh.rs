@@ -26,6 +26,12 @@ pub struct Remesh {
     pub stiffness: StiffnessLaw,
     /// Which way the nodes may move. Default `free`: the paper's elasticity.
     pub motion: Motion,
+    /// Most rounds of an optimisation, each with a new reference mesh. Default 20; 0 keeps the undeformed mesh as the
+    /// only reference.
+    pub rounds: usize,
+    /// Largest share of the way to the first inverted element that a design may lie from the reference of its round, 0
+    /// to 1. Default 0.9.
+    pub inversion_share: f64,
     /// Surfaces whose nodes stay in their plane. Default none.
     pub slide: Vec<String>,
     /// Surfaces whose nodes stay. Default none; the outside of the body is fixed unless it is named elsewhere.
@@ -56,6 +62,8 @@ choice! {
         InverseSize = "inverse_size",
         /// Proportional to 1 / volume.
         InverseVolume = "inverse_volume",
+        /// Each principal direction of an element stiffer the shorter the element is along it.
+        Directional = "directional",
     }
 }
 
@@ -82,6 +90,14 @@ pub struct Subregion {
     pub force: Option<[f64; 3]>,
 }
 
+impl StiffnessLaw {
+    /// The law of a policy of the elastic map; `None` for one that the configuration has no word for.
+    pub fn of_policy(policy: fluxmorph_remesh::StiffnessPolicy) -> Option<Self> {
+        let same = |(word, _): &&(&str, Self)| *word == policy.name();
+        <Self as super::choice::Choice>::CHOICES.iter().find(same).map(|(_, law)| *law)
+    }
+}
+
 impl Remesh {
     pub(super) fn read(section: Section<'_>) -> Self {
         let remesh = Self {
@@ -91,6 +107,8 @@ impl Remesh {
             force: section.numbers("force", Range::FINITE).unwrap_or([0.0; 3]),
             stiffness: section.choice("stiffness").unwrap_or(StiffnessLaw::InverseSize),
             motion: section.choice("motion").unwrap_or(Motion::Free),
+            rounds: section.integer("rounds", 0, 1000).unwrap_or(20),
+            inversion_share: section.number("inversion_share", Range::open(0.0, 1.0)).unwrap_or(0.9),
             slide: section.names("slide").unwrap_or_default(),
             fixed: section.names("fixed").unwrap_or_default(),
             free: section.names("free").unwrap_or_default(),

@@ -25,6 +25,8 @@ pub struct Source {
     pub(super) places: BTreeMap<String, Place>,
     pub(super) directory: PathBuf,
     pub(super) stem: String,
+    /// The same texts with the places of every case of `[[morph.case]]`.
+    pub(super) cases: Vec<Source>,
 }
 
 impl Source {
@@ -46,6 +48,12 @@ impl Source {
     /// The folder that paths in the configuration are relative to.
     pub fn directory(&self) -> &Path {
         &self.directory
+    }
+
+    /// The same texts with the places of one case of `[[morph.case]]`: what the case does not say stands where it does
+    /// without it.
+    pub fn case(&self, index: usize) -> &Source {
+        self.cases.get(index).unwrap_or(self)
     }
 
     /// Where the value at a key path such as `design.surface` or `coils[0].center` stands.

@@ -100,6 +100,26 @@ fn convert(document: usize, node: &Spanned<DeValue<'_>>, key_place: Option<Place
     Node { value, place, key_place }
 }
 
+/// The values of a table as TOML, for writing them out again; dates, which no key takes, are left out.
+pub(super) fn to_toml(table: &Table) -> toml::Table {
+    let entry = |(key, node): (&String, &Node)| Some((key.clone(), to_value(&node.value)?));
+    table.iter().filter_map(entry).collect()
+}
+
+fn to_value(value: &Value) -> Option<toml::Value> {
+    Some(match value {
+        Value::Text(text) => toml::Value::String(text.clone()),
+        Value::Integer(value) => toml::Value::Integer(*value),
+        Value::Float(value) => toml::Value::Float(*value),
+        Value::Boolean(value) => toml::Value::Boolean(*value),
+        Value::Date => return None,
+        Value::Array(items) => {
+            toml::Value::Array(items.iter().filter_map(|item| to_value(&item.value)).collect())
+        }
+        Value::Table(table) => toml::Value::Table(to_toml(table)),
+    })
+}
+
 /// The place of every value, by key path.
 pub(super) fn places(table: &Table) -> BTreeMap<String, Place> {
     let mut places = BTreeMap::new();

@@ -13,6 +13,7 @@
 
 use fluxmorph_geometry::tet4::{Point, Tet4, area_vector, centroid, cross, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
+use fluxmorph_remesh::RemeshError;
 
 use super::GeometricError;
 use crate::problem::Shape;
@@ -87,9 +88,12 @@ impl Volume {
     }
 
     /// Value on a moved mesh and its derivative with respect to every design variable [m², or kg/m].
-    pub fn evaluate(&self, mesh: &Mesh, shape: &Shape) -> (f64, Vec<f64>) {
+    ///
+    /// # Errors
+    /// [`RemeshError::NotConverged`].
+    pub fn evaluate(&self, mesh: &Mesh, shape: &Shape) -> Result<(f64, Vec<f64>), RemeshError> {
         let nodal = self.node_derivative(mesh);
-        (self.value(mesh), shape.surface.gradient(&shape.map.gradient(&nodal)))
+        Ok((self.value(mesh), shape.surface.gradient(&shape.motion.map().gradient(&nodal)?)))
     }
 
     /// Derivative with respect to every node's position, shape `(n_nodes, 3)`.
@@ -196,7 +200,7 @@ mod tests {
     fn volume(setup: &crate::setup::Setup) -> Volume {
         let problem = &setup.problem;
         let surface = problem.states[0].conductors().first().map(|plate| plate.surface.as_slice());
-        Volume::new(&problem.reference, &setup.full_mesh, "plate", surface).expect("a plate has a volume")
+        Volume::new(&problem.original, &setup.full_mesh, "plate", surface).expect("a plate has a volume")
     }
 
     #[test]
@@ -206,8 +210,8 @@ mod tests {
             let (problem, plate) = (&setup.problem, volume(&setup));
             let shape = problem.shape.as_ref().expect("a shape");
             let uniform = vec![3e-3; shape.surface.variable_count()];
-            let (mesh, _) = problem.mesh_of(&uniform).expect("inside the bounds");
-            let (value, gradient) = plate.evaluate(&mesh, shape);
+            let mesh = problem.moved(&uniform).expect("inside the bounds").mesh;
+            let (value, gradient) = plate.evaluate(&mesh, shape).expect("a direct solve");
             // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
             assert!((value - 0.12 * 0.24 * 0.013).abs() < 1e-12 * value, "{value}");
             let swept: f64 = gradient.iter().sum();
@@ -223,7 +227,10 @@ mod tests {
             let setup = shield(overrides);
             let (problem, plate) = (&setup.problem, volume(&setup));
             let shape = problem.shape.as_ref().expect("a shape");
-            let at = |p: &[f64]| plate.evaluate(&problem.mesh_of(p).expect("inside the bounds").0, shape);
+            let at = |p: &[f64]| {
+                let mesh = problem.moved(p).expect("inside the bounds").mesh;
+                plate.evaluate(&mesh, shape).expect("a direct solve")
+            };
             taylor(at, &wavy(problem), 1e-3);
             at(&wavy(problem)).0
         });

@@ -60,9 +60,19 @@ fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
     let value = serde_json::to_value(evaluation).expect("numbers and text have a JSON form");
     let cell = |column: &String| match &value[column] {
         Value::Null => String::new(),
+        Value::String(text) => csv_text(text),
         other => other.to_string(),
     };
     columns.iter().map(cell).collect::<Vec<_>>().join(",")
+}
+
+/// A text as a cell: quoted where it holds what separates cells.
+fn csv_text(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
 }
 
 #[cfg(test)]
@@ -83,6 +93,9 @@ mod tests {
             max_thickness_m: None,
             linear_iterations: 57,
             seconds: 4.2,
+            step_to_inversion: Some(1.25),
+            inversion_element: Some(17),
+            inversion_region: Some("air, \"near\"".to_owned()),
             round: 0,
             constraints: [("c_volume".to_owned(), -0.5)].into(),
         }
@@ -99,9 +112,10 @@ mod tests {
             .and_then(|mut history| history.append(&evaluation()))
             .expect("appended");
 
-        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,0,-0.5\n";
+        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,-0.5\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
-                      min_thickness_m,max_thickness_m,linear_iterations,seconds,round,c_volume\n";
+                      min_thickness_m,max_thickness_m,linear_iterations,seconds,step_to_inversion,inversion_element,inversion_region,\
+                      round,c_volume\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));
 

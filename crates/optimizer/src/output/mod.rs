@@ -15,6 +15,7 @@ pub use files::{SyncedLog, write_atomic, write_atomic_with};
 pub use history::History;
 pub use manifest::{FileHash, Host, Manifest, MeshHash, RunStatus, blake3_hex};
 pub use process::{hostname, peak_memory_bytes, utc_timestamp};
+pub(crate) use result::to_json;
 pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, StopReason, TermResult,

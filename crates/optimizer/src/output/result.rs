@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory, write_atomic};
 use crate::cli::ExitCode;
+use crate::rounds::RoundEvent;
 
 /// The content of `result.json`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,6 +33,9 @@ pub struct RunResult {
     pub design: Option<DesignResult>,
     /// The mesh.
     pub mesh: MeshResult,
+    /// Rounds of the mesh motion and remedies, as they came; empty where one reference mesh was enough.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<RoundEvent>,
     /// The frequencies [Hz] in the order of the configuration.
     #[serde(default)]
     pub frequencies_hz: Vec<f64>,
@@ -239,7 +243,7 @@ impl RunResult {
 }
 
 /// Indented JSON with a line break at the end.
-pub(super) fn to_json(value: &impl Serialize) -> Vec<u8> {
+pub(crate) fn to_json(value: &impl Serialize) -> Vec<u8> {
     let mut bytes = serde_json::to_vec_pretty(value).expect("structs of numbers and text have a JSON form");
     bytes.push(b'\n');
     bytes
@@ -275,6 +279,16 @@ pub(crate) mod tests {
                 value: 1e-3,
                 bound: 1e-3,
                 satisfied: true,
+            }],
+            rounds: vec![crate::rounds::RoundEvent {
+                round: 1,
+                kind: crate::rounds::RoundKind::Round,
+                evaluation: Some(4),
+                worst_quality: [0.1; 2],
+                admitted: None,
+                stiffness: "inverse_size".to_owned(),
+                reach: [0.5, 0.75],
+                cause: "the search reached the edge of its box".to_owned(),
             }],
             design: Some(DesignResult {
                 values_m: vec![0.02],

@@ -26,8 +26,19 @@ pub struct RunDirectory {
 const MANIFEST: &str = "manifest.json";
 const FIELDS: &str = "fields";
 /// The files of a run beside its manifest.
-const FILES: &[&str] =
-    &["config.toml", "resolved.toml", "history.csv", "history.jsonl", "fields.pvd", "result.json", OPTIMUM];
+const FILES: &[&str] = &[
+    "config.toml",
+    "resolved.toml",
+    "history.csv",
+    "history.jsonl",
+    "fields.pvd",
+    "result.json",
+    "before.vtu",
+    "after.vtu",
+    "morph.csv",
+    "tuned.toml",
+    OPTIMUM,
+];
 const OPTIMUM: &str = "optimum.msh";
 /// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
 const LONGEST_NAME: usize = 50;
@@ -41,6 +52,17 @@ impl RunDirectory {
     /// # Errors
     /// When the folder holds something else, or the operating system refuses.
     pub fn create(path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        let directory = Self::create_flat(path, older)?;
+        let fields = directory.fields();
+        fs::create_dir_all(&fields).map_err(OutputError::io("create", fields))?;
+        Ok(directory)
+    }
+
+    /// The same without a folder for fields.
+    ///
+    /// # Errors
+    /// As [`RunDirectory::create`].
+    pub fn create_flat(path: &Path, older: OlderRun) -> Result<Self, OutputError> {
         let directory = Self { path: path.to_owned() };
         match fs::read_dir(path) {
             Ok(mut entries) => {
@@ -54,8 +76,7 @@ impl RunDirectory {
             }
             Err(error) => return Err(OutputError::io("read", path)(error)),
         }
-        let fields = directory.fields();
-        fs::create_dir_all(&fields).map_err(OutputError::io("create", fields))?;
+        fs::create_dir_all(path).map_err(OutputError::io("create", path))?;
         Ok(directory)
     }
 
@@ -92,6 +113,9 @@ impl RunDirectory {
         // The list is a file's content: only names that this program gives are taken from it.
         let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
         for name in FILES.iter().copied().chain(surfaces) {
+            remove_if_there(&self.path.join(name))?;
+        }
+        for name in entries(&self.path)?.iter().filter(|name| is_case(name)) {
             remove_if_there(&self.path.join(name))?;
         }
         self.remove_unfinished(&self.path)?;
@@ -159,6 +183,26 @@ impl RunDirectory {
         self.path.join("result.json")
     }
 
+    /// The undeformed mesh of a prescribed motion; `case` is the number of a case of a sweep, from 0.
+    pub fn before(&self, case: Option<usize>) -> PathBuf {
+        self.path.join(morph_name(case, "before"))
+    }
+
+    /// The mesh after a prescribed motion.
+    pub fn after(&self, case: Option<usize>) -> PathBuf {
+        self.path.join(morph_name(case, "after"))
+    }
+
+    /// `morph.csv`, one row for each case of a prescribed motion.
+    pub fn morph_csv(&self) -> PathBuf {
+        self.path.join("morph.csv")
+    }
+
+    /// `tuned.toml`, the configuration that the tuner found.
+    pub fn tuned(&self) -> PathBuf {
+        self.path.join("tuned.toml")
+    }
+
     /// `optimum.msh`, the mesh of the best design.
     pub fn optimum(&self) -> PathBuf {
         self.path.join(OPTIMUM)
@@ -211,6 +255,22 @@ fn is_surface(name: &str) -> bool {
     name.strip_prefix("optimum_")
         .and_then(|rest| rest.strip_suffix(".stl"))
         .is_some_and(|stem| stem.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_'))
+}
+
+fn morph_name(case: Option<usize>, what: &str) -> String {
+    match case {
+        None => format!("{what}.vtu"),
+        Some(case) => format!("case_{:02}_{what}.vtu", case + 1),
+    }
+}
+
+/// Whether a name is one that [`morph_name`] gives a case.
+fn is_case(name: &str) -> bool {
+    let number = |end| name.strip_prefix("case_").and_then(|rest| rest.strip_suffix(end));
+    ["_before.vtu", "_after.vtu"]
+        .into_iter()
+        .filter_map(number)
+        .any(|digits| digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 fn field_name(evaluation: usize) -> String {
@@ -296,8 +356,17 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = started(&folder.path().join("run"));
         assert_eq!(RunDirectory::open(run.path()).expect("a run"), run);
-        let ours = [run.result(), run.history_csv(), run.field(0), run.field(10_000), run.collection()];
-        let foreign = [run.path().join("notes.md"), run.fields().join("eval_best.vtu")];
+        let mut ours =
+            vec![run.result(), run.history_csv(), run.field(0), run.field(10_000), run.collection()];
+        ours.extend([
+            run.before(None),
+            run.after(Some(0)),
+            run.before(Some(99)),
+            run.morph_csv(),
+            run.tuned(),
+        ]);
+        let foreign = ["notes.md", "fields/eval_best.vtu", "case_1_before.vtu", "case_01.vtu"];
+        let foreign = foreign.map(|name| run.path().join(name));
         for path in ours.iter().chain(&foreign) {
             write_atomic(path, b"x").expect("written");
         }

@@ -12,7 +12,7 @@ use fluxmorph_geometry::topology::OUTSIDE;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
-use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source};
+use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source, Target};
 use crate::error::Error;
 use crate::output::OutputError;
 
@@ -92,6 +92,11 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         add("remesh.slide", &remesh.slide);
         add("remesh.fixed", &remesh.fixed);
         add("remesh.free", &remesh.free);
+    }
+    for (i, motion) in config.morph.iter().flat_map(|morph| &morph.motion).enumerate() {
+        if let Target::Surface(surfaces) = &motion.target {
+            add(&format!("morph.motion[{i}].surface"), surfaces);
+        }
     }
     let design = config.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
     // By default it is the design surface, whose own key is the better place for a fault.

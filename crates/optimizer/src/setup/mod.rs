@@ -2,13 +2,16 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map.
+//! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem.
 
 mod design;
 mod field;
 mod functional;
 pub(crate) mod mesh;
+mod motion;
 mod shape;
+
+pub use motion::{MotionSetup, set_up_motion};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
@@ -57,6 +60,8 @@ impl Audited {
 pub enum Purpose {
     /// A field analysis: objective and design take part where they are given.
     Analysis,
+    /// A look at everything, without solving: with [morph] a field problem need not be complete.
+    Inspection,
     /// An optimisation: objective, design and remesh region must be there.
     Optimisation,
 }
@@ -89,7 +94,8 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     let free = conditions.flux_parallel.is_empty()
         && conditions.flux_normal.is_empty()
         && conditions.uniform_field.is_none();
-    if free && conductors.is_empty() {
+    let motion_alone = purpose == Purpose::Inspection && config.morph.is_some();
+    if free && conductors.is_empty() && !motion_alone {
         let fault = source
             .fault("boundaries", "no surface has a condition: the potential is known up to a constant only")
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
@@ -97,7 +103,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     }
     let states = field::field_models(config, &mesh, &conductors)?;
     warnings.extend(field::coil_notices(&states[0]));
-    if states.iter().all(FieldModel::is_unexcited) {
+    if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
         warnings.push(
             "nothing excites a field, it is zero everywhere; add [[coils]], a magnet's remanence or an applied field"
                 .to_owned(),
@@ -115,7 +121,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
-    let problem = Problem { reference: mesh, states, objective, constraints, shape };
+    let problem = Problem { original: mesh, states, objective, constraints, shape };
     Ok(Setup { problem, audits, warnings, full_mesh })
 }
 

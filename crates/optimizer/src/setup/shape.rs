@@ -5,20 +5,23 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
-use fluxmorph_remesh::check_step;
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, ElasticMap, Guidance, Limits, Motion, RemeshError, RemeshSetup, SolverChoice,
+    StiffnessPolicy, Subregion,
 };
 use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
 use crate::config::{
-    Config, Design, DesignDirection, DirectionWord, Fault, Motion, Remesh, RemeshExtent, Source, StiffnessLaw,
+    self, Config, Design, DesignDirection, DirectionWord, Fault, Remesh, RemeshExtent, Source, StiffnessLaw,
 };
 use crate::design::DesignSurface;
 use crate::error::Error;
 use crate::problem::Shape;
 use crate::thickness::Thickness;
+
+/// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
+const LEAST_QUALITY_SHARE: f64 = 0.05;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
@@ -51,7 +54,7 @@ pub(super) fn shape(
             surface.variable_count()
         ));
     }
-    let materials: BTreeSet<&str> = regions_at(full_mesh, &full_surface)
+    let materials: BTreeSet<&str> = regions_at(full_mesh, full_surface.nodes())
         .into_iter()
         .map(|region| {
             let name = full_mesh.topology().region_names()[region.index()].as_str();
@@ -64,39 +67,54 @@ pub(super) fn shape(
             design.surface.join("`, `")
         ));
     }
-    let setup = remesh_setup(inputs, &surface, warnings)?;
-    let map = ElasticMap::new(mesh, setup)?;
-    let moving = moving_elements(mesh, &surface, &map);
+    let guidance = guidance(source, Some(design), inputs.remesh)?;
+    let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
+    let motion = Motion::new(mesh.clone(), setup)?;
+    let moving = moving_elements(mesh, &surface, motion.map());
     overlap_faults(inputs, &moving, model, observed)?;
-    source.check(held_node_fault(inputs, &surface, &map, model).into_iter().collect())?;
+    source.check(held_node_fault(inputs, &surface, motion.map(), model).into_iter().collect())?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
+    let initial = design.initial.values(n, design.lower, design.upper).ok_or_else(|| {
+        let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
+        source.error(vec![fault.expected(format!("one value for each of the {n} design variables"))])
+    })?;
+    let quality = QualityReport::of_elements(mesh, &moving).map_or(0.0, |quality| quality.worst);
+    let limits = Limits {
+        inversion_share: inputs.remesh.inversion_share,
+        least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
+        rounds: inputs.remesh.rounds,
+        ..Limits::default()
+    };
     let shape = Shape {
         surface,
-        map,
+        motion,
+        limits,
         moving,
         thickness,
         lower: vec![design.lower; n],
         upper: vec![design.upper; n],
-        initial: vec![design.initial; n],
+        initial,
     };
-    check_bounds(source, mesh, &shape, config.optimizer.minimum_quality)?;
+    check_bounds(source, &shape)?;
     Ok(shape)
 }
 
-/// Subregions, boundary kinds and design nodes of the elastic body.
-fn remesh_setup(
-    inputs: &Inputs<'_>,
-    surface: &DesignSurface,
+/// Subregions, boundary kinds and design nodes (ascending) of the elastic body.
+pub(super) fn remesh_setup(
+    source: &Source,
+    remesh: &Remesh,
+    mesh: &Mesh,
+    design_nodes: &[NodeId],
+    guidance: Guidance,
     warnings: &mut Vec<String>,
 ) -> Result<RemeshSetup, Error> {
-    let Inputs { source, remesh, mesh, .. } = *inputs;
     let topology = mesh.topology();
     let mut subregions: Vec<Subregion> = match &remesh.extent {
         RemeshExtent::Regions(names) => {
             let mut names: BTreeSet<String> = names.iter().cloned().collect();
-            for region in regions_at(mesh, surface) {
+            for region in regions_at(mesh, design_nodes) {
                 let name = &topology.region_names()[region.index()];
                 if names.insert(name.clone()) {
                     warnings.push(format!(
@@ -171,45 +189,46 @@ fn remesh_setup(
         StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
         StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
         StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
+        StiffnessLaw::Directional => StiffnessPolicy::Directional,
     };
     Ok(RemeshSetup {
         subregions,
         policy,
-        guidance: guidance(inputs)?,
-        design_nodes: surface.nodes().to_vec(),
+        guidance,
+        design_nodes: design_nodes.to_vec(),
         boundaries,
         fixed_nodes: Vec::new(),
+        solver: SolverChoice::Automatic,
     })
 }
 
 /// The axis of the design's direction where the motion is to follow it.
-fn guidance(inputs: &Inputs<'_>) -> Result<Guidance, Error> {
-    let axis = match inputs.design.direction {
-        DesignDirection::Vector(direction) => (0..3).find(|&d| direction[d].abs() == 1.0),
-        DesignDirection::Word(DirectionWord::Normal) => None,
+pub(super) fn guidance(source: &Source, design: Option<&Design>, remesh: &Remesh) -> Result<Guidance, Error> {
+    let axis = match design.map(|design| design.direction) {
+        Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
+        Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
     };
-    match inputs.remesh.motion {
-        Motion::Free => Ok(Guidance::Free),
-        Motion::AlongDesign => match axis {
+    match remesh.motion {
+        config::Motion::Free => Ok(Guidance::Free),
+        config::Motion::AlongDesign => match axis {
             Some(axis) => Ok(Guidance::Axis(axis)),
             None => {
-                let fault = inputs
-                    .source
+                let fault = source
                     .fault("remesh.motion", "the design does not move along a coordinate axis")
                     .expected("motion = \"free\", or a design.direction along x, y or z");
-                Err(inputs.source.error(vec![fault]).into())
+                Err(source.error(vec![fault]).into())
             }
         },
     }
 }
 
-/// Regions with an element that has a face on the design surface.
-fn regions_at(mesh: &Mesh, surface: &DesignSurface) -> BTreeSet<RegionId> {
+/// Regions with an element that has a face between design nodes, which are ascending.
+fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
     let topology = mesh.topology();
     topology
         .facets()
         .iter()
-        .filter(|f| f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
+        .filter(|f| f.nodes.iter().all(|n| design_nodes.binary_search(n).is_ok()))
         .flat_map(|f| std::iter::once(f.inside).chain(f.outside))
         .map(|e| topology.region_of()[e.index()])
         .collect()
@@ -322,60 +341,47 @@ fn held_node_fault(
     Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
 }
 
-/// Tries the two extreme designs, all variables at their lower and at their upper bound, before anything is solved.
-fn check_bounds(source: &Source, mesh: &Mesh, shape: &Shape, minimum_quality: f64) -> Result<(), Error> {
-    let mut faults = Vec::new();
-    let initial = shape.map.displacement(&shape.surface.displacement(&shape.initial));
-    if let Err(RemeshError::Inverted { element, region, centroid, .. }) = check_step(mesh, &initial) {
-        let fault = source
-            .fault(
-                "remesh",
-                format!(
-                    "the initial design breaks the mesh: element {element} of region `{region}` at {} is inverted",
-                    millimetres(centroid)
-                ),
-            )
-            .help("shrink remesh.force or design.initial");
-        return Err(source.error(vec![fault]).into());
+/// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
+/// solved.
+fn check_bounds(source: &Source, shape: &Shape) -> Result<(), Error> {
+    if shape.limits.rounds > 0 {
+        return Ok(());
     }
+    let mut faults = Vec::new();
     for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
-        let displacement = shape.map.displacement(&shape.surface.displacement(bound));
-        match check_step(mesh, &displacement) {
+        let at = bound[0] * 1e3;
+        match shape.motion.moved(&shape.displacement(bound)) {
             Ok(moved) => {
-                let quality = QualityReport::of_elements(&moved, &shape.moving);
-                if let Some(quality) = quality.filter(|q| q.worst < minimum_quality) {
+                let quality = QualityReport::of_elements(&moved.mesh, &shape.moving);
+                let least = shape.limits.least_quality;
+                if let Some(quality) = quality.filter(|q| q.worst < least) {
+                    let message = format!(
+                        "`{key}`: at {at:.3} mm element {} has the quality {:.2e}",
+                        quality.worst_element, quality.worst
+                    );
                     faults.push(
                         source
-                            .fault(
-                                key,
-                                format!(
-                                    "`{key}`: at {:.3} mm element {} has the quality {:.4}",
-                                    bound[0] * 1e3,
-                                    quality.worst_element,
-                                    quality.worst
-                                ),
-                            )
-                            .expected(format!("at least optimizer.minimum_quality = {minimum_quality}"))
-                            .help("narrow the bound, or lower optimizer.minimum_quality"),
+                            .fault(key, message)
+                            .expected(format!("at least {least:.2e} (optimizer.minimum_quality)"))
+                            .help(
+                                "narrow the bound, lower optimizer.minimum_quality, or allow remesh.rounds",
+                            ),
                     );
                 }
             }
             Err(RemeshError::Inverted { element, region, centroid, fraction }) => {
+                let message = format!(
+                    "`{key}`: the mesh breaks at {at:.3} mm: element {element} of region `{region}` at {} is inverted",
+                    millimetres(centroid)
+                );
                 faults.push(
                     source
-                        .fault(
-                            key,
-                            format!(
-                                "`{key}`: the mesh breaks at {:.3} mm: element {element} of region `{region}` at {} is \
-                                 inverted",
-                                bound[0] * 1e3,
-                                millimetres(centroid)
-                            ),
-                        )
-                        .expected(format!("a bound nearer to zero than {:.3} mm", bound[0] * fraction * 1e3))
+                        .fault(key, message)
+                        .expected(format!("a bound nearer to zero than {:.3} mm", at * fraction))
                         .help(
-                            "narrow the bound, enlarge the remesh region, take another remesh.stiffness, or let faces between \
-                             regions beside the design follow it: they are held unless remesh.slide or remesh.free lists them",
+                            "allow remesh.rounds, narrow the bound, enlarge the remesh region, take another \
+                             remesh.stiffness, or let faces between regions beside the design follow it: they are held \
+                             unless remesh.slide or remesh.free lists them",
                         ),
                 );
             }

@@ -129,6 +129,6 @@ pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, pois
         guidance: Guidance::Free,
         design_nodes: plate_bottom(mesh),
         boundaries: ["x_min", "y_min", "plate_side"].map(slide).to_vec(),
-        fixed_nodes: Vec::new(),
+        ..RemeshSetup::default()
     }
 }

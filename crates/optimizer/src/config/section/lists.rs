@@ -171,7 +171,8 @@ impl Section<'_> {
         None
     }
 
-    fn two_points(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
+    /// Two points [m].
+    pub(in crate::config) fn two_points(&self, key: &'static str) -> Option<[[f64; 3]; 2]> {
         let node = self.get(key)?;
         self.array_of(node, &join(&self.path, key), "points", |item, path| {
             self.lengths_of(item, path, Range::FINITE)

@@ -1,6 +1,7 @@
 //! Reading whole configurations.
 
 mod faults;
+mod morph;
 mod overrides;
 mod sources;
 

@@ -1,0 +1,120 @@
+//! What happens to the mesh between evaluations: rounds that begin, and remedies that are taken.
+
+use fluxmorph_remesh::{Event, Motion, Rescue, Rescued};
+use serde::{Deserialize, Serialize};
+
+/// What happened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RoundKind {
+    /// A step towards the first design, which lies too far for a single one.
+    Approach,
+    /// The best mesh became the reference of a new round.
+    Round,
+    /// The box to search in became smaller.
+    SmallerSteps,
+    /// Stiffness follows element size in another way.
+    Policy,
+    /// The interior nodes were smoothed.
+    Smoothing,
+    /// The mesh was made anew with all nodes moving along the design's axis.
+    Guided,
+}
+
+/// One such event; an entry of `rounds` in `result.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RoundEvent {
+    /// The round after it.
+    pub round: usize,
+    /// What happened.
+    pub kind: RoundKind,
+    /// The evaluation whose mesh is the reference of the round; `None` before the first one.
+    pub evaluation: Option<usize>,
+    /// Worst quality of the reference mesh (Eq. 4) before and after.
+    pub worst_quality: [f64; 2],
+    /// Share of the refused step that keeps the limits, before and after; `None` where no step was refused.
+    pub admitted: Option<[f64; 2]>,
+    /// How stiffness follows element size from now on.
+    pub stiffness: String,
+    /// How far down and up the search may go from there, as shares of the span between the bounds.
+    pub reach: [f64; 2],
+    /// Why.
+    pub cause: String,
+}
+
+impl RoundEvent {
+    /// A step of the way to the first design.
+    pub fn approach(event: &Event, motion: &Motion) -> Self {
+        let none = Self {
+            round: motion.round(),
+            kind: RoundKind::Approach,
+            evaluation: None,
+            worst_quality: [f64::NAN; 2],
+            admitted: None,
+            stiffness: motion.policy().name().to_owned(),
+            reach: [1.0; 2],
+            cause: "the first design lies too far from the undeformed mesh for a single step".to_owned(),
+        };
+        match *event {
+            Event::Stepped { round, quality, .. } => Self { round, worst_quality: [quality; 2], ..none },
+            Event::Rescued(rescued) => none.with(&rescued),
+        }
+    }
+
+    /// The same with what a remedy did.
+    #[must_use]
+    pub fn with(self, rescued: &Rescued) -> Self {
+        let kind = match rescued.rescue {
+            Rescue::Policy { .. } => RoundKind::Policy,
+            Rescue::Smoothing { .. } => RoundKind::Smoothing,
+            Rescue::Guided { .. } => RoundKind::Guided,
+            _ => RoundKind::SmallerSteps,
+        };
+        let stiffness = match rescued.rescue {
+            Rescue::Policy { to, .. } => to.name().to_owned(),
+            _ => self.stiffness,
+        };
+        Self { kind, stiffness, worst_quality: rescued.quality, admitted: Some(rescued.admitted), ..self }
+    }
+
+    /// One line for a reader.
+    pub fn describe(&self) -> String {
+        let Self { round, worst_quality: [before, after], reach: [down, up], cause, .. } = self;
+        let reference = match self.evaluation {
+            Some(evaluation) => format!("reference: evaluation {evaluation}"),
+            None => "before the first evaluation".to_owned(),
+        };
+        let percent = |share: &f64| 100.0 * share;
+        match self.kind {
+            RoundKind::Approach => {
+                format!("round {round} on the way to the first design: worst quality {after:.4}")
+            }
+            RoundKind::Round => format!(
+                "round {round}: {cause}; {reference}, worst quality {after:.4}, the search may go {:.0} % of the bounds' \
+                 span down and {:.0} % up",
+                percent(down),
+                percent(up)
+            ),
+            RoundKind::SmallerSteps => format!(
+                "{cause}; nothing gained in round {round}: the search may go {:.0} % of the bounds' span down and {:.0} % up",
+                percent(down),
+                percent(up)
+            ),
+            RoundKind::Policy => {
+                let [from, to] = self.admitted.unwrap_or([f64::NAN; 2]);
+                format!(
+                    "{cause}; round {round} with stiffness `{}`: {to:.3} of the refused step can be taken, was {from:.3}",
+                    self.stiffness
+                )
+            }
+            RoundKind::Guided => format!(
+                "{cause}; round {round} with all nodes moving along the design's axis: worst quality {after:.4}, was \
+                 {before:.4}; its field is computed anew"
+            ),
+            RoundKind::Smoothing => format!(
+                "{cause}; round {round} with smoothed interior nodes: worst quality {after:.4}, was {before:.4}; its field is \
+                 computed anew"
+            ),
+        }
+    }
+}

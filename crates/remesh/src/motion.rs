@@ -1,0 +1,210 @@
+//! The motion of a mesh over rounds: which mesh is the reference, where the design stands there, and the elastic map
+//! that is frozen on it.
+//!
+//! Within a round every mesh is `x = X_r + Δx(Δx_b − Δx_b,r)`: `X_r` the reference of the round, `Δx_b,r` the design
+//! displacement at which it stands (the *anchor*), `Δx` the affine map of Eq. 3 frozen on `X_r`. That is what makes an
+//! objective a function of the design and its gradient exact. [`Motion::rebased`] starts the next round on a mesh that
+//! was reached: stiffness and factor are new, pattern and symbolic factor stay. The fictitious force acts in the first
+//! round only, else it would be taken again with every round. When a round ends is not decided here, but by
+//! [`crate::travel`] on a given path, and by an optimiser on its own.
+
+use fluxmorph_geometry::{Mesh, NodeId};
+use std::sync::Arc;
+
+use fluxmorph_geometry::quality::{QualityReport, quality};
+use fluxmorph_geometry::tet4::{Point, add, sub};
+use rayon::prelude::*;
+
+use crate::deform::{ElasticMap, RemeshSetup};
+use crate::error::RemeshError;
+use crate::guard::{StepToInversion, check_step, step_to_inversion};
+use crate::policy::StiffnessPolicy;
+use crate::smoothing::least_shape;
+use crate::travel::Limits;
+
+/// Halvings in the search for the share of a step that keeps a quality: to a thousandth of the step.
+const ADMITTED_BITS: usize = 10;
+
+/// A mesh that follows a design, in its present round. A clone shares the factor.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// The mesh of no motion at all: its elements are the shapes to keep.
+    original: Mesh,
+    reference: Mesh,
+    displacement: Vec<Point>,
+    anchor: Vec<Point>,
+    map: Arc<ElasticMap>,
+    round: usize,
+}
+
+/// A mesh of a round.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Displacement of every node from the original mesh [m], shape `(n_nodes, 3)`.
+    pub displacement: Vec<Point>,
+    /// First inversion along the straight motion from the round's reference, as a multiple of it.
+    pub inversion: StepToInversion,
+}
+
+impl Motion {
+    /// The first round, on the undeformed mesh.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::new`].
+    pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
+        let map = Arc::new(ElasticMap::new(&original, setup)?);
+        let anchor = vec![[0.0; 3]; map.design_nodes().len()];
+        let displacement = vec![[0.0; 3]; original.points().len()];
+        Ok(Self { reference: original.clone(), original, displacement, anchor, map, round: 0 })
+    }
+
+    /// The next round, on a mesh that this one reached: `displacement` is that of every node from the original mesh,
+    /// `anchor` that of the design nodes [m].
+    ///
+    /// # Errors
+    /// As [`ElasticMap::rebased`].
+    ///
+    /// # Panics
+    /// If the mesh has another topology, or a displacement another length.
+    pub fn rebased(
+        &self,
+        reference: Mesh,
+        displacement: Vec<Point>,
+        anchor: Vec<Point>,
+        policy: StiffnessPolicy,
+    ) -> Result<Self, RemeshError> {
+        assert_eq!(displacement.len(), reference.points().len(), "one displacement per node");
+        assert_eq!(anchor.len(), self.anchor.len(), "one displacement per design node");
+        let map = Arc::new(self.map.rebased(&reference, policy)?);
+        let original = self.original.clone();
+        Ok(Self { original, reference, displacement, anchor, map, round: self.round + 1 })
+    }
+
+    /// This motion, counted as the round after another.
+    pub(crate) fn after(self, other: &Self) -> Self {
+        Self { round: other.round + 1, ..self }
+    }
+
+    /// The same place with another stiffness: a round of its own.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::rebased`].
+    pub fn with_policy(&self, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
+        self.rebased(self.reference.clone(), self.displacement.clone(), self.anchor.clone(), policy)
+    }
+
+    /// Displacement of every node from the round's reference [m], shape `(n_nodes, 3)`, for displacements of the design
+    /// nodes from the original mesh [m], shape `(n_design, 3)`; whether or not that leaves a valid mesh.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::linear`].
+    ///
+    /// # Panics
+    /// If there is not one displacement per design node.
+    pub fn step(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
+        if self.round == 0 {
+            return self.map.displacement(design);
+        }
+        assert_eq!(design.len(), self.anchor.len(), "one displacement per design node");
+        let change: Vec<Point> =
+            design.iter().zip(&self.anchor).map(|(u, anchor)| sub(*u, *anchor)).collect();
+        self.map.linear(&change)
+    }
+
+    /// The mesh of a design.
+    ///
+    /// # Errors
+    /// [`RemeshError::Inverted`] names the first element to invert and the share of the step that can be taken.
+    ///
+    /// # Panics
+    /// If there is not one displacement per design node.
+    pub fn moved(&self, design: &[Point]) -> Result<Moved, RemeshError> {
+        let step = self.step(design)?;
+        self.taken(&step, self.inversion(&step))
+    }
+
+    /// The mesh after a step from the round's reference, whose first inversion is known.
+    pub(crate) fn taken(&self, step: &[Point], inversion: StepToInversion) -> Result<Moved, RemeshError> {
+        let mesh = check_step(&self.reference, step)?;
+        let displacement = self.displacement.iter().zip(step).map(|(u, step)| add(*u, *step)).collect();
+        Ok(Moved { mesh, displacement, inversion })
+    }
+
+    /// First inversion along a step from the round's reference.
+    pub fn inversion(&self, step: &[Point]) -> StepToInversion {
+        step_to_inversion(&self.reference, step)
+    }
+
+    /// Largest share of a step from the round's reference that keeps the limits; 1 for the whole step.
+    pub fn admitted(&self, step: &[Point], limits: &Limits) -> f64 {
+        let most = (limits.inversion_share * self.inversion(step).step).min(1.0);
+        let keeps = |share: f64| {
+            let vertex = |n: NodeId| {
+                let (x, u) = (self.reference.point(n), step[n.index()]);
+                [0, 1, 2].map(|d| x[d] + share * u[d])
+            };
+            let topology = self.reference.topology();
+            self.map
+                .elements()
+                .par_iter()
+                .all(|&e| quality(topology.tet(e).map(vertex)) >= limits.least_quality)
+        };
+        if limits.least_quality <= 0.0 || keeps(most) {
+            return most;
+        }
+        let (mut low, mut high) = (0.0, most);
+        for _ in 0..ADMITTED_BITS {
+            let middle = 0.5 * (low + high);
+            if keeps(middle) { low = middle } else { high = middle }
+        }
+        low
+    }
+
+    /// Quality of the elastic body's elements on a mesh of this topology.
+    pub fn quality(&self, mesh: &Mesh) -> QualityReport {
+        QualityReport::of_elements(mesh, self.map.elements()).expect("an elastic body has elements")
+    }
+
+    /// Least share of its original shape that an element of the elastic body has on a mesh of this topology: 1 where all
+    /// are similar to those of the original mesh.
+    pub fn shape(&self, mesh: &Mesh) -> f64 {
+        least_shape(mesh, &self.original, self.map.elements())
+    }
+
+    /// The undeformed mesh.
+    pub fn original(&self) -> &Mesh {
+        &self.original
+    }
+
+    /// The reference mesh of the round.
+    pub fn reference(&self) -> &Mesh {
+        &self.reference
+    }
+
+    /// Displacement of the reference mesh from the original one [m], shape `(n_nodes, 3)`.
+    pub fn reference_displacement(&self) -> &[Point] {
+        &self.displacement
+    }
+
+    /// Displacement of the design nodes at which the reference stands [m], shape `(n_design, 3)`.
+    pub fn anchor(&self) -> &[Point] {
+        &self.anchor
+    }
+
+    /// The elastic map of the round.
+    pub fn map(&self) -> &ElasticMap {
+        &self.map
+    }
+
+    /// Rounds begun before this one.
+    pub fn round(&self) -> usize {
+        self.round
+    }
+
+    /// How stiffness follows element size in this round.
+    pub fn policy(&self) -> StiffnessPolicy {
+        self.map.policy()
+    }
+}

@@ -1,0 +1,97 @@
+//! A prescribed motion of a mesh, and what single step and rounds make of it under one policy.
+
+use fluxmorph_geometry::quality::quality;
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_remesh::{Event, Limits, Motion, RemeshSetup, StiffnessPolicy, Travelled};
+
+use crate::support::Point;
+
+/// A mesh, its elastic body, and where the design nodes go.
+pub struct Case {
+    pub name: String,
+    pub mesh: Mesh,
+    /// The policy in it is replaced by that of the measurement.
+    pub setup: RemeshSetup,
+    /// Displacement of the design nodes [m] over the path `0 ≤ t ≤ 1`.
+    pub path: Path,
+}
+
+pub type Path = Box<dyn Fn(f64) -> Vec<Point> + Sync>;
+
+/// What one policy makes of a case.
+pub struct Outcome {
+    pub policy: StiffnessPolicy,
+    /// Worst quality (Eq. 4) of the body before the motion.
+    pub start: f64,
+    /// The whole motion in one linear step.
+    pub single: SingleStep,
+    /// The motion in rounds.
+    pub travelled: Travelled,
+    /// Worst quality of the body after them.
+    pub worst: f64,
+    pub events: Vec<Event>,
+}
+
+/// The whole motion in one linear step, inverted or not.
+pub struct SingleStep {
+    pub worst: f64,
+    pub inverted: usize,
+    /// Step to inversion.
+    pub step: f64,
+}
+
+impl Case {
+    /// A case in which each design node moves as a function of the path's parameter and its own first place.
+    pub fn new(
+        name: &str,
+        mesh: Mesh,
+        setup: RemeshSetup,
+        displacement: impl Fn(f64, Point) -> Point + Sync + 'static,
+    ) -> Self {
+        let places: Vec<Point> = setup.design_nodes.iter().map(|&n| mesh.point(n)).collect();
+        let path = Box::new(move |t| places.iter().map(|&p| displacement(t, p)).collect());
+        Self { name: name.to_owned(), mesh, setup, path }
+    }
+
+    pub fn motion(&self, policy: StiffnessPolicy) -> Motion {
+        Motion::new(self.mesh.clone(), RemeshSetup { policy, ..self.setup.clone() }).expect("a sound case")
+    }
+
+    pub fn single_step(&self, motion: &Motion) -> SingleStep {
+        let step = motion.step(&(self.path)(1.0)).expect("a direct solve");
+        let moved = |n: NodeId| {
+            let (p, u) = (self.mesh.point(n), step[n.index()]);
+            [p[0] + u[0], p[1] + u[1], p[2] + u[2]]
+        };
+        let qualities =
+            motion.map().elements().iter().map(|&e| quality(self.mesh.topology().tet(e).map(moved)));
+        let (mut worst, mut inverted) = (f64::INFINITY, 0);
+        for q in qualities {
+            worst = worst.min(q);
+            inverted += usize::from(q <= 0.0);
+        }
+        SingleStep { worst, inverted, step: motion.inversion(&step).step }
+    }
+
+    pub fn outcome(&self, policy: StiffnessPolicy, limits: &Limits) -> Outcome {
+        let motion = self.motion(policy);
+        let single = self.single_step(&motion);
+        let start = motion.quality(&self.mesh).worst;
+        let mut events = Vec::new();
+        let travelled =
+            motion.travel(&self.path, limits, &mut |event| events.push(*event)).expect("a direct solve");
+        let worst = travelled.motion.quality(&travelled.moved.mesh).worst;
+        Outcome { policy, start, single, travelled, worst, events }
+    }
+}
+
+impl Outcome {
+    /// Share of the way to the first inversion that each round used.
+    pub fn shares(&self) -> Vec<f64> {
+        let share = |event: &Event| match event {
+            Event::Stepped { share, .. } => Some(*share),
+            Event::Rescued(_) => None,
+        };
+        self.events.iter().filter_map(share).collect()
+    }
+}

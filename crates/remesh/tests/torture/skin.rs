@@ -1,0 +1,76 @@
+//! (e): what the skin layers under the moved face keep of their thickness when the plate goes to 5 and 30 mm.
+
+use fluxmorph_geometry::generate::ShieldParameters;
+use fluxmorph_geometry::tet4::{norm, sub};
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_remesh::{Guidance, Limits, StiffnessPolicy};
+
+use crate::cases::{alternating_control_points, shield_parameters};
+
+/// The layers of the moved face from outside to inside, and how much of their thickness they keep.
+pub struct Kept {
+    pub policy: StiffnessPolicy,
+    pub guidance: Guidance,
+    pub layers: Vec<Layer>,
+}
+
+/// Shares of its thickness that a layer keeps: distance of its two nodes in a column, after and before.
+#[derive(Debug)]
+pub struct Layer {
+    /// At first [m].
+    pub thickness: f64,
+    /// Least share over the columns clear of the side layers.
+    pub clear: f64,
+    /// Least share over all columns.
+    pub least: f64,
+    /// Mean share over all columns.
+    pub mean: f64,
+}
+
+/// The plate of configs/shield.toml, whose ten layers fill it.
+pub fn filled() -> ShieldParameters {
+    shield_parameters()
+}
+
+/// The same plate with layers to two skin depths (1.74 mm) and a coarse core of two cells.
+pub fn cored() -> ShieldParameters {
+    ShieldParameters { skin: vec![0.3e-3, 0.8e-3, 1.6e-3, 5e-3], ..shield_parameters() }
+}
+
+/// What is left when the control points alternate between 5 and 30 mm.
+pub fn kept(p: &ShieldParameters, policy: StiffnessPolicy, guidance: Guidance) -> Kept {
+    let case = alternating_control_points(p, guidance);
+    let outcome = case.outcome(policy, &Limits::default());
+    let moved = &outcome.travelled.moved.mesh;
+    let columns = plate_columns(&case.mesh);
+    // On the side layers' innermost line a column is still as wide as the plate's other ones on one side.
+    let inner = [0, 1].map(|d| p.plate[d] - p.side_skin.last().copied().unwrap_or(0.0) + 1e-9);
+    let is_clear = |c: &[NodeId]| (0..2).all(|d| case.mesh.point(c[0])[d] <= inner[d]);
+    let least = |shares: &mut dyn Iterator<Item = f64>| shares.fold(f64::INFINITY, f64::min);
+    let of_layer = |layer: usize| {
+        let height = |mesh: &Mesh, c: &[NodeId]| norm(sub(mesh.point(c[layer + 1]), mesh.point(c[layer])));
+        let share = |c: &Vec<NodeId>| height(moved, c) / height(&case.mesh, c);
+        Layer {
+            thickness: height(&case.mesh, &columns[0]),
+            clear: least(&mut columns.iter().filter(|c| is_clear(c)).map(share)),
+            least: least(&mut columns.iter().map(share)),
+            mean: columns.iter().map(share).sum::<f64>() / columns.len() as f64,
+        }
+    };
+    Kept { policy, guidance, layers: (0..p.skin.len()).map(of_layer).collect() }
+}
+
+/// Grid columns of the plate: its nodes at each place of the lower face, bottom to top.
+fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
+    let mut columns = std::collections::BTreeMap::<(u64, u64), Vec<NodeId>>::new();
+    let plate = mesh.topology().region("plate").expect("it is there");
+    let mut nodes: Vec<NodeId> =
+        mesh.topology().elements_of(plate).into_iter().flat_map(|e| mesh.topology().tet(e)).collect();
+    nodes.sort_by(|a, b| mesh.point(*a)[2].total_cmp(&mesh.point(*b)[2]).then(a.cmp(b)));
+    nodes.dedup();
+    for node in nodes {
+        let p = mesh.point(node);
+        columns.entry((p[0].to_bits(), p[1].to_bits())).or_default().push(node);
+    }
+    columns.into_values().collect()
+}

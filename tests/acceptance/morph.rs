@@ -1,0 +1,231 @@
+//! `fluxmorph morph`: one motion, sweeps, increments, the tuner, and what it refuses.
+
+use std::path::Path;
+
+use fluxmorph_geometry::io::read_vtu;
+use serde_json::Value;
+
+use crate::program::{Finished, files_below, fluxmorph, folder, read_json};
+use crate::shield::{count, number, scalars, vectors};
+
+/// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
+const BLOCK: &str = r#"title = "lifted"
+[mesh]
+generator = "block"
+[mesh.block]
+size = ["40 mm", "40 mm", "40 mm"]
+cells = [4, 4, 4]
+[remesh]
+region = "block"
+free = ["z_max"]
+[[morph.motion]]
+nodes = [["20 mm", "20 mm", "40 mm"]]
+displacement = ["0 mm", "0 mm", "5 mm"]
+"#;
+
+/// Pressed in by three quarters of the height: no single increment survives that.
+fn pressed(increments: &str) -> String {
+    BLOCK
+        .replace("\"5 mm\"", "\"-30 mm\"")
+        .replace("[[morph.motion]]", &format!("[morph]\n{increments}\n[[morph.motion]]"))
+}
+
+fn morph(home: &Path, text: &str, further: &[&str]) -> Finished {
+    let config = home.join("block.toml");
+    std::fs::write(&config, text).expect("written");
+    let out = home.join("out");
+    let path = |path: &Path| path.to_str().expect("UTF-8").to_owned();
+    let mut arguments = vec!["morph".to_owned(), path(&config), "--out".to_owned(), path(&out)];
+    arguments.extend(further.iter().map(|&argument| argument.to_owned()));
+    fluxmorph(&arguments)
+}
+
+#[test]
+fn one_motion_leaves_both_meshes_and_a_result() {
+    let home = folder();
+    let finished = morph(home.path(), BLOCK, &["--json"]).exits_with(0);
+    let out = home.path().join("out");
+    let files = [
+        "after.vtu",
+        "before.vtu",
+        "config.toml",
+        "manifest.json",
+        "morph.csv",
+        "resolved.toml",
+        "result.json",
+    ];
+    assert_eq!(files_below(&out), files);
+    let result = read_json(&out.join("result.json"));
+    assert_eq!(finished.json()["cases"], result["cases"]);
+    assert_eq!((&result["command"], &result["status"]), (&"morph".into(), &"done".into()));
+    let case = &result["cases"][0];
+    assert_eq!((count(case, "/tets"), count(case, "/moved_nodes"), count(case, "/increments")), (384, 1, 1));
+    // Interior nodes of 3 × 3 × 4, top free, without the node that is moved.
+    assert_eq!(count(case, "/equations"), 3 * (36 - 1));
+    assert_eq!(case["valid"], true);
+    let before = read_vtu(&out.join("before.vtu")).expect("a VTU file");
+    let after = read_vtu(&out.join("after.vtu")).expect("a VTU file");
+    let moved = vectors(&after.point_data["displacement"]);
+    for ((x, y), u) in before.points.iter().zip(&after.points).zip(moved) {
+        // The points were computed with the same sums.
+        assert_eq!(std::array::from_fn::<f64, 3, _>(|d| x[d] + u[d]), *y);
+    }
+    let top = before.points.iter().position(|p| *p == [0.02, 0.02, 0.04]).expect("a node of the block");
+    assert_eq!(moved[top], [0.0, 0.0, 0.005]);
+    let worst = scalars(&after.cell_data["quality"]).iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(worst, number(case, "/after/worst"));
+    assert_eq!(worst, scalars(&after.cell_data["quality"])[count(case, "/worst_element/element") as usize]);
+    let table = morph(home.path(), BLOCK, &["--force"]).exits_with(0).stdout;
+    assert!(table.contains("elastic body") && table.contains("lifted"), "{table}");
+    morph(home.path(), BLOCK, &[]).exits_with(5).says(&["--force"]);
+}
+
+#[test]
+fn a_motion_that_breaks_the_mesh_is_a_result_or_goes_on_in_increments() {
+    let home = folder();
+    let run = |increments: &str, code: i32| -> Value {
+        let finished = morph(home.path(), &pressed(increments), &["--json", "--force"]).exits_with(code);
+        finished.json()["cases"][0].clone()
+    };
+    let once = run("increments = 1", 4);
+    assert!(number(&once, "/after/worst") < 0.0 && count(&once, "/inverted") > 0 && once["valid"] == false);
+    let step = number(&once, "/inversion/step");
+    assert!(step > 0.0 && step < 1.0, "{step}");
+    // The inverted mesh can be looked at.
+    let after = read_vtu(&home.path().join("out/after.vtu")).expect("a VTU file");
+    assert!(scalars(&after.cell_data["quality"]).iter().any(|&q| q < 0.0));
+
+    let auto = run("", 0);
+    assert!(count(&auto, "/increments") > 1 && count(&auto, "/inverted") == 0, "{auto}");
+    assert!(number(&auto, "/after/worst") > 0.0 && number(&auto, "/reached") == 1.0);
+    // The first inversion is that of the whole motion in one step, whatever way was taken.
+    assert_eq!(number(&auto, "/inversion/step"), step);
+}
+
+#[test]
+fn a_sweep_is_one_table_with_published_values_beside() {
+    let home = folder();
+    let cases = "[[morph.case]]\nname = \"soft, uniform\"\nremesh = { poisson = 0.1, stiffness = \"uniform\" }\n\
+                 paper = { worst_quality = 0.25, poor = 7 }\n\
+                 [[morph.case]]\nname = \"fine\"\nmesh.block.cells = [8, 8, 8]\n\
+                 [[morph.case]]\nname = \"broken\"\nincrements = 1\n\
+                 motion = [{ nodes = [[0.02, 0.02, 0.04]], displacement = [0, 0, \"-30 mm\"] }]\n";
+    let text = format!("{BLOCK}{cases}");
+    let finished = morph(home.path(), &text, &[]).exits_with(1).says(&["(3 of 3)"]);
+    for fragment in ["(0.2500)", "(7)", "fine", "broken: ", "inverted elements"] {
+        assert!(finished.stdout.contains(fragment), "{}", finished.stdout);
+    }
+    let out = home.path().join("out");
+    let result = read_json(&out.join("result.json"));
+    assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limit".into()));
+    assert_eq!(count(&result, "/cases/1/tets"), 3072);
+    assert_eq!(count(&result, "/cases/0/paper/poor"), 7);
+    let csv = std::fs::read_to_string(out.join("morph.csv")).expect("read");
+    assert_eq!(csv.lines().count(), 4);
+    assert!(
+        csv.lines().nth(1).is_some_and(|row| row.starts_with("\"soft, uniform\",true,105,384,")),
+        "{csv}"
+    );
+    for case in 1..=3 {
+        assert!(out.join(format!("case_{case:02}_after.vtu")).exists());
+    }
+    // A later single motion removes the files of the sweep.
+    morph(home.path(), BLOCK, &["--force"]).exits_with(0);
+    assert!(!out.join("case_01_after.vtu").exists() && out.join("after.vtu").exists());
+}
+
+#[test]
+fn resolved_configurations_repeat_the_motion_bit_for_bit_on_any_number_of_threads() {
+    let home = folder();
+    morph(home.path(), &pressed(""), &["--threads", "1"]).exits_with(0);
+    let first = std::fs::read(home.path().join("out/after.vtu")).expect("read");
+    let resolved = std::fs::read_to_string(home.path().join("out/resolved.toml")).expect("read");
+    morph(home.path(), &resolved, &["--threads", "3", "--force"]).exits_with(0);
+    assert_eq!(std::fs::read(home.path().join("out/after.vtu")).expect("read"), first);
+}
+
+#[test]
+fn the_tuner_writes_a_configuration_that_repeats_what_it_found() {
+    let home = folder();
+    let text = BLOCK
+        .replace("\"5 mm\"", "\"20 mm\"")
+        .replace("region = \"block\"", "region = \"block\"\npoisson = 0.4")
+        + "[morph.tune]\nparameters = [\"poisson\", \"force\"]\nevaluations = 25\n";
+    let tuned = morph(home.path(), &text, &["--tune", "--json"]).exits_with(0).json();
+    let [was, found] = [0, 1].map(|k| number(&tuned, &format!("/tuned/worst_quality/{k}")));
+    // A force along the motion lets the whole body follow: far better than rounding or luck.
+    assert!(found > was + 0.05, "{was} {found}");
+    assert_eq!(number(&tuned, "/cases/0/after/worst"), found);
+    assert!(count(&tuned, "/tuned/evaluations") <= 4 * 26 + 1);
+    let found_again = std::fs::read_to_string(home.path().join("out/tuned.toml")).expect("written");
+    let again = morph(home.path(), &found_again, &["--json", "--force"]).exits_with(0).json();
+    assert_eq!(number(&again, "/cases/0/after/worst"), found);
+}
+
+#[test]
+fn the_tuner_softens_the_region_away_from_the_motion() {
+    let home = folder();
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/block_table2.toml");
+    let out = home.path().join("out");
+    let path = |path: &Path| path.to_str().expect("UTF-8").to_owned();
+    let mut arguments: Vec<String> = ["morph", "--tune", "--json", "--out"].map(str::to_owned).to_vec();
+    arguments.extend([path(&out), path(&config)]);
+    let regions = "remesh.region=[\"inner\", \"outer\"]";
+    for change in [regions, "remesh.free=[\"z_max\", \"inner|outer\"]", "morph.tune.evaluations=15"] {
+        arguments.extend(["--set".to_owned(), change.to_owned()]);
+    }
+    let found = fluxmorph(&arguments).exits_with(0).says(&["the cases are left out"]).json();
+    // The row "middle" of Table 2; the paper's elected parameters make 1.8 times its worst quality.
+    assert!((number(&found, "/tuned/worst_quality/0") - 0.0527).abs() < 1e-4);
+    assert!(number(&found, "/tuned/worst_quality/1") > 1.8 * 0.0527);
+    let [inner, outer] = [0, 1].map(|k| number(&found, &format!("/tuned/regions/{k}/young/1")));
+    assert!(outer < inner, "{inner} {outer}");
+    // On equal cells no stiffness is better than another: the one given stays.
+    assert_eq!(found["tuned"]["stiffness"][1], "uniform");
+}
+
+#[test]
+fn what_cannot_be_moved_is_a_fault_at_its_key() {
+    let home = folder();
+    let refused = |text: &str, fragments: &[&str]| {
+        morph(home.path(), text, &[]).exits_with(3).says(fragments);
+    };
+    let without =
+        BLOCK.split("[[morph").next().expect("a beginning").to_owned() + "[analysis]\nfrequency = 0\n";
+    refused(&without, &["missing table `morph`", "[[morph.motion]]"]);
+    refused(
+        &BLOCK.replace("\"20 mm\", \"20 mm\", \"40 mm\"", "\"21 mm\", \"20 mm\", \"40 mm\""),
+        &["there is no node at (21.000, 20.000, 40.000) mm", "the nearest is at (20.000, 20.000, 40.000) mm"],
+    );
+    refused(
+        &BLOCK.replace("nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]", "surface = \"top\""),
+        &["there is no surface `top`", "z_max"],
+    );
+    refused(
+        &BLOCK.replace("nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]", "box = [[1, 1, 1], [2, 2, 2]]"),
+        &["`morph.motion[0].box` holds no node of the mesh"],
+    );
+    let designed = BLOCK.split("nodes").next().expect("a beginning").to_owned() + "design = \"upper\"\n";
+    refused(&designed, &["there is no [design]"]);
+    // A name that only a case gives wrong is shown at the line of the case.
+    let case = format!("{BLOCK}[[morph.case]]\nname = \"a\"\nremesh.free = [\"lid\"]\n");
+    refused(&case, &["there is no surface `lid`", "block.toml:15"]);
+    assert!(!home.path().join("out").exists(), "nothing is written before all is known");
+    morph(home.path(), &format!("{case}[morph.tune]\nevaluations = 0\n"), &["--tune"])
+        .exits_with(3)
+        .says(&["out of range"]);
+}
+
+#[test]
+fn check_lists_the_motions() {
+    let home = folder();
+    let config = home.path().join("block.toml");
+    std::fs::write(&config, BLOCK).expect("written");
+    let arguments = ["check", config.to_str().expect("UTF-8"), "--json"];
+    let summary = fluxmorph(&arguments).exits_with(0).json();
+    assert_eq!((count(&summary, "/motions/0/equations"), count(&summary, "/motions/0/elements")), (105, 384));
+    // Solving it all the same is refused: no surface has a condition.
+    fluxmorph(&["solve", config.to_str().expect("UTF-8")])
+        .exits_with(3)
+        .says(&["no surface has a condition"]);
+}
