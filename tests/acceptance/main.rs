@@ -5,6 +5,7 @@ mod bad_input;
 mod commands;
 mod determinism;
 mod folders;
+mod fresh_mesh;
 mod interruption;
 mod mesh_files;
 mod morph;

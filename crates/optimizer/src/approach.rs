@@ -1,14 +1,17 @@
-//! Taking the mesh of a problem to a design that a single step from the undeformed mesh does not reach.
+//! Taking the mesh of a problem to a design: in one step where that keeps the limits, else in rounds.
 
-use fluxmorph_remesh::{Event, RemeshError, Travelled};
+use std::ops::ControlFlow;
+
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_remesh::{Event, Limits, Motion, Moved, RemeshError, Travelled};
 
 use crate::error::Error;
-use crate::problem::Problem;
+use crate::problem::{Problem, Shape};
 use crate::rounds::RoundEvent;
 
 impl Problem {
-    /// Makes a mesh near a design the reference of the present round, in as many rounds as the way there takes; nothing
-    /// where a single step does, or where the problem allows no rounds.
+    /// Makes the mesh of a design the reference of the present round; nothing where it is already, or where the problem
+    /// allows no rounds. What happened on the way, if one step was not enough.
     ///
     /// # Errors
     /// [`Error::DesignUnreached`] says how far the mesh can be taken.
@@ -16,29 +19,81 @@ impl Problem {
     /// # Panics
     /// If `p` has another length than there are variables.
     pub fn approach(&mut self, p: &[f64]) -> Result<Vec<RoundEvent>, Error> {
+        let Some(shape) = &self.shape else { return Ok(Vec::new()) };
+        let displacement = shape.displacement(p);
+        self.approach_displacement(displacement)
+    }
+
+    /// As [`Problem::approach`] for displacements of the design nodes from the undeformed mesh [m], shape `(n_design, 3)`,
+    /// whether or not any variables give them.
+    ///
+    /// # Errors
+    /// As [`Problem::approach`].
+    ///
+    /// # Panics
+    /// If there is not one displacement per design node.
+    pub fn approach_displacement(&mut self, goal: Vec<Point>) -> Result<Vec<RoundEvent>, Error> {
         let Some(shape) = self.shape.as_mut().filter(|shape| shape.limits.rounds > 0) else {
             return Ok(Vec::new());
         };
-        let last = shape.displacement(p);
-        match shape.motion.moved(&last) {
-            Ok(moved) if 1.0 / moved.inversion.step <= shape.limits.inversion_share => return Ok(Vec::new()),
+        let Some((motion, events)) = shape.standing_at(&shape.motion, goal)? else { return Ok(Vec::new()) };
+        shape.motion = motion;
+        Ok(events)
+    }
+}
+
+impl Shape {
+    /// The mesh of a design from the undeformed one, whatever the present round.
+    ///
+    /// # Errors
+    /// As [`Problem::approach`], and [`RemeshError::Inverted`] where there are no rounds.
+    pub fn from_undeformed(&self, p: &[f64]) -> Result<Moved, Error> {
+        let (motion, goal) = (self.motion.restarted()?, self.displacement(p));
+        let standing = if self.limits.rounds > 0 { self.standing_at(&motion, goal.clone())? } else { None };
+        let motion = standing.map_or(motion, |(motion, _)| motion);
+        Ok(motion.moved(&goal)?)
+    }
+
+    /// The round after a motion that stands at displacements of the design nodes, and what happened on the way there;
+    /// `None` if the motion does.
+    fn standing_at(
+        &self,
+        motion: &Motion,
+        goal: Vec<Point>,
+    ) -> Result<Option<(Motion, Vec<RoundEvent>)>, Error> {
+        let start = motion.anchor();
+        if start == goal {
+            return Ok(None);
+        }
+        // The rounds of the limits are the optimisation's.
+        let limits = Limits { rounds: Limits::default().rounds, ..self.limits };
+        match motion.moved(&goal) {
+            Ok(moved)
+                if 1.0 / moved.inversion.step <= limits.inversion_share
+                    && motion.quality(&moved.mesh).worst >= limits.least_quality =>
+            {
+                let motion = motion.rebased(moved.mesh, moved.displacement, goal, motion.policy())?;
+                return Ok(Some((motion, Vec::new())));
+            }
             Ok(_) | Err(RemeshError::Inverted { .. }) => {}
             Err(other) => return Err(other.into()),
         }
-        let first = shape.motion.anchor().to_vec();
-        let path = |t: f64| -> Vec<[f64; 3]> {
+        let path = |t: f64| -> Vec<Point> {
             let between =
-                |(from, to): (&[f64; 3], &[f64; 3])| std::array::from_fn(|d| from[d] + t * (to[d] - from[d]));
-            if t == 1.0 { last.clone() } else { first.iter().zip(&last).map(between).collect() }
+                |(from, to): (&Point, &Point)| std::array::from_fn(|d| from[d] + t * (to[d] - from[d]));
+            if t == 1.0 { goal.clone() } else { start.iter().zip(&goal).map(between).collect() }
         };
         let mut events = Vec::new();
-        let mut tell = |event: &Event| events.push(*event);
-        let Travelled { motion, moved, reached, .. } =
-            shape.motion.clone().travel(&path, &shape.limits, &mut tell)?;
+        let travelled = motion.clone().travel(&path, &limits, &mut |event: &Event| {
+            events.push(RoundEvent::approach(event));
+            ControlFlow::Continue(())
+        })?;
+        let Travelled { motion, moved, reached, .. } = travelled;
         if reached < 1.0 {
             return Err(Error::DesignUnreached { reached });
         }
-        shape.motion = motion.rebased(moved.mesh, moved.displacement, last.clone(), motion.policy())?;
-        Ok(events.iter().map(|event| RoundEvent::approach(event, &shape.motion)).collect())
+        let policy = motion.policy();
+        let motion = motion.rebased(moved.mesh, moved.displacement, goal.clone(), policy)?;
+        Ok(Some((motion, events)))
     }
 }

@@ -6,6 +6,7 @@ use fluxmorph_solver::SolverError;
 
 use crate::cli::ExitCode;
 use crate::config::ConfigError;
+use crate::design::Apart;
 use crate::geometric::GeometricError;
 use crate::output::{DesignFileError, OutputError};
 
@@ -28,6 +29,9 @@ pub enum Error {
     /// A geometric constraint has no meaning for the shape.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
+    /// A shape cannot be taken over by another mesh.
+    #[error(transparent)]
+    Apart(#[from] Apart),
     /// A file with a design is wrong.
     #[error(transparent)]
     Design(#[from] DesignFileError),
@@ -97,6 +101,7 @@ impl Error {
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
             | Self::DesignUnreached { .. }
+            | Self::Apart(_)
             | Self::Config(_)
             | Self::Solver(_)
             | Self::Remesh(_)

@@ -12,6 +12,7 @@ pub mod driver;
 mod error;
 mod exports;
 pub mod fields;
+pub mod fresh_mesh;
 pub mod geometric;
 pub mod morph;
 pub mod objective;

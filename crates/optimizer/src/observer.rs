@@ -114,6 +114,11 @@ pub trait Observer {
         let _ = event;
     }
 
+    /// Something that was left out, and why; nothing to act on.
+    fn notice(&mut self, message: &str) {
+        let _ = message;
+    }
+
     /// Something the user should know; the run goes on.
     fn warning(&mut self, message: &str) {
         let _ = message;
@@ -236,6 +241,10 @@ impl<W: Write> Observer for Console<W> {
         self.line(&event.describe());
     }
 
+    fn notice(&mut self, message: &str) {
+        self.line(&format!("note: {message}"));
+    }
+
     fn warning(&mut self, message: &str) {
         show_warning(&mut self.writer, message);
     }
@@ -249,6 +258,9 @@ impl<W: Write> Observer for Console<W> {
             row("objective, initial", format!("{:.6e}", objective.initial));
             row("objective, best", format!("{:.6e} {evaluation}", objective.best));
             row("F/F0", format!("{:.5}", objective.ratio));
+            if let Some(fresh) = &objective.verification {
+                row("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets));
+            }
         }
         for constraint in &result.constraints {
             let ConstraintResult { name, value, bound, satisfied } = constraint;
@@ -328,7 +340,14 @@ mod tests {
         let mut bytes = Vec::new();
         Console::new(&mut bytes).finished(&crate::output::example_result());
         let text = String::from_utf8(bytes).expect("text");
-        for fragment in ["the objective has converged", "F/F0", "0.50000", "8 (7 iterations)", "in plate"] {
+        for fragment in [
+            "the objective has converged",
+            "F/F0",
+            "0.50000",
+            "8 (7 iterations)",
+            "in plate",
+            "0.50000 (147000 tetrahedra)",
+        ] {
             assert!(text.contains(fragment), "{fragment}\n{text}");
         }
     }

@@ -269,7 +269,8 @@ impl Problem {
         let share = |constraint: &Constraint| matches!(constraint.limit, Limit::AtMostRatio(_));
         let initial;
         let measured = if p != shape.initial && self.constraints.iter().any(share) {
-            initial = self.evaluate(&shape.initial, Want::Value)?;
+            // Of the undeformed mesh's motion, as a run has it, and not of the round around `p`.
+            initial = self.analyse(&shape.initial, shape.from_undeformed(&shape.initial)?, Want::Value)?;
             &initial.constraints
         } else {
             &analysis.constraints

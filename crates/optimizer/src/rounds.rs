@@ -1,6 +1,6 @@
 //! What happens to the mesh between evaluations: rounds that begin, and remedies that are taken.
 
-use fluxmorph_remesh::{Event, Motion, Rescue, Rescued};
+use fluxmorph_remesh::{Event, Rescue, Rescued};
 use serde::{Deserialize, Serialize};
 
 /// What happened.
@@ -44,20 +44,24 @@ pub struct RoundEvent {
 
 impl RoundEvent {
     /// A step of the way to the first design.
-    pub fn approach(event: &Event, motion: &Motion) -> Self {
-        let none = Self {
-            round: motion.round(),
+    pub fn approach(event: &Event) -> Self {
+        let (round, policy, quality) = match *event {
+            Event::Stepped { round, policy, quality, .. } => (round + 1, policy, [quality; 2]),
+            Event::Rescued { round, policy, rescued } => (round, policy, rescued.quality),
+        };
+        let event_of_step = Self {
+            round,
             kind: RoundKind::Approach,
             evaluation: None,
-            worst_quality: [f64::NAN; 2],
+            worst_quality: quality,
             admitted: None,
-            stiffness: motion.policy().name().to_owned(),
+            stiffness: policy.name().to_owned(),
             reach: [1.0; 2],
-            cause: "the first design lies too far from the undeformed mesh for a single step".to_owned(),
+            cause: "the design lies too far from the undeformed mesh for a single step".to_owned(),
         };
-        match *event {
-            Event::Stepped { round, quality, .. } => Self { round, worst_quality: [quality; 2], ..none },
-            Event::Rescued(rescued) => none.with(&rescued),
+        match event {
+            Event::Stepped { .. } => event_of_step,
+            Event::Rescued { rescued, .. } => event_of_step.with(rescued),
         }
     }
 
@@ -87,7 +91,7 @@ impl RoundEvent {
         let percent = |share: &f64| 100.0 * share;
         match self.kind {
             RoundKind::Approach => {
-                format!("round {round} on the way to the first design: worst quality {after:.4}")
+                format!("round {round} on the way to the design: worst quality {after:.4}")
             }
             RoundKind::Round => format!(
                 "round {round}: {cause}; {reference}, worst quality {after:.4}, the search may go {:.0} % of the bounds' \

@@ -16,6 +16,7 @@ use crate::driver::{self, Recorder};
 use crate::error::Error;
 use crate::exports;
 use crate::fields;
+use crate::fresh_mesh::{Gain, Shapes};
 use crate::objective::Term;
 use crate::observer::{Evaluation, Observer, Started};
 use crate::output::{
@@ -49,9 +50,13 @@ pub fn run(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let setup = set_up(config, source, Purpose::Optimisation)?;
+    let mut setup = set_up(config, source, Purpose::Optimisation)?;
+    // A first design that the mesh cannot reach is refused before an earlier run is replaced.
+    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
+    let approach = setup.problem.approach(&initial)?;
     let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
+        approach.iter().for_each(|event| observer.round(event));
         let mut recorder = DirectoryRecorder {
             directory: &session.directory,
             history: History::create(&session.directory, &constraint_names(&session.setup.problem))?,
@@ -66,7 +71,7 @@ pub fn run(
             recorder.write(best.evaluation, problem, &best.analysis)?;
         }
         exports::write(config, &session.directory, &best.analysis.mesh, observer)?;
-        Ok(RunResult {
+        let result = RunResult {
             evaluations: optimised.evaluations,
             iterations: optimised.iterations,
             objective: Some(ObjectiveResult {
@@ -74,10 +79,12 @@ pub fn run(
                 best: best.objective,
                 ratio: best.objective / optimised.initial,
                 best_evaluation: best.evaluation,
+                verified_ratio: None,
+                verification: None,
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            rounds: optimised.rounds.clone(),
+            rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: LinearSolverResult { worst_residual: optimised.worst_residual },
             ..session.result(
                 optimised.stop_reason,
@@ -87,7 +94,10 @@ pub fn run(
                 &optimised.timings,
                 observer,
             )?
-        })
+        };
+        let shapes = Shapes::of(config, &session.setup, &best.values)?;
+        drop(optimised);
+        session.verified(result, &shapes, options.interrupted, observer)
     })
 }
 
@@ -121,11 +131,12 @@ pub fn solve(
     };
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    setup.problem.approach(p)?;
+    let approach = setup.problem.approach(p)?;
     let moved = setup.problem.moved(p)?;
     let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
+        approach.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
         let analysis = problem.analyse(p, moved, Want::Gradient)?;
@@ -144,9 +155,12 @@ pub fn solve(
                 best: value,
                 ratio: 1.0,
                 best_evaluation: 0,
+                verified_ratio: None,
+                verification: None,
                 terms: terms(problem, &analysis),
             }),
             constraints: constraints(problem, &analysis, &bounds),
+            rounds: approach.clone(),
             ..session.result(
                 StopReason::Done,
                 &analysis,
@@ -231,6 +245,32 @@ impl<'a> Session<'a> {
     fn write_configuration(&self) -> Result<(), Error> {
         write_atomic(&self.directory.config(), self.source.text().as_bytes())?;
         Ok(write_atomic(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
+    }
+
+    /// The result with the gain checked on a fresh mesh; the run's own problem is gone then.
+    ///
+    /// # Errors
+    /// When the result cannot be written.
+    fn verified(
+        &mut self,
+        mut result: RunResult,
+        shapes: &Shapes,
+        interrupted: &dyn Fn() -> bool,
+        observer: &mut dyn Observer,
+    ) -> Result<RunResult, Error> {
+        // The check may need more memory or patience than there is: what the run has found is safe before.
+        result.write(&self.directory)?;
+        (self.setup.problem.states, self.setup.problem.shape) = (Vec::new(), None);
+        let clock = Instant::now();
+        let gain = Gain { config: self.config, source: self.source, stop_reason: result.stop_reason, shapes };
+        if let Some(objective) = &mut result.objective {
+            gain.verify(objective, interrupted, observer);
+        }
+        let seconds = clock.elapsed().as_secs_f64();
+        result.timings_s.insert("verification".to_owned(), seconds);
+        result.timings_s.insert("total".to_owned(), self.clock.elapsed().as_secs_f64());
+        result.peak_memory_bytes = peak_memory_bytes();
+        Ok(result)
     }
 
     /// The parts of a result that run and solve share.

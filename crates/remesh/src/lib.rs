@@ -35,4 +35,4 @@ pub use rescue::{Rescue, Rescued, Rung};
 pub use smoothing::{Smoothed, SmoothingSettings, least_shape, smooth, smooth_points};
 pub use solver::SolverChoice;
 pub use subregion::Subregion;
-pub use travel::{Event, Limits, Travelled};
+pub use travel::{Event, Limits, Tell, Travelled};

@@ -5,10 +5,10 @@
 //! displacement at which it stands (the *anchor*), `Δx` the affine map of Eq. 3 frozen on `X_r`. That is what makes an
 //! objective a function of the design and its gradient exact. [`Motion::rebased`] starts the next round on a mesh that
 //! was reached: stiffness and factor are new, pattern and symbolic factor stay. The fictitious force acts in the first
-//! round only, else it would be taken again with every round. When a round ends is not decided here, but by
+//! step only, else it would be taken again with every round. When a round ends is not decided here, but by
 //! [`crate::travel`] on a given path, and by an optimiser on its own.
 
-use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use std::sync::Arc;
 
 use fluxmorph_geometry::quality::{QualityReport, quality};
@@ -25,6 +25,13 @@ use crate::travel::Limits;
 /// Halvings in the search for the share of a step that keeps a quality: to a thousandth of the step.
 const ADMITTED_BITS: usize = 10;
 
+/// Whether the fictitious force is still to be taken: it acts once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Force {
+    Due,
+    Taken,
+}
+
 /// A mesh that follows a design, in its present round. A clone shares the factor.
 #[derive(Clone, Debug)]
 pub struct Motion {
@@ -34,6 +41,8 @@ pub struct Motion {
     displacement: Vec<Point>,
     anchor: Vec<Point>,
     map: Arc<ElasticMap>,
+    moving: Arc<[ElementId]>,
+    force: Force,
     round: usize,
 }
 
@@ -55,9 +64,19 @@ impl Motion {
     /// As [`ElasticMap::new`].
     pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let map = Arc::new(ElasticMap::new(&original, setup)?);
+        let moving = moving_elements(&original, &map);
         let anchor = vec![[0.0; 3]; map.design_nodes().len()];
         let displacement = vec![[0.0; 3]; original.points().len()];
-        Ok(Self { reference: original.clone(), original, displacement, anchor, map, round: 0 })
+        Ok(Self {
+            reference: original.clone(),
+            original,
+            displacement,
+            anchor,
+            map,
+            moving,
+            force: Force::Due,
+            round: 0,
+        })
     }
 
     /// The next round, on a mesh that this one reached: `displacement` is that of every node from the original mesh,
@@ -78,8 +97,9 @@ impl Motion {
         assert_eq!(displacement.len(), reference.points().len(), "one displacement per node");
         assert_eq!(anchor.len(), self.anchor.len(), "one displacement per design node");
         let map = Arc::new(self.map.rebased(&reference, policy)?);
-        let original = self.original.clone();
-        Ok(Self { original, reference, displacement, anchor, map, round: self.round + 1 })
+        let (original, moving) = (self.original.clone(), Arc::clone(&self.moving));
+        let (force, round) = (Force::Taken, self.round + 1);
+        Ok(Self { original, reference, displacement, anchor, map, moving, force, round })
     }
 
     /// This motion, counted as the round after another.
@@ -87,12 +107,31 @@ impl Motion {
         Self { round: other.round + 1, ..self }
     }
 
+    /// The first round again, on the undeformed mesh.
+    ///
+    /// # Errors
+    /// As [`Motion::new`].
+    pub fn restarted(&self) -> Result<Self, RemeshError> {
+        Self::new(self.original.clone(), self.map.setup().clone())
+    }
+
     /// The same place with another stiffness: a round of its own.
     ///
     /// # Errors
     /// As [`ElasticMap::rebased`].
     pub fn with_policy(&self, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
-        self.rebased(self.reference.clone(), self.displacement.clone(), self.anchor.clone(), policy)
+        self.replaced(self.reference.clone(), self.displacement.clone(), policy)
+    }
+
+    /// Another mesh, or another stiffness, at the same place.
+    pub(crate) fn replaced(
+        &self,
+        reference: Mesh,
+        displacement: Vec<Point>,
+        policy: StiffnessPolicy,
+    ) -> Result<Self, RemeshError> {
+        let motion = self.rebased(reference, displacement, self.anchor.clone(), policy)?;
+        Ok(Self { force: self.force, ..motion })
     }
 
     /// Displacement of every node from the round's reference [m], shape `(n_nodes, 3)`, for displacements of the design
@@ -104,13 +143,22 @@ impl Motion {
     /// # Panics
     /// If there is not one displacement per design node.
     pub fn step(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
-        if self.round == 0 {
-            return self.map.displacement(design);
-        }
         assert_eq!(design.len(), self.anchor.len(), "one displacement per design node");
         let change: Vec<Point> =
             design.iter().zip(&self.anchor).map(|(u, anchor)| sub(*u, *anchor)).collect();
-        self.map.linear(&change)
+        match self.force {
+            Force::Due => self.map.displacement(&change),
+            Force::Taken => self.map.linear(&change),
+        }
+    }
+
+    /// The round's reference as a mesh of the round: what no step at all leads to.
+    pub(crate) fn unmoved(&self) -> Moved {
+        Moved {
+            mesh: self.reference.clone(),
+            displacement: self.displacement.clone(),
+            inversion: StepToInversion { step: f64::INFINITY, element: None },
+        }
     }
 
     /// The mesh of a design.
@@ -146,10 +194,7 @@ impl Motion {
                 [0, 1, 2].map(|d| x[d] + share * u[d])
             };
             let topology = self.reference.topology();
-            self.map
-                .elements()
-                .par_iter()
-                .all(|&e| quality(topology.tet(e).map(vertex)) >= limits.least_quality)
+            self.moving.par_iter().all(|&e| quality(topology.tet(e).map(vertex)) >= limits.least_quality)
         };
         if limits.least_quality <= 0.0 || keeps(most) {
             return most;
@@ -162,9 +207,15 @@ impl Motion {
         low
     }
 
-    /// Quality of the elastic body's elements on a mesh of this topology.
+    /// Quality of the elements that may move, on a mesh of this topology.
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
-        QualityReport::of_elements(mesh, self.map.elements()).expect("an elastic body has elements")
+        QualityReport::of_elements(mesh, &self.moving).expect("an elastic body has elements")
+    }
+
+    /// Elements of the elastic body, and those beside it that share a node that may move: faces at which the body ends
+    /// move too where they are listed as sliding or free. Ascending.
+    pub fn moving(&self) -> &[ElementId] {
+        &self.moving
     }
 
     /// Least share of its original shape that an element of the elastic body has on a mesh of this topology: 1 where all
@@ -207,4 +258,16 @@ impl Motion {
     pub fn policy(&self) -> StiffnessPolicy {
         self.map.policy()
     }
+}
+
+/// Elements of the body, and those around nodes that may move.
+fn moving_elements(mesh: &Mesh, map: &ElasticMap) -> Arc<[ElementId]> {
+    let topology = mesh.topology();
+    let mut moves = vec![false; topology.tets().len()];
+    map.elements().iter().for_each(|e| moves[e.index()] = true);
+    let free = topology.nodes().filter(|&n| (0..3).any(|component| map.is_unknown(n, component)));
+    for node in free.chain(map.design_nodes().iter().copied()) {
+        topology.elements_around(node).iter().for_each(|e| moves[e.index()] = true);
+    }
+    topology.elements().filter(|e| moves[e.index()]).collect()
 }

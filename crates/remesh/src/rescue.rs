@@ -9,7 +9,8 @@
 //! A motion along a given path has one more, because its meshes need not follow one another: smoothing as a matter of
 //! course before each round that would begin on worn elements.
 
-use fluxmorph_geometry::Mesh;
+use std::ops::ControlFlow;
+
 use fluxmorph_geometry::tet4::{Point, add};
 
 use crate::deform::{Guidance, RemeshSetup};
@@ -19,7 +20,8 @@ use crate::policy::StiffnessPolicy;
 use crate::smoothing::{SmoothingSettings, smooth};
 use crate::travel::Limits;
 
-/// Another policy is taken if it carries the refused step at least this much further.
+/// Another policy is taken if it carries the refused step at least this much further: it costs a factor, and the model
+/// that a method has built of the objective.
 const WORTHWHILE: f64 = 1.1;
 
 /// Smoothing that leaves elements with less than this part of the share of their shape they should have is no help: the
@@ -111,6 +113,7 @@ impl Motion {
             return Ok(Some((motion, rescued, Rung::Policies)));
         }
         if rung < Rung::Smoothed
+            && self.map().guidance() == Guidance::Free
             && let Some((motion, nodes)) = self.smoothed()?
         {
             let after = motion.admitted(&motion.step(wanted)?, limits);
@@ -150,26 +153,27 @@ impl Motion {
     /// # Errors
     /// As [`Motion::rebased`].
     pub fn smoothed(&self) -> Result<Option<(Self, usize)>, RemeshError> {
-        let (mesh, displacement) = (self.reference(), self.reference_displacement());
-        self.on_smoothed(mesh, displacement, self.anchor(), SmoothingSettings::default())
+        let smoothed = self.smooth_mesh(&self.unmoved(), SmoothingSettings::default())?;
+        let on = |(moved, nodes): (Moved, usize)| {
+            Ok((self.replaced(moved.mesh, moved.displacement, self.policy())?, nodes))
+        };
+        smoothed.map(on).transpose()
     }
 
-    /// The next round on a mesh of this one, smoothed.
-    fn on_smoothed(
+    /// A mesh of this motion, smoothed, and how many nodes moved; `None` where none did.
+    fn smooth_mesh(
         &self,
-        mesh: &Mesh,
-        displacement: &[Point],
-        anchor: &[Point],
+        moved: &Moved,
         settings: SmoothingSettings,
-    ) -> Result<Option<(Self, usize)>, RemeshError> {
-        let smoothed = smooth(mesh, Some(self.original()), self.map().elements(), &settings)?;
+    ) -> Result<Option<(Moved, usize)>, RemeshError> {
+        let smoothed = smooth(&moved.mesh, Some(self.original()), self.map().elements(), &settings)?;
         if smoothed.moved_nodes == 0 {
             return Ok(None);
         }
-        let displacement =
-            displacement.iter().zip(&smoothed.displacement).map(|(u, step)| add(*u, *step)).collect();
-        let motion = self.rebased(smoothed.mesh, displacement, anchor.to_vec(), self.policy())?;
-        Ok(Some((motion, smoothed.moved_nodes)))
+        let steps = moved.displacement.iter().zip(&smoothed.displacement);
+        let displacement = steps.map(|(u, step)| add(*u, *step)).collect();
+        let moved = Moved { mesh: smoothed.mesh, displacement, inversion: moved.inversion };
+        Ok(Some((moved, smoothed.moved_nodes)))
     }
 
     /// The next round on the mesh that this one reached at `design` on the way to `goal`, if elements of it have less than
@@ -190,14 +194,15 @@ impl Motion {
             return Ok(None);
         }
         let settings = SmoothingSettings { target: least, ..SmoothingSettings::default() };
-        let smoothed = self.on_smoothed(&moved.mesh, &moved.displacement, design, settings)?;
-        let shape = smoothed.as_ref().map_or(0.0, |(motion, _)| motion.shape(motion.reference()));
+        let smoothed = self.smooth_mesh(moved, settings)?;
+        let shape = smoothed.as_ref().map_or(0.0, |(moved, _)| self.shape(&moved.mesh));
         if shape < WORN_OUT * least
             && let Some(guided) = self.guided(design, goal, limits)?
         {
             return Ok(Some(guided));
         }
-        let Some((motion, nodes)) = smoothed else { return Ok(None) };
+        let Some((smooth, nodes)) = smoothed else { return Ok(None) };
+        let motion = self.rebased(smooth.mesh, smooth.displacement, design.to_vec(), self.policy())?;
         let quality = [&moved.mesh, motion.reference()].map(|mesh| motion.quality(mesh).worst);
         // Nothing was refused: there is no step to hold against another.
         let rescued = Rescued { rescue: Rescue::Smoothing { nodes }, quality, admitted: [1.0; 2] };
@@ -226,8 +231,9 @@ impl Motion {
             ..self.map().setup().clone()
         };
         let path = |t: f64| design.iter().map(|u| u.map(|u| t * u)).collect();
-        let anew =
-            Self::new(self.original().clone(), setup)?.travel(&path, &Limits::default(), &mut |_| ())?;
+        let way = Limits { least_quality: limits.least_quality, ..Limits::default() };
+        let anew = Self::new(self.original().clone(), setup)?
+            .travel(&path, &way, &mut |_| ControlFlow::Continue(()))?;
         if anew.reached < 1.0 {
             return Ok(None);
         }

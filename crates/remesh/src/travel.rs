@@ -5,11 +5,17 @@
 //! interior smoothed if elements are worn. Where even a short step is refused, the remedies of [`crate::rescue`] are
 //! tried. Nothing here is chosen by a field or an objective.
 
+use std::ops::ControlFlow;
+
 use fluxmorph_geometry::tet4::Point;
 
 use crate::error::RemeshError;
 use crate::motion::{Motion, Moved};
+use crate::policy::StiffnessPolicy;
 use crate::rescue::{Rescued, Rung};
+
+/// Hears of every step; a break ends the way there.
+pub type Tell<'a> = &'a mut dyn FnMut(&Event) -> ControlFlow<()>;
 
 /// Shortest part of the path that is still called progress.
 const SHORTEST_STRIDE: f64 = 1e-3;
@@ -51,11 +57,28 @@ pub enum Event {
         reached: f64,
         /// Share of the way to the first inversion that the step used.
         share: f64,
-        /// Worst quality of the elastic body.
+        /// Worst quality of the elements that may move.
         quality: f64,
+        /// How stiffness follows element size in it.
+        policy: StiffnessPolicy,
     },
     /// A remedy was taken.
-    Rescued(Rescued),
+    Rescued {
+        /// Rounds begun, that after the remedy included.
+        round: usize,
+        /// How stiffness follows element size from now on.
+        policy: StiffnessPolicy,
+        /// What was done.
+        rescued: Rescued,
+    },
+}
+
+/// What a search for the longest step found.
+enum Stride {
+    /// A step to this part of the path.
+    Taken(f64, Moved),
+    /// Even the shortest step was refused, towards these displacements.
+    Refused(Vec<Point>),
 }
 
 /// Where a motion came to.
@@ -75,16 +98,18 @@ pub struct Travelled {
 
 impl Travelled {
     /// A remedy gave another mesh, or another map, for the place reached.
-    fn go_on(&mut self, motion: Motion) -> Result<(), RemeshError> {
-        self.moved = motion.moved(motion.anchor())?;
+    fn go_on(&mut self, motion: Motion, rescued: Rescued, tell: Tell<'_>) -> ControlFlow<()> {
+        self.moved = motion.unmoved();
+        let (round, policy) = (motion.round(), motion.policy());
         self.motion = motion;
         self.rescues += 1;
-        Ok(())
+        tell(&Event::Rescued { round, policy, rescued })
     }
 }
 
 impl Motion {
-    /// Moves the mesh along a path of design displacements from the original mesh [m], which begins at the anchor.
+    /// Moves the mesh along a path of design displacements from the original mesh [m], which begins at the anchor; `tell`
+    /// hears of every step and may end the way there.
     ///
     /// A path that cannot be followed to its end is no error: see [`Travelled::reached`].
     ///
@@ -97,38 +122,44 @@ impl Motion {
         self,
         path: &dyn Fn(f64) -> Vec<Point>,
         limits: &Limits,
-        tell: &mut dyn FnMut(&Event),
+        tell: Tell<'_>,
     ) -> Result<Travelled, RemeshError> {
         let mut travelled =
-            Travelled { moved: self.moved(self.anchor())?, motion: self, reached: 0.0, steps: 0, rescues: 0 };
+            Travelled { moved: self.unmoved(), motion: self, reached: 0.0, steps: 0, rescues: 0 };
         let mut rung = Rung::Ground;
         while travelled.reached < 1.0 && travelled.steps < limits.rounds {
             let motion = &travelled.motion;
             match motion.stride(path, travelled.reached, limits)? {
-                Ok((reached, moved)) => {
+                Stride::Taken(reached, moved) => {
                     let share = 1.0 / moved.inversion.step;
                     let quality = motion.quality(&moved.mesh).worst;
-                    tell(&Event::Stepped { round: motion.round(), reached, share, quality });
+                    let (round, policy) = (motion.round(), motion.policy());
+                    let told = tell(&Event::Stepped { round, reached, share, quality, policy });
                     let anchor = path(reached);
                     let refreshed = motion.refreshed(&moved, &anchor, &path(1.0), limits)?;
                     (travelled.reached, travelled.moved) = (reached, moved);
                     travelled.steps += 1;
                     rung = Rung::Ground;
+                    if told.is_break() {
+                        break;
+                    }
                     if let Some((motion, rescued)) = refreshed {
-                        tell(&Event::Rescued(rescued));
-                        travelled.go_on(motion)?;
+                        if travelled.go_on(motion, rescued, tell).is_break() {
+                            break;
+                        }
                     } else if reached < 1.0 && travelled.steps < limits.rounds {
                         let Moved { mesh, displacement, .. } = travelled.moved.clone();
                         let policy = travelled.motion.policy();
                         travelled.motion = travelled.motion.rebased(mesh, displacement, anchor, policy)?;
                     }
                 }
-                Err(refused) => {
+                Stride::Refused(refused) => {
                     let Some((motion, rescued, next)) = motion.rescued(&refused, rung, limits)? else {
                         break;
                     };
-                    tell(&Event::Rescued(rescued));
-                    travelled.go_on(motion)?;
+                    if travelled.go_on(motion, rescued, tell).is_break() {
+                        break;
+                    }
                     rung = next;
                 }
             }
@@ -136,13 +167,13 @@ impl Motion {
         Ok(travelled)
     }
 
-    /// The longest step along the path that keeps the limits, or the displacements that even the shortest was refused for.
+    /// The longest step along the path that keeps the limits.
     fn stride(
         &self,
         path: &dyn Fn(f64) -> Vec<Point>,
         from: f64,
         limits: &Limits,
-    ) -> Result<Result<(f64, Moved), Vec<Point>>, RemeshError> {
+    ) -> Result<Stride, RemeshError> {
         let mut stride = 1.0 - from;
         loop {
             let to = if stride >= 1.0 - from { 1.0 } else { from + stride };
@@ -155,7 +186,7 @@ impl Motion {
             } else {
                 match self.taken(&step, inversion) {
                     Ok(moved) if self.quality(&moved.mesh).worst >= limits.least_quality => {
-                        return Ok(Ok((to, moved)));
+                        return Ok(Stride::Taken(to, moved));
                     }
                     // Inverted, though the exact root lies further: elements so flat that rounding decides.
                     Ok(_) | Err(RemeshError::Inverted { .. }) => 0.5,
@@ -163,7 +194,7 @@ impl Motion {
                 }
             };
             if stride * shorter < SHORTEST_STRIDE {
-                return Ok(Err(design));
+                return Ok(Stride::Refused(design));
             }
             stride *= shorter;
         }

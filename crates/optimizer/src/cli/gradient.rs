@@ -17,7 +17,7 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     with_threads(args.common.threads, |_| {
         let mut observer = observer(args.common.quiet);
         observer.phase("setting up mesh and matrices");
-        let setup = set_up(&config, &source, Purpose::Optimisation)?;
+        let mut setup = set_up(&config, &source, Purpose::Optimisation)?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
@@ -26,6 +26,7 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             Some(path) => read_design(path, shape.surface.variable_count())?,
             None => shape.initial.clone(),
         };
+        setup.problem.approach(&p)?;
         let settings = Settings::default();
         let certificates = certify_all(&setup.problem, &p, &settings, |constraint, index, direction| {
             observer.phase(&format!(

@@ -192,6 +192,20 @@ impl MeshConfig {
     }
 }
 
+impl MeshConfig {
+    /// The same with a refinement so many times as large; `None` for a mesh without such a parameter.
+    pub fn refined(&self, factor: f64) -> Option<Self> {
+        let mut refined = self.clone();
+        match &mut refined {
+            Self::Shield(shield) => shield.refinement *= factor,
+            Self::Boxes(boxes) => boxes.refinement *= factor,
+            Self::Sphere(sphere) => sphere.refinement *= factor,
+            Self::Block(_) | Self::File { .. } => return None,
+        }
+        Some(refined)
+    }
+}
+
 impl Default for ShieldMesh {
     fn default() -> Self {
         let ShieldParameters {

@@ -5,7 +5,12 @@ use std::path::{Path, PathBuf};
 use serde::{Serialize, Serializer};
 
 use super::choice::choice;
+use super::range::Range;
 use super::section::Section;
+
+/// Refinements of the fresh mesh beside 0: coarser than half the cells shows nothing, finer than four times costs more than
+/// the run.
+const REFINEMENTS: Range = Range::closed(0.5, 4.0);
 
 /// Where results go.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,6 +24,9 @@ pub struct Output {
     pub mesh: bool,
     /// Surfaces of the optimum that are written as STL files. Default: the design surfaces.
     pub stl: Vec<String>,
+    /// Refinement of the fresh mesh, relative to that of the run, on which a run's gain is checked; 0: it is not checked.
+    /// Default 1.25: all nodes lie elsewhere, for about twice the elements.
+    pub verify_refinement: f64,
 }
 
 choice! {
@@ -43,6 +51,7 @@ impl Output {
             fields: FieldsKept::Every,
             mesh: true,
             stl: surfaces.iter().filter(|name| !name.is_empty()).cloned().collect(),
+            verify_refinement: 1.25,
         }
     }
 
@@ -53,7 +62,18 @@ impl Output {
             fields: section.choice("fields").unwrap_or(default.fields),
             mesh: section.boolean("mesh").unwrap_or(default.mesh),
             stl: section.names("stl").unwrap_or(default.stl),
+            verify_refinement: section
+                .number("verify_refinement", Range::FINITE)
+                .unwrap_or(default.verify_refinement),
         };
+        let factor = output.verify_refinement;
+        if factor != 0.0 && !REFINEMENTS.contains(factor) {
+            section.wrong(
+                "verify_refinement",
+                format!("`output.verify_refinement` is {factor}"),
+                format!("0 for no check, or a number {}", REFINEMENTS.describe("")),
+            );
+        }
         section.finish();
         output
     }

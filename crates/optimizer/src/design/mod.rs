@@ -12,6 +12,7 @@ mod grid;
 mod normal;
 mod rim;
 mod ties;
+mod transfer;
 
 use std::collections::BTreeSet;
 
@@ -19,6 +20,7 @@ use fluxmorph_geometry::tet4::{Point, dot};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 pub use grid::dominant_axis;
+pub use transfer::{Apart, Triangulation};
 
 /// Weights of the variables at one node, ascending by variable.
 type Row = Vec<(usize, f64)>;

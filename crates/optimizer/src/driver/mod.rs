@@ -155,10 +155,22 @@ pub fn optimise(
         shrinks: 0,
         rung: Rung::Ground,
         renewals: 0,
+        refused: None,
     };
     let reason = loop {
-        if let Some(reason) = search.once(&mut run, settings)? {
-            break reason;
+        match search.once(&mut run, settings) {
+            Ok(None) => {}
+            Ok(Some(reason)) => break reason,
+            // Between evaluations only the mesh motion can fail: what was reached is saved.
+            Err(error @ Error::Remesh(_)) if run.best.is_some() => {
+                run.observer.warning(&error.to_string());
+                break StopReason::MeshLimit;
+            }
+            Err(error) if run.best.is_some() && error.exit_code() == ExitCode::Numerical => {
+                run.observer.warning(&error.to_string());
+                break StopReason::NumericalFailure;
+            }
+            Err(error) => return Err(error),
         }
     };
     run.finish(reason)
@@ -173,6 +185,8 @@ struct Search {
     /// How far up the ladder since the last gain.
     rung: Rung,
     renewals: usize,
+    /// The design refused last, and why.
+    refused: Option<(String, Vec<f64>)>,
 }
 
 impl Search {
@@ -195,7 +209,8 @@ impl Search {
         let gained = run.best.as_ref().is_some_and(|best| match before {
             None => best.evaluation > evaluations,
             Some((violation, objective)) => {
-                best.violation < violation || (best.objective - objective).abs() > gain * objective.abs()
+                best.violation < (1.0 - gain) * violation
+                    || (best.objective - objective).abs() > gain * objective.abs()
             }
         });
         match outcome {
@@ -205,10 +220,20 @@ impl Search {
                     self.renew(run);
                     return Ok(None);
                 }
-                let best = run.centre();
-                if gained && self.trust.holds_back(run.shape(), &best) && run.has_rounds_left() {
-                    self.next_round(run, settings, "the search reached the edge of its box")?;
+                let held_back = self.trust.holds_back(run.shape(), &run.centre());
+                if gained && held_back {
+                    if run.has_rounds_left() {
+                        self.next_round(run, settings, "the search reached the edge of its box")?;
+                    } else {
+                        self.trust = TrustRegion::new(run.shape(), &run.centre(), self.trust.scale)?;
+                    }
                     return Ok(None);
+                }
+                if held_back
+                    && self.trust.scale < 1.0
+                    && let Some((cause, wanted)) = self.refused.clone()
+                {
+                    return self.climb(run, gained, &cause, &wanted);
                 }
                 Ok(Some(match ending {
                     Ending::Objective => StopReason::ObjectiveConverged,
@@ -237,6 +262,7 @@ impl Search {
                     ));
                 }
                 self.ftol_rel = RESTART_TOLERANCE * settings.ftol_rel;
+                self.refused = Some((cause.clone(), wanted.clone()));
                 if gained && run.has_rounds_left() {
                     self.next_round(run, settings, &cause)?;
                     return Ok(None);
@@ -258,9 +284,7 @@ impl Search {
 
     /// The best mesh becomes the reference, and the box is laid around the best design.
     fn next_round(&mut self, run: &mut Run<'_>, settings: &Optimizer, cause: &str) -> Result<(), Error> {
-        let best = run.best.as_ref().expect("something was gained");
-        let motion = run.shape().next_round(&best.values, &best.analysis)?;
-        run.shape_mut().motion = motion;
+        run.begin_round()?;
         // What a box shrank to is doubled with every gain.
         let scale = (self.trust.scale / SHRINK).min(1.0);
         self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
@@ -297,8 +321,10 @@ impl Search {
             run.tell(event);
             return Ok(None);
         }
-        let shape = run.shape();
         let remedy = if run.has_rounds_left() {
+            // The remedies are for the mesh of the best design.
+            run.stand_at_best()?;
+            let shape = run.shape();
             shape.motion.rescued(&shape.displacement(wanted), self.rung, &shape.limits)?
         } else {
             None

@@ -43,6 +43,8 @@ pub(super) struct Run<'a> {
     worst_residual: f64,
     timings: Timings,
     pub(super) rounds: Vec<RoundEvent>,
+    /// Rounds begun at a best design.
+    begun: usize,
 }
 
 impl<'a> Run<'a> {
@@ -72,6 +74,7 @@ impl<'a> Run<'a> {
             worst_residual: 0.0,
             timings: Timings::default(),
             rounds: Vec::new(),
+            begun: 0,
         }
     }
 
@@ -91,7 +94,21 @@ impl<'a> Run<'a> {
 
     /// Whether another round may begin.
     pub(super) fn has_rounds_left(&self) -> bool {
-        self.shape().motion.round() < self.shape().limits.rounds
+        self.begun < self.shape().limits.rounds
+    }
+
+    /// Makes the mesh of the best design the reference, and counts the round.
+    pub(super) fn begin_round(&mut self) -> Result<(), RemeshError> {
+        self.begun += 1;
+        self.stand_at_best()
+    }
+
+    /// Makes the mesh of the best design the reference.
+    pub(super) fn stand_at_best(&mut self) -> Result<(), RemeshError> {
+        let Some(best) = self.best.as_ref().filter(|_| !self.best_is_stale) else { return Ok(()) };
+        let motion = self.shape().next_round(&best.values, &best.analysis)?;
+        self.shape_mut().motion = motion;
+        Ok(())
     }
 
     /// Keeps what happened to the mesh, and tells it.
@@ -142,9 +159,9 @@ impl<'a> Run<'a> {
         })?;
         let limits = &self.shape().limits;
         let share = 1.0 / moved.inversion.step;
-        // Without a first evaluation there is no other reference to take.
+        // Without rounds there is no other reference to take.
         if let Some(element) =
-            moved.inversion.element.filter(|_| share > limits.inversion_share && self.best.is_some())
+            moved.inversion.element.filter(|_| share > limits.inversion_share && limits.rounds > 0)
         {
             return Err(refused(format!(
                 "a design would go {:.0} % of the way to inverting element {element}, beyond remesh.inversion_share = {}",

@@ -2,7 +2,7 @@
 //!
 //! From the round's first design every variable may go as far up as the mesh carries a motion of all variables by that
 //! much, within [`fluxmorph_remesh::Limits::inversion_share`] of the first inversion, and as far down likewise; and never
-//! beyond the design's own bounds. Designs inside the box may still be refused one by one; then `scale` makes it smaller.
+//! beyond the design's own bounds. Without rounds the box is that of the bounds, since no other reference can be had. Designs inside the box may still be refused one by one; then `scale` makes it smaller.
 
 use fluxmorph_remesh::RemeshError;
 
@@ -10,6 +10,9 @@ use crate::problem::Shape;
 
 /// Of its span, a variable nearer than this to a bound lies on it: far below any step, and above rounding.
 const ON_BOUND: f64 = 1e-9;
+
+/// A box reaches at least this share of the bounds' span: methods need room, and designs in it may still be refused.
+const LEAST_REACH: f64 = 1e-3;
 
 /// A box around the first design of a round.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,10 +31,14 @@ impl TrustRegion {
     /// # Errors
     /// As [`fluxmorph_remesh::Motion::step`].
     pub(super) fn new(shape: &Shape, centre: &[f64], scale: f64) -> Result<Self, RemeshError> {
+        if shape.limits.rounds == 0 {
+            return Ok(Self { centre: centre.to_vec(), reach: [1.0; 2], scale });
+        }
         let reach = |sign: f64| -> Result<f64, RemeshError> {
-            let moved: Vec<f64> = (0..centre.len()).map(|k| centre[k] + sign * span(shape, k)).collect();
-            let step = shape.motion.step(&shape.displacement(&moved))?;
-            Ok((shape.limits.inversion_share * shape.motion.inversion(&step).step).min(1.0))
+            let change: Vec<f64> = (0..centre.len()).map(|k| sign * span(shape, k)).collect();
+            let step = shape.motion.map().linear(&shape.displacement(&change))?;
+            let share = shape.limits.inversion_share * shape.motion.inversion(&step).step;
+            Ok(share.clamp(LEAST_REACH, 1.0))
         };
         let reach = [reach(-1.0)?, reach(1.0)?];
         Ok(Self { centre: centre.to_vec(), reach, scale })

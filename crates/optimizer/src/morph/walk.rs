@@ -1,5 +1,6 @@
 //! The way of a mesh along a path: one increment, a number of equal ones, or as many as it asks for.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use fluxmorph_geometry::tet4::{Point, add, volume};
@@ -62,7 +63,10 @@ pub fn walk(
         Increments::Auto(_) => {
             let limits = Limits { least_quality, ..Limits::default() };
             let Travelled { moved, reached, steps, rescues, .. } =
-                motion.travel(&path, &limits, &mut |event| tell(&line(event)))?;
+                motion.travel(&path, &limits, &mut |event| {
+                    tell(&line(event));
+                    ControlFlow::Continue(())
+                })?;
             (moved.displacement, reached, steps, rescues)
         }
     };
@@ -112,13 +116,13 @@ fn equal(
 
 fn line(event: &Event) -> String {
     match event {
-        Event::Stepped { round, reached, share, quality } => format!(
+        Event::Stepped { round, reached, share, quality, .. } => format!(
             "increment {}: {:.1} % of the motion, {:.0} % of the way to an inversion, worst quality {quality:.4}",
             round + 1,
             reached * 100.0,
             share * 100.0
         ),
-        Event::Rescued(rescued) => {
+        Event::Rescued { rescued, .. } => {
             let what = match rescued.rescue {
                 Rescue::Policy { from, to } => format!("stiffness {} instead of {}", to.name(), from.name()),
                 Rescue::Smoothing { nodes } => format!("{nodes} interior nodes smoothed"),

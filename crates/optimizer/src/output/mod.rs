@@ -18,7 +18,7 @@ pub use process::{hostname, peak_memory_bytes, utc_timestamp};
 pub(crate) use result::to_json;
 pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
-    StateResult, StopReason, TermResult,
+    StateResult, StopReason, TermResult, Verification,
 };
 pub use run_directory::{OlderRun, RunDirectory, surface_files};
 

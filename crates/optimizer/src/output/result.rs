@@ -135,9 +135,30 @@ pub struct ObjectiveResult {
     pub ratio: f64,
     /// The evaluation of the best design.
     pub best_evaluation: usize,
+    /// `best / initial` of the same two shapes on a freshly generated mesh; `None` where that was not computed.
+    #[serde(default)]
+    pub verified_ratio: Option<f64>,
+    /// How the verified ratio came about; `None` without one, and where the initial design is the best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verification: Option<Verification>,
     /// The terms at the best design.
     #[serde(default)]
     pub terms: Vec<TermResult>,
+}
+
+/// The gain of a run computed again on a mesh that the optimiser never saw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Verification {
+    /// Refinement of that mesh relative to the run's.
+    pub refinement: f64,
+    /// Its tetrahedra.
+    pub tets: usize,
+    /// The objective at the initial design there.
+    pub initial: f64,
+    /// The objective at the best design there.
+    pub best: f64,
+    /// `best / initial`.
+    pub ratio: f64,
 }
 
 /// One term of an objective.
@@ -266,6 +287,14 @@ pub(crate) mod tests {
                 best: 1.0,
                 ratio: 0.5,
                 best_evaluation: 7,
+                verified_ratio: Some(0.5),
+                verification: Some(Verification {
+                    refinement: 1.25,
+                    tets: 147_000,
+                    initial: 2.2,
+                    best: 1.1,
+                    ratio: 0.5,
+                }),
                 terms: vec![TermResult {
                     kind: "loss".to_owned(),
                     region: Some("plate".to_owned()),
@@ -319,7 +348,7 @@ pub(crate) mod tests {
         let value: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
         let contract: &[(&str, &[&str])] = &[
             ("", &["schema_version", "command", "evaluations", "iterations", "probes", "peak_memory_bytes"]),
-            ("/objective", &["initial", "best", "ratio", "best_evaluation"]),
+            ("/objective", &["initial", "best", "ratio", "best_evaluation", "verified_ratio"]),
             ("/design", &["values_m", "lower_m", "upper_m", "points_m"]),
             ("/mesh", &["nodes", "tets", "unknowns", "worst_quality_initial", "worst_quality_final"]),
             ("/losses_w", &["plate"]),

@@ -7,7 +7,9 @@ use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
 
 use super::millimetres;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, Source};
-use crate::design::{Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim};
+use crate::design::{
+    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
+};
 use crate::error::Error;
 
 /// The design surface on the mesh with all regions.
@@ -71,6 +73,17 @@ pub(super) fn surface(
         return Err(source.error(vec![fault]).into());
     }
     Ok(surface)
+}
+
+/// The triangles of the design surface, each once, on the mesh with all regions.
+pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Triangulation, Error> {
+    let mut own = BTreeSet::new();
+    let mut triangles = Vec::new();
+    for name in &design.surface {
+        let surface = mesh.topology().surface(name)?;
+        triangles.extend(surface.iter().copied().filter(|t| own.insert(face_key(*t))));
+    }
+    Ok(Triangulation::new(mesh, &triangles))
 }
 
 /// The same surface on the mesh without the regions that impedance surfaces replace.

@@ -11,6 +11,7 @@ pub(crate) mod mesh;
 mod motion;
 mod shape;
 
+pub(crate) use design::triangulation as design_triangulation;
 pub use motion::{MotionSetup, set_up_motion};
 
 use fluxmorph_geometry::fem::c64;

@@ -70,7 +70,7 @@ pub(super) fn shape(
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
     let motion = Motion::new(mesh.clone(), setup)?;
-    let moving = moving_elements(mesh, &surface, motion.map());
+    let moving = motion.moving().to_vec();
     overlap_faults(inputs, &moving, model, observed)?;
     source.check(held_node_fault(inputs, &surface, motion.map(), model).into_iter().collect())?;
     let thickness = body(full_mesh, &full_surface, config)
@@ -261,17 +261,6 @@ fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
     surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
 }
 
-/// Elements of the elastic body and those that share a node that may move: faces at which the body ends move too where
-/// they are listed as sliding or free.
-fn moving_elements(mesh: &Mesh, surface: &DesignSurface, map: &ElasticMap) -> Vec<ElementId> {
-    let topology = mesh.topology();
-    let mut elements: BTreeSet<ElementId> = map.elements().iter().copied().collect();
-    for node in topology.nodes().filter(|&n| may_move(surface, map, n)) {
-        elements.extend(topology.elements_around(node));
-    }
-    elements.into_iter().collect()
-}
-
 /// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
 fn overlap_faults(
     inputs: &Inputs<'_>,
@@ -348,6 +337,14 @@ fn check_bounds(source: &Source, shape: &Shape) -> Result<(), Error> {
         return Ok(());
     }
     let mut faults = Vec::new();
+    if let Err(error @ RemeshError::Inverted { .. }) = shape.motion.moved(&shape.displacement(&shape.initial))
+    {
+        faults.push(
+            source
+                .fault("design.initial", format!("the first design breaks the mesh: {error}"))
+                .help("allow remesh.rounds, or start nearer to the undeformed shape"),
+        );
+    }
     for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
         let at = bound[0] * 1e3;
         match shape.motion.moved(&shape.displacement(bound)) {

@@ -1,5 +1,7 @@
 //! A prescribed motion of a mesh, and what single step and rounds make of it under one policy.
 
+use std::ops::ControlFlow;
+
 use fluxmorph_geometry::quality::quality;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{Event, Limits, Motion, RemeshSetup, StiffnessPolicy, Travelled};
@@ -78,8 +80,12 @@ impl Case {
         let single = self.single_step(&motion);
         let start = motion.quality(&self.mesh).worst;
         let mut events = Vec::new();
-        let travelled =
-            motion.travel(&self.path, limits, &mut |event| events.push(*event)).expect("a direct solve");
+        let travelled = motion
+            .travel(&self.path, limits, &mut |event| {
+                events.push(*event);
+                ControlFlow::Continue(())
+            })
+            .expect("a direct solve");
         let worst = travelled.motion.quality(&travelled.moved.mesh).worst;
         Outcome { policy, start, single, travelled, worst, events }
     }
@@ -90,7 +96,7 @@ impl Outcome {
     pub fn shares(&self) -> Vec<f64> {
         let share = |event: &Event| match event {
             Event::Stepped { share, .. } => Some(*share),
-            Event::Rescued(_) => None,
+            Event::Rescued { .. } => None,
         };
         self.events.iter().filter_map(share).collect()
     }

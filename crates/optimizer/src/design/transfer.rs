@@ -1,0 +1,242 @@
+//! Displacements of one triangulation of a design surface, taken over by another one of the same surface.
+//!
+//! A node takes the displacement of the nearest point of the undeformed old surface, linear on its triangle: constant and
+//! linear displacements are reproduced, and a planar surface keeps its shape but for the corners between nodes. A node on
+//! the rim takes that of the nearest point of the old rim: it stays in the planes that the rim slides in, and a held rim
+//! stays. Does not live here: what a displacement does to the mesh.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
+use fluxmorph_geometry::{Mesh, NodeId};
+
+/// How far a node may lie from a piece of the old surface, as a share of that piece's longest edge. Two triangulations of
+/// one plane meet exactly; of a sphere with cells as wide as its radius they lie an eighth of an edge apart.
+const NEAR: f64 = 0.25;
+
+/// Two triangulations are not of one surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the fresh mesh's design surface has a node at {point:?} m, far from the run's; set output.verify_refinement = 0"
+)]
+pub struct Apart {
+    /// Place of the node [m].
+    pub point: Point,
+}
+
+/// A triangulated surface, its nodes counted from 0 in ascending order of their numbers in the mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triangulation {
+    /// Places of the nodes [m].
+    pub places: Vec<Point>,
+    /// Nodes of every triangle.
+    pub triangles: Vec<[usize; 3]>,
+}
+
+impl Triangulation {
+    /// The surface that these triangles of a mesh make.
+    pub fn new(mesh: &Mesh, triangles: &[[NodeId; 3]]) -> Self {
+        let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
+        let places = nodes.iter().map(|&n| mesh.point(n)).collect();
+        let index: BTreeMap<NodeId, usize> = nodes.into_iter().enumerate().map(|(i, n)| (n, i)).collect();
+        let triangles = triangles.iter().map(|triangle| triangle.map(|n| index[&n])).collect();
+        Self { places, triangles }
+    }
+
+    /// Edges of one triangle only, ascending.
+    fn rim(&self) -> Vec<[usize; 2]> {
+        let mut count: BTreeMap<[usize; 2], usize> = BTreeMap::new();
+        for &[a, b, c] in &self.triangles {
+            for [i, j] in [[a, b], [b, c], [c, a]] {
+                *count.entry([i.min(j), i.max(j)]).or_default() += 1;
+            }
+        }
+        count.into_iter().filter(|&(_, triangles)| triangles == 1).map(|(edge, _)| edge).collect()
+    }
+
+    /// Displacements of the nodes of `fresh`, from those of the nodes of this one, both of shape `(n_nodes, 3)` [m].
+    ///
+    /// # Errors
+    /// [`Apart`] where a node has no piece of this surface near.
+    ///
+    /// # Panics
+    /// If there is not one displacement per node.
+    pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, Apart> {
+        assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
+        let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
+        let rim = Pieces::new(&self.places, self.rim().iter().map(|e| e.to_vec()).collect());
+        let on_rim: BTreeSet<usize> = fresh.rim().into_iter().flatten().collect();
+        let of = |(i, &place): (usize, &Point)| {
+            let pieces = if on_rim.contains(&i) { &rim } else { &inner };
+            let weights = pieces.nearest(place).ok_or(Apart { point: place })?;
+            Ok(weights.iter().fold([0.0; 3], |sum: Point, &(node, weight)| {
+                std::array::from_fn(|d| sum[d] + weight * displacement[node][d])
+            }))
+        };
+        fresh.places.iter().enumerate().map(of).collect()
+    }
+}
+
+/// Triangles or edges, found by place.
+struct Pieces<'a> {
+    places: &'a [Point],
+    pieces: Vec<Vec<usize>>,
+    /// Width of the cells [m].
+    width: f64,
+    /// Every piece in each cell that its bounding box, as much wider as a node may lie apart, has a part in.
+    cells: BTreeMap<[i64; 3], Vec<usize>>,
+}
+
+impl<'a> Pieces<'a> {
+    fn new(places: &'a [Point], pieces: Vec<Vec<usize>>) -> Self {
+        let width = pieces.iter().map(|piece| longest_edge(places, piece)).fold(f64::MIN_POSITIVE, f64::max);
+        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+        for (number, piece) in pieces.iter().enumerate() {
+            let margin = NEAR * longest_edge(places, piece);
+            let bound = |d: usize, pick: fn(f64, f64) -> f64, start: f64| {
+                piece.iter().map(|&n| places[n][d]).fold(start, pick)
+            };
+            let least = cell(std::array::from_fn(|d| bound(d, f64::min, f64::INFINITY) - margin), width);
+            let most = cell(std::array::from_fn(|d| bound(d, f64::max, f64::NEG_INFINITY) + margin), width);
+            for x in least[0]..=most[0] {
+                for y in least[1]..=most[1] {
+                    for z in least[2]..=most[2] {
+                        cells.entry([x, y, z]).or_default().push(number);
+                    }
+                }
+            }
+        }
+        Self { places, pieces, width, cells }
+    }
+
+    /// Nodes and their weights at the point of the pieces that lies nearest, the first of equals; `None` without one near.
+    fn nearest(&self, place: Point) -> Option<Vec<(usize, f64)>> {
+        let mut best: Option<(f64, Vec<(usize, f64)>)> = None;
+        for &number in self.cells.get(&cell(place, self.width)).into_iter().flatten() {
+            let piece = &self.pieces[number];
+            let corners: Vec<Point> = piece.iter().map(|&n| self.places[n]).collect();
+            let weights = nearest_point(&corners, place);
+            let at: Point =
+                std::array::from_fn(|d| weights.iter().zip(&corners).map(|(w, x)| w * x[d]).sum());
+            let distance = norm(sub(place, at));
+            let near = distance <= NEAR * longest_edge(self.places, piece);
+            if near && best.as_ref().is_none_or(|(least, _)| distance < *least) {
+                best = Some((distance, piece.iter().copied().zip(weights).collect()));
+            }
+        }
+        best.map(|(_, weights)| weights)
+    }
+}
+
+fn cell(place: Point, width: f64) -> [i64; 3] {
+    place.map(|c| (c / width).floor() as i64)
+}
+
+/// Length of the longest edge of a triangle, or of an edge [m].
+fn longest_edge(places: &[Point], piece: &[usize]) -> f64 {
+    let lengths = (0..piece.len()).map(|k| norm(sub(places[piece[k]], places[piece[(k + 1) % piece.len()]])));
+    lengths.fold(0.0, f64::max)
+}
+
+/// Weights of the corners at the point of a triangle or an edge that lies nearest to a place.
+fn nearest_point(corners: &[Point], place: Point) -> Vec<f64> {
+    if let &[a, b] = corners {
+        let (along, to) = (sub(b, a), sub(place, a));
+        let length = dot(along, along);
+        let share = if length > 0.0 { (dot(to, along) / length).clamp(0.0, 1.0) } else { 0.0 };
+        return vec![1.0 - share, share];
+    }
+    let area = |k: usize| {
+        let (b, c) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
+        cross(sub(c, b), sub(place, b))
+    };
+    let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+    let square = dot(normal, normal);
+    let weights: Vec<f64> = (0..3).map(|k| dot(area(k), normal) / square).collect();
+    // Of a triangle without area they are no numbers, and its edges are all of it.
+    if weights.iter().all(|weight| *weight >= 0.0) {
+        return weights;
+    }
+    let mut best = (f64::INFINITY, vec![1.0, 0.0, 0.0]);
+    for k in 0..3 {
+        let (i, j) = (k, (k + 1) % 3);
+        let share = nearest_point(&[corners[i], corners[j]], place);
+        let at: Point = std::array::from_fn(|d| share[0] * corners[i][d] + share[1] * corners[j][d]);
+        let distance = norm(sub(place, at));
+        if distance < best.0 {
+            let mut weights = vec![0.0; 3];
+            (weights[i], weights[j]) = (share[0], share[1]);
+            best = (distance, weights);
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rectangle of `n` × `m` cells, each cut into two triangles, at a height over the plane.
+    fn plate([n, m]: [usize; 2], height: impl Fn(f64, f64) -> f64) -> Triangulation {
+        let places = (0..=n)
+            .flat_map(|i| (0..=m).map(move |j| [0.24 * i as f64 / n as f64, 0.48 * j as f64 / m as f64]))
+            .map(|[x, y]| [x, y, height(x, y)])
+            .collect();
+        let node = |i: usize, j: usize| i * (m + 1) + j;
+        let triangles = (0..n)
+            .flat_map(|i| (0..m).map(move |j| (i, j)))
+            .flat_map(|(i, j)| {
+                let [a, b, c, d] = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)];
+                [[a, b, c], [a, c, d]]
+            })
+            .collect();
+        Triangulation { places, triangles }
+    }
+
+    #[test]
+    fn constant_and_linear_displacements_are_reproduced() {
+        let (old, fresh) = (plate([7, 9], |_, _| -0.01), plate([11, 8], |_, _| -0.01));
+        for law in [
+            |_: &Point| [0.0, 0.0, 0.02],
+            |x: &Point| [0.0, 0.0, 0.3 * x[0] - 0.1 * x[1] + 0.005],
+            |x: &Point| [0.2 * x[1], -0.1 * x[0], 0.01],
+        ] {
+            let displacement: Vec<Point> = old.places.iter().map(law).collect();
+            let found = old.transferred(&displacement, &fresh).expect("the same plane");
+            for (place, found) in fresh.places.iter().zip(found) {
+                // Rounding of places of half a metre, times slopes below one.
+                assert!(norm(sub(found, law(place))) < 1e-15, "{place:?}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_surface_takes_its_own_displacements_over_exactly() {
+        let old = plate([5, 6], |x, y| 0.1 * (3.0 * x * x - y * y));
+        let displacement: Vec<Point> = (0..old.places.len()).map(|i| [0.0, 1e-3 * i as f64, 1.0]).collect();
+        let found = old.transferred(&displacement, &old).expect("the same surface");
+        for (found, expected) in found.iter().zip(&displacement) {
+            // Rounding of displacements of a metre.
+            assert!(norm(sub(*found, *expected)) < 1e-14, "{found:?}: {expected:?}");
+        }
+    }
+
+    #[test]
+    fn a_held_rim_stays_and_a_rim_in_a_plane_keeps_to_it() {
+        // On a bent surface the nearest point to a node of the rim may lie inside, where nodes leave the rim's plane.
+        let bent = |x: f64, y: f64| 0.3 * (x * x + x * y);
+        let (old, fresh) = (plate([4, 5], bent), plate([7, 6], bent));
+        let law = |x: &Point| if x[0] == 0.0 { [0.0, 0.0, 0.01] } else { [0.01, 0.0, 0.01] };
+        let displacement: Vec<Point> = old.places.iter().map(law).collect();
+        let found = old.transferred(&displacement, &fresh).expect("the same surface");
+        assert!(fresh.places.iter().zip(&found).all(|(x, u)| x[0] > 0.0 || u[0] == 0.0));
+    }
+
+    #[test]
+    fn another_surface_is_refused_with_the_place() {
+        let (old, other) = (plate([4, 4], |_, _| 0.0), plate([4, 4], |_, _| 0.1));
+        let displacement = vec![[0.0; 3]; old.places.len()];
+        let refused = old.transferred(&displacement, &other).expect_err("a tenth of a metre apart");
+        assert_eq!(refused, Apart { point: [0.0, 0.0, 0.1] });
+    }
+}
