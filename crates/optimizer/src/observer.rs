@@ -104,6 +104,11 @@ pub trait Observer {
         let _ = name;
     }
 
+    /// Something has happened, in a line.
+    fn note(&mut self, message: &str) {
+        let _ = message;
+    }
+
     /// An evaluation is complete.
     fn evaluation(&mut self, evaluation: &Evaluation) {
         let _ = evaluation;
@@ -200,6 +205,10 @@ impl<W: Write> Observer for Console<W> {
 
     fn phase(&mut self, name: &str) {
         self.line(&format!("{name} ..."));
+    }
+
+    fn note(&mut self, message: &str) {
+        self.line(message);
     }
 
     fn evaluation(&mut self, row: &Evaluation) {

@@ -36,7 +36,7 @@ pub struct RoundEvent {
     pub admitted: Option<[f64; 2]>,
     /// How stiffness follows element size from now on.
     pub stiffness: String,
-    /// How far down and up the search may go from there, as shares of the span between the bounds.
+    /// How far down and up the search may go from there, as shares of the longest way of a variable to its bound.
     pub reach: [f64; 2],
     /// Why.
     pub cause: String,
@@ -94,13 +94,13 @@ impl RoundEvent {
                 format!("round {round} on the way to the design: worst quality {after:.4}")
             }
             RoundKind::Round => format!(
-                "round {round}: {cause}; {reference}, worst quality {after:.4}, the search may go {:.0} % of the bounds' \
-                 span down and {:.0} % up",
+                "round {round}: {cause}; {reference}, worst quality {after:.4}, the search may go {:.1} % of the longest \
+                 way to a lower bound and {:.1} % to an upper one",
                 percent(down),
                 percent(up)
             ),
             RoundKind::SmallerSteps => format!(
-                "{cause}; nothing gained in round {round}: the search may go {:.0} % of the bounds' span down and {:.0} % up",
+                "{cause}; less than optimizer.ftol_rel gained since the search began anew: it may go {:.2} % of the longest way to a lower bound and {:.2} % to an upper one",
                 percent(down),
                 percent(up)
             ),

@@ -20,7 +20,7 @@ use crate::fresh_mesh::{Gain, Shapes};
 use crate::objective::Term;
 use crate::observer::{Evaluation, Observer, Started};
 use crate::output::{
-    ConstraintResult, DesignResult, FileHash, History, LinearSolverResult, Manifest, MeshHash, MeshResult,
+    ConstraintResult, DesignResult, History, LinearSolverResult, Manifest, MeshHash, MeshResult,
     ObjectiveResult, OlderRun, ProbeResult, RunDirectory, RunResult, RunStatus, StateResult, StopReason,
     TermResult, blake3_hex, peak_memory_bytes, surface_files, write_atomic,
 };
@@ -53,7 +53,7 @@ pub fn run(
     let mut setup = set_up(config, source, Purpose::Optimisation)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial)?;
+    let approach = setup.problem.approach(&initial).map_err(|error| unreached(error, source))?;
     let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         approach.iter().for_each(|event| observer.round(event));
@@ -196,12 +196,7 @@ impl<'a> Session<'a> {
     ) -> Result<Self, Error> {
         let setup_seconds = clock.elapsed().as_secs_f64();
         let directory = RunDirectory::create(&config.output.directory, options.older_run)?;
-        let mut manifest = Manifest::started(command, options.threads);
-        manifest.config = source.documents().first().map(|document| FileHash {
-            path: document.name.clone(),
-            blake3: blake3_hex(document.text.as_bytes()),
-        });
-        manifest.overrides = source.overrides().map(str::to_owned).collect();
+        let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.write(&directory)?;
@@ -375,6 +370,17 @@ impl<'a> Session<'a> {
             losses_w: solution.losses(model, mesh).into_iter().collect(),
             probes,
         })
+    }
+}
+
+/// A first design that the mesh cannot reach is a fault of the configuration.
+fn unreached(error: Error, source: &Source) -> Error {
+    match error {
+        Error::DesignUnreached { .. } => {
+            let fault = source.fault("design.initial", error.to_string());
+            source.error(vec![fault]).into()
+        }
+        other => other,
     }
 }
 

@@ -123,6 +123,7 @@ impl Motion {
         }
         if rung < Rung::Guided
             && let Some((motion, rescued)) = self.guided(self.anchor(), wanted, limits)?
+            && rescued.admitted[1] > rescued.admitted[0]
         {
             return Ok(Some((motion, rescued, Rung::Guided)));
         }

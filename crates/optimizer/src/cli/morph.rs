@@ -2,9 +2,11 @@
 
 use super::args::MorphArgs;
 use super::exit::ExitCode;
-use super::{observer, stdout, with_threads};
+use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::morph::{self, Parameters};
+use crate::output::StopReason;
+use crate::session::Options;
 
 /// Do what the command line says.
 ///
@@ -14,13 +16,17 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     let parameters = if args.tune { Parameters::Tuned } else { Parameters::Given };
     with_threads(args.common.threads, |threads| {
-        let target = (args.common.older_run(), threads);
-        let report = morph::morph(&config, &source, parameters, target, &mut *observer(args.common.quiet))?;
+        let signal = interrupt::watch();
+        let interrupted = || signal.received().is_some();
+        let options = Options { older_run: args.common.older_run(), threads, interrupted: &interrupted };
+        let report = morph::morph(&config, &source, parameters, options, &mut *observer(args.common.quiet))?;
         if args.common.json {
             stdout::print_json(&report)?;
         } else {
             stdout::print(&morph::text(&report))?;
         }
-        Ok(report.exit_code())
+        // A signal that came too late to leave anything out does not change how the command ended.
+        let stopped_by = signal.received().filter(|_| report.stop_reason == StopReason::Interrupted);
+        Ok(stopped_by.unwrap_or_else(|| report.exit_code()))
     })
 }

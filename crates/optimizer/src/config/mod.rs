@@ -67,6 +67,9 @@ use section::Section;
 /// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
 const LARGEST_FILE: u64 = 1024 * 1024;
 
+/// The tables that only mean something to a field problem.
+const OF_THE_FIELD: [&str; 6] = ["coils", "objective", "boundaries", "constraints", "materials", "regions"];
+
 /// A complete configuration in SI, every default filled in.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Config {
@@ -216,14 +219,19 @@ fn read(
 ) -> Result<(Config, Source), ConfigError> {
     let mut documents = vec![Document { name, text }];
     documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
-    let (places, cases) = (BTreeMap::new(), Vec::new());
-    let mut source = Source { documents, places, directory, stem: stem.to_owned(), cases };
-
-    let root = parse_documents(&source).map_err(|faults| source.error(faults))?;
-    source.places = tree::places(&root);
+    let bare = Source {
+        documents: documents.into(),
+        places: BTreeMap::new(),
+        directory,
+        stem: stem.to_owned(),
+        cases: [].into(),
+    };
+    let root = parse_documents(&bare).map_err(|faults| bare.error(faults))?;
+    let mut source = Source { places: tree::places(&root), ..bare.clone() };
+    let mut cases = Vec::new();
 
     let (mut config, mut faults) = read_tree(&root, &source);
-    for (index, tree) in morph::case_trees(&root).into_iter().enumerate() {
+    for (index, tree) in morph::case_trees(root).enumerate() {
         let (tree, overlay) = match tree {
             Ok(tree) => tree,
             Err(fault) => {
@@ -231,15 +239,16 @@ fn read(
                 continue;
             }
         };
-        let (case, own) = read_tree(&tree, &source);
+        let (case, own) = read_tree(&tree, &bare);
         // What is wrong without the case has been said.
         faults.extend(own.into_iter().filter(|fault| !faults.contains(fault)).collect::<Vec<_>>());
-        source.cases.push(Source { places: tree::places(&tree), cases: Vec::new(), ..source.clone() });
+        cases.push(Source { places: tree::places(&tree), ..bare.clone() });
         let slot = config.as_mut().and_then(|config| config.morph.as_mut()?.cases.get_mut(index));
         if let (Some(slot), Some(case)) = (slot, case) {
             slot.complete(overlay, case);
         }
     }
+    source.cases = cases.into();
     match config {
         Some(config) if faults.is_empty() => Ok((config, source)),
         _ => {
@@ -275,11 +284,7 @@ fn parse_documents(source: &Source) -> Result<tree::Table, Vec<Fault>> {
 fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
     let title = root.text("title").unwrap_or_else(|| source.stem.clone());
     let mesh = required(&root, "mesh", |section| MeshConfig::read(section, &source.directory));
-    let analysis = if root.has("morph") && !root.has("analysis") {
-        Some(Analysis::default())
-    } else {
-        required(&root, "analysis", Analysis::read)
-    };
+    let analysis = read_analysis(&root);
     // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
     let frequencies = analysis.as_ref().map_or(&[][..], Analysis::frequencies);
     let frequencies = if frequencies.iter().any(|f| f.is_nan()) { &[] } else { frequencies };
@@ -331,6 +336,23 @@ fn read_root(root: Section<'_>, source: &Source) -> Option<Config> {
         probes,
         output,
     })
+}
+
+/// The field problem; only a motion alone may be without.
+fn read_analysis(root: &Section<'_>) -> Option<Analysis> {
+    if root.has("analysis") || !root.has("morph") {
+        return required(root, "analysis", Analysis::read);
+    }
+    let Some(table) = OF_THE_FIELD.into_iter().find(|table| root.has(table)) else {
+        return Some(Analysis::default());
+    };
+    root.missing(
+        "analysis",
+        &format!(
+            "[analysis] with frequency = \"60 Hz\", as there is `{table}`: only a motion alone needs none"
+        ),
+    );
+    None
 }
 
 fn required<T>(root: &Section<'_>, key: &'static str, read: impl FnOnce(&Section<'_>) -> T) -> Option<T> {

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::fault::{Fault, Place};
 
@@ -18,15 +19,15 @@ pub struct Document {
     pub text: String,
 }
 
-/// Where a configuration came from.
+/// Where a configuration came from. A clone shares the texts, and so does every case of a sweep.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Source {
-    pub(super) documents: Vec<Document>,
+    pub(super) documents: Arc<[Document]>,
     pub(super) places: BTreeMap<String, Place>,
     pub(super) directory: PathBuf,
     pub(super) stem: String,
     /// The same texts with the places of every case of `[[morph.case]]`.
-    pub(super) cases: Vec<Source>,
+    pub(super) cases: Arc<[Source]>,
 }
 
 impl Source {

@@ -20,7 +20,7 @@ mod trust;
 
 use fluxmorph_remesh::{Rescue, Rescued, Rung};
 
-use crate::algorithm::{self, Ending, Minimisation, Outcome};
+use crate::algorithm::{self, Ending, Minimisation, Outcome, Sample};
 use crate::cli::ExitCode;
 use crate::config::Optimizer;
 use crate::constraint::Bound;
@@ -89,6 +89,10 @@ pub struct Best {
     pub violation: f64,
     /// Its field.
     pub analysis: Analysis,
+    /// What the method was told of it.
+    pub(crate) sample: Sample,
+    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
+    pub(crate) round: usize,
 }
 
 /// How an optimisation went.
@@ -233,7 +237,7 @@ impl Search {
                     && self.trust.scale < 1.0
                     && let Some((cause, wanted)) = self.refused.clone()
                 {
-                    return self.climb(run, gained, &cause, &wanted);
+                    return self.climb(run, settings, gained, &cause, &wanted);
                 }
                 Ok(Some(match ending {
                     Ending::Objective => StopReason::ObjectiveConverged,
@@ -267,7 +271,7 @@ impl Search {
                     self.next_round(run, settings, &cause)?;
                     return Ok(None);
                 }
-                self.climb(run, gained, &cause, &wanted)
+                self.climb(run, settings, gained, &cause, &wanted)
             }
         }
     }
@@ -299,6 +303,7 @@ impl Search {
     fn climb(
         &mut self,
         run: &mut Run<'_>,
+        settings: &Optimizer,
         gained: bool,
         cause: &str,
         wanted: &[f64],
@@ -330,14 +335,19 @@ impl Search {
             None
         };
         let Some((motion, rescued, rung)) = remedy else {
-            run.observer
-                .warning(&format!("{cause}; no remedy is left: the mesh carries the design no further"));
+            let exhausted = match run.shape().limits.rounds {
+                0 => "and remesh.rounds = 0 allows no other reference".to_owned(),
+                rounds if !run.has_rounds_left() => format!("and all of remesh.rounds = {rounds} are used"),
+                _ => "and no remedy is left".to_owned(),
+            };
+            run.observer.warning(&format!("{cause}, {exhausted}: the mesh carries the design no further"));
             return Ok(Some(StopReason::MeshLimit));
         };
         run.best_is_stale = rescued.rescue.changes_mesh();
         run.shape_mut().motion = motion;
         self.rung = rung;
-        self.shrinks = 0;
+        (self.shrinks, self.renewals) = (0, 0);
+        self.ftol_rel = RESTART_TOLERANCE * settings.ftol_rel;
         self.trust = TrustRegion::new(run.shape(), &run.centre(), 1.0)?;
         let event = self.event(run, cause).with(&rescued);
         run.tell(event);

@@ -123,7 +123,16 @@ impl<'a> Run<'a> {
     }
 
     /// ±F/|F0| and the constraints of a design, with their gradients.
+    ///
+    /// What is known of the best design in this round is not computed again.
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+        let round = self.shape().motion.round();
+        if let Some(best) = &self.best
+            && best.round == round
+            && best.values == p
+        {
+            return Ok(best.sample.clone());
+        }
         self.check_limits()?;
         let clock = Instant::now();
         let moved = self.mesh(p)?;
@@ -173,7 +182,7 @@ impl<'a> Run<'a> {
             let quality = self.problem.quality(&moved.mesh);
             if quality.worst < limits.least_quality {
                 return Err(refused(format!(
-                    "element {} would have the quality {:.2e}, below the least of {:.2e} (optimizer.minimum_quality)",
+                    "element {} would have the quality {:.4e}, below the least of {:.4e} (optimizer.minimum_quality)",
                     quality.worst_element, quality.worst, limits.least_quality
                 )));
             }
@@ -266,7 +275,9 @@ impl<'a> Run<'a> {
         self.observer.evaluation(&row);
         if improved {
             let (evaluation, values) = (row.evaluation, p.to_vec());
-            self.best = Some(Best { evaluation, values, objective: value, violation, analysis });
+            let (sample, round) = (sample.clone(), row.round);
+            self.best =
+                Some(Best { evaluation, values, objective: value, violation, analysis, sample, round });
         }
         Ok(())
     }

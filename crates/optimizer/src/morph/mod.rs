@@ -11,7 +11,7 @@ mod table;
 mod tune;
 mod walk;
 
-pub use report::{CaseReport, Inversion, MorphReport, QualityShares, WorstElement};
+pub use report::{CaseReport, CaseResult, Inversion, MorphReport, QualityShares, WorstElement};
 pub use session::{MotionSummary, inspected, morph};
 pub use table::{csv, text};
 pub use tune::{Parameters, TuneReport, TunedRegion};

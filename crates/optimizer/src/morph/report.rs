@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, centroid};
-use fluxmorph_geometry::{ElementId, Topology};
 use serde::Serialize;
 
 use super::{TuneReport, Walk};
 use crate::cli::ExitCode;
 use crate::config::Paper;
+use crate::error::Error;
 use crate::output::{RunStatus, StopReason};
+use crate::setup::MotionSetup;
 
 /// The result of `fluxmorph morph`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -19,9 +20,10 @@ pub struct MorphReport {
     pub schema_version: u32,
     /// `morph`.
     pub command: &'static str,
-    /// `done` where all cases end on a valid mesh.
+    /// `done` where all cases end on a valid mesh; `failed` where that of a single motion is inverted; else `stopped`, or
+    /// `interrupted`.
     pub status: RunStatus,
-    /// `done` or `mesh_limit`.
+    /// `done`, `mesh_limit` or `interrupted`.
     pub stop_reason: StopReason,
     /// Which elements qualities are of.
     pub quality_of: &'static str,
@@ -43,12 +45,26 @@ pub struct CaseReport {
     pub name: String,
     /// Whether the whole motion was made, without an inverted element and not below the least quality.
     pub valid: bool,
+    /// Why the motion could not be computed; without it there is a result.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
     /// Nodes of the mesh.
     pub nodes: usize,
     /// Tetrahedra of the mesh.
     pub tets: usize,
     /// Nodes whose motion is prescribed.
     pub moved_nodes: usize,
+    /// What came out; its keys stand among those of the case.
+    #[serde(flatten)]
+    pub result: Option<CaseResult>,
+    /// Published values.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paper: Option<Paper>,
+}
+
+/// What came out of one motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CaseResult {
     /// Number of equations of the elastic body.
     pub equations: usize,
     /// Quality before.
@@ -67,9 +83,6 @@ pub struct CaseReport {
     pub increments: usize,
     /// Remedies taken.
     pub rescues: usize,
-    /// Published values.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub paper: Option<Paper>,
 }
 
 /// How the quality of the body's elements is distributed.
@@ -113,50 +126,85 @@ pub struct Inversion {
     pub at_m: Option<Point>,
 }
 
+/// Status and reason of motions that were all made.
+///
+/// A single motion that leaves inverted elements has failed; a sweep has stopped at a limit, since its other rows are worth
+/// having, and so has a motion that goes no further and leaves a valid mesh.
+pub(super) fn verdict(cases: &[CaseReport]) -> (RunStatus, StopReason) {
+    let inverted = |case: &CaseReport| case.result.as_ref().is_some_and(|result| result.inverted > 0);
+    match cases {
+        cases if cases.iter().all(|case| case.valid) => (RunStatus::Done, StopReason::Done),
+        [case] if inverted(case) => (RunStatus::Failed, StopReason::MeshLimit),
+        _ => (RunStatus::Stopped, StopReason::MeshLimit),
+    }
+}
+
 impl MorphReport {
-    /// 0 where every mesh is valid; else 1 for a sweep, whose other rows are worth having, and 4 for a single motion.
+    /// 0 where every mesh is valid, 4 where that of a single motion is inverted, that of a signal where one came; else 1.
     pub fn exit_code(&self) -> ExitCode {
-        match self.cases.as_slice() {
-            cases if cases.iter().all(|case| case.valid) => ExitCode::Success,
-            [_] => ExitCode::Numerical,
-            _ => ExitCode::Stopped,
+        match self.status {
+            RunStatus::Failed => ExitCode::Numerical,
+            _ => self.stop_reason.exit_code(),
         }
     }
 }
 
 impl CaseReport {
+    /// A motion that was made.
+    pub fn made(name: &str, setup: &MotionSetup, walk: &Walk, least_quality: f64) -> Self {
+        let result = CaseResult::new(walk);
+        let valid = walk.reached >= 1.0 && walk.inverted == 0 && result.after.worst >= least_quality;
+        Self { valid, result: Some(result), ..Self::of(name, setup) }
+    }
+
+    /// A motion that could not be computed.
+    pub fn failed(name: &str, setup: &MotionSetup, error: &Error) -> Self {
+        Self { error: Some(error.to_string()), ..Self::of(name, setup) }
+    }
+
+    fn of(name: &str, setup: &MotionSetup) -> Self {
+        let topology = setup.mesh.topology();
+        Self {
+            name: name.to_owned(),
+            valid: false,
+            error: None,
+            nodes: topology.node_count(),
+            tets: topology.tets().len(),
+            moved_nodes: setup.path.nodes().len(),
+            result: None,
+            paper: None,
+        }
+    }
+
+    /// The same with published values.
+    #[must_use]
+    pub fn beside(self, paper: Option<Paper>) -> Self {
+        Self { paper, ..self }
+    }
+}
+
+impl CaseResult {
     /// Measures a motion.
-    pub fn new(
-        name: &str,
-        walk: &Walk,
-        moved_nodes: usize,
-        least_quality: f64,
-        paper: Option<Paper>,
-    ) -> Self {
+    fn new(walk: &Walk) -> Self {
+        let topology = &walk.topology;
         let quality = |points: &[Point]| {
-            QualityReport::of_points(&walk.topology, points, &walk.body)
-                .expect("an elastic body has elements")
+            QualityReport::of_points(topology, points, &walk.body).expect("an elastic body has elements")
         };
         let (before, after) = (quality(&walk.before), quality(&walk.after));
         let step = walk.inversion.step;
-        let first = walk.inversion.element.map(|e| (e, walk.topology.tet(e)));
+        let first = walk.inversion.element.map(|e| (e, topology.tet(e)));
         Self {
-            name: name.to_owned(),
-            valid: walk.reached >= 1.0 && walk.inverted == 0 && after.worst >= least_quality,
-            nodes: walk.topology.node_count(),
-            tets: walk.topology.tets().len(),
-            moved_nodes,
             equations: walk.equations,
             inverted: walk.inverted,
             worst_element: WorstElement {
                 element: after.worst_element.0,
-                region: region(&walk.topology, after.worst_element),
+                region: topology.region_name_at(after.worst_element).to_owned(),
                 at_m: after.worst_centroid,
             },
             inversion: Inversion {
                 step: step.is_finite().then_some(step),
                 element: first.map(|(e, _)| e.0),
-                region: first.map(|(e, _)| region(&walk.topology, e)),
+                region: first.map(|(e, _)| topology.region_name_at(e).to_owned()),
                 at_m: first.map(|(_, tet)| centroid(tet.map(|n| walk.before[n.index()]))),
             },
             before: QualityShares::new(&before),
@@ -164,7 +212,6 @@ impl CaseReport {
             reached: walk.reached,
             increments: walk.increments,
             rescues: walk.rescues,
-            paper,
         }
     }
 }
@@ -180,8 +227,4 @@ impl QualityShares {
             shares_percent: report.shares().map(|share| 100.0 * share),
         }
     }
-}
-
-fn region(topology: &Topology, element: ElementId) -> String {
-    topology.region_names()[topology.region_of()[element.index()].index()].clone()
 }

@@ -1,28 +1,28 @@
 //! One call of `morph` with its run directory.
 //!
 //! Every case is set up before anything is written, so that a fault in the last does not cost the first. The files of a
-//! case are written when it is done, the report at the end.
+//! case are written when it is done, the report at the end, whatever became of the cases.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use fluxmorph_geometry::io::{ArrayData, Field, vtu_bytes_at};
 use fluxmorph_geometry::quality::quality;
 use fluxmorph_geometry::tet4::Point;
-
-use fluxmorph_remesh::ElasticMap;
+use fluxmorph_remesh::{ElasticMap, RemeshSetup, SolverChoice};
 use serde::Serialize;
 
-use super::tune::tune;
+use super::report::verdict;
+use super::tune::{Found, nothing_to_search, tune};
 use super::{CaseReport, MorphReport, Parameters, Walk, csv, walk};
 use crate::config::{Config, Morph, Paper, Source, resolved_toml};
 use crate::error::Error;
 use crate::observer::Observer;
 use crate::output::{
-    FileHash, Manifest, OlderRun, RunDirectory, RunStatus, StopReason, blake3_hex, peak_memory_bytes,
-    to_json, write_atomic,
+    Manifest, RunDirectory, RunStatus, StopReason, peak_memory_bytes, to_json, write_atomic,
 };
-use crate::session::mesh_hash;
+use crate::session::{Options, mesh_hash};
 use crate::setup::{MotionSetup, set_up_motion};
 
 /// One motion to be made.
@@ -37,41 +37,61 @@ struct Job<'a> {
 
 /// Makes the motions of a configuration, or tunes its elastic parameters, and writes the run directory.
 ///
+/// Whether the user wants to stop is asked before each motion and each evaluation of the tuner but the first: what is done
+/// by then is written. A case of a sweep that cannot be computed is a row with its error.
+///
 /// # Errors
-/// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
+/// Faults of the configuration and of the elastic bodies before anything is written; afterwards what a single motion
+/// refuses, and files that cannot be written, with the manifest completed.
 pub fn morph(
     config: &Config,
     source: &Source,
     parameters: Parameters,
-    (older_run, threads): (OlderRun, usize),
+    options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<MorphReport, Error> {
     let clock = Instant::now();
     observer.phase("setting up the motion");
     let jobs = jobs(config, source, parameters)?;
-    for warning in jobs.iter().flat_map(|job| &job.setup.warnings).collect::<std::collections::BTreeSet<_>>()
-    {
-        observer.warning(warning);
-    }
-    if parameters == Parameters::Tuned && config.morph.as_ref().is_some_and(|morph| !morph.cases.is_empty()) {
-        observer.warning("the tuner takes the motion outside of the cases; the cases are left out");
-    }
-    let directory = RunDirectory::create_flat(&config.output.directory, older_run)?;
-    let mut manifest = Manifest::started("morph", threads);
-    manifest.config = source.documents().first().map(|document| FileHash {
-        path: document.name.clone(),
-        blake3: blake3_hex(document.text.as_bytes()),
-    });
-    manifest.overrides = source.overrides().map(str::to_owned).collect();
+    // An earlier run is replaced only by one that can begin.
+    jobs.iter().try_for_each(|job| check_body(&job.setup))?;
+    warn(config, parameters, &jobs, observer);
+    let directory = RunDirectory::create_flat(&config.output.directory, options.older_run)?;
+    let mut manifest = Manifest::started("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;
-    let outcome = write_all(config, source, parameters, &jobs, &directory, (clock, observer));
+    let session = Session { config, source, parameters, jobs, directory, options, clock };
+    let outcome = session.work(observer);
     let status = outcome.as_ref().map_or(RunStatus::Failed, |report| report.status);
     manifest.complete(status, clock.elapsed().as_secs_f64());
-    let completed = manifest.write(&directory);
+    let completed = manifest.write(&session.directory);
     let outcome = outcome?;
     completed?;
     Ok(outcome)
+}
+
+/// Whether the elastic body can be set up, found by its cheapest solver and without its force: factors by component take a
+/// tenth of the work of one factor. What only the whole matrix shows comes later.
+fn check_body(setup: &MotionSetup) -> Result<(), Error> {
+    let mut remesh = RemeshSetup { solver: SolverChoice::ComponentBlocks, ..setup.remesh.clone() };
+    remesh.subregions.iter_mut().for_each(|subregion| subregion.force = [0.0; 3]);
+    ElasticMap::new(&setup.mesh, remesh)?;
+    Ok(())
+}
+
+/// Says what the user should know before the work, each thing once.
+fn warn(config: &Config, parameters: Parameters, jobs: &[Job<'_>], observer: &mut dyn Observer) {
+    let warnings: BTreeSet<&String> = jobs.iter().flat_map(|job| &job.setup.warnings).collect();
+    warnings.into_iter().for_each(|warning| observer.warning(warning));
+    if parameters == Parameters::Given {
+        return;
+    }
+    if config.morph.as_ref().is_some_and(|morph| !morph.cases.is_empty()) {
+        observer.warning("the tuner takes the motion outside of the cases; the cases are left out");
+    }
+    jobs.iter()
+        .filter_map(|job| nothing_to_search(&job.morph.tune, &job.setup))
+        .for_each(|warning| observer.warning(warning));
 }
 
 /// A motion that was set up and not made.
@@ -137,54 +157,126 @@ fn jobs<'a>(config: &'a Config, source: &'a Source, parameters: Parameters) -> R
     own.cases.iter().enumerate().map(job).collect()
 }
 
-fn write_all(
-    config: &Config,
-    source: &Source,
+/// A run directory that is open, and the motions to be made.
+struct Session<'a> {
+    config: &'a Config,
+    source: &'a Source,
     parameters: Parameters,
-    jobs: &[Job<'_>],
-    directory: &RunDirectory,
-    (clock, observer): (Instant, &mut dyn Observer),
-) -> Result<MorphReport, Error> {
-    write_atomic(&directory.config(), source.text().as_bytes())?;
-    write_atomic(&directory.resolved(), resolved_toml(config).as_bytes())?;
-    let tuned = match (parameters, jobs) {
-        (Parameters::Tuned, [job]) => {
-            let found = tune(job.config, job.source, &job.setup, observer)?;
-            write_atomic(&directory.tuned(), resolved_toml(&found.config).as_bytes())?;
-            Some(found)
+    jobs: Vec<Job<'a>>,
+    directory: RunDirectory,
+    options: Options<'a>,
+    clock: Instant,
+}
+
+impl Session<'_> {
+    fn work(&self, observer: &mut dyn Observer) -> Result<MorphReport, Error> {
+        let directory = &self.directory;
+        write_atomic(&directory.config(), self.source.text().as_bytes())?;
+        write_atomic(&directory.resolved(), resolved_toml(self.config).as_bytes())?;
+        let tuned = self.tuned(observer)?;
+        let (mut cases, mut cut_short) = (Vec::new(), None);
+        for (index, job) in self.jobs.iter().enumerate() {
+            let first = index == 0 && tuned.is_none();
+            let left_out = tuned.as_ref().is_some_and(|found| !found.left_out.is_empty());
+            if left_out || (!first && (self.options.interrupted)()) {
+                break;
+            }
+            observer.phase(&format!("{} ({} of {})", job.name, index + 1, self.jobs.len()));
+            let (setup, morph) = match &tuned {
+                Some(found) => (&found.setup, found.config.morph.as_ref().unwrap_or(job.morph)),
+                None => (&job.setup, job.morph),
+            };
+            let made = self.made(index, setup, morph, observer);
+            if made.as_ref().is_ok_and(|walk| walk.reached < 1.0) && (self.options.interrupted)() {
+                cut_short = Some(job.name);
+            }
+            let case = match made {
+                Ok(walk) => CaseReport::made(job.name, setup, &walk, morph.least_quality),
+                // The others of a sweep are worth having; without files there is no place for them.
+                Err(error) if self.jobs.len() > 1 && !matches!(error, Error::Output(_)) => {
+                    observer.warning(&format!("{}: {error}; the other cases are not affected", job.name));
+                    CaseReport::failed(job.name, setup, &error)
+                }
+                Err(error) => return Err(error),
+            };
+            cases.push(case.beside(job.paper));
+            if cut_short.is_some() {
+                break;
+            }
         }
-        _ => None,
-    };
-    let mut cases = Vec::new();
-    for (index, job) in jobs.iter().enumerate() {
-        observer.phase(&format!("{} ({} of {})", job.name, index + 1, jobs.len()));
-        let number = (jobs.len() > 1).then_some(index);
-        let (setup, morph) = match &tuned {
-            Some(found) => (&found.setup, found.config.morph.as_ref().unwrap_or(job.morph)),
-            None => (&job.setup, job.morph),
+        let left_out = self.left_out(&cases, tuned.as_ref(), cut_short);
+        let (status, stop_reason) = match &left_out {
+            Some(_) => (RunStatus::Interrupted, StopReason::Interrupted),
+            None => verdict(&cases),
         };
-        let walked = walk(setup, morph.increments, morph.least_quality, &mut |line| observer.phase(line))?;
-        write_atomic(&directory.before(number), &vtu(&walked, &walked.before)?)?;
-        write_atomic(&directory.after(number), &vtu(&walked, &walked.after)?)?;
-        let moved = setup.path.nodes().len();
-        cases.push(CaseReport::new(job.name, &walked, moved, morph.least_quality, job.paper));
+        let report = MorphReport {
+            schema_version: 1,
+            command: "morph",
+            status,
+            stop_reason,
+            quality_of: "elastic body",
+            cases,
+            tuned: tuned.map(|found| found.report),
+            timings_s: BTreeMap::from([("total".to_owned(), self.clock.elapsed().as_secs_f64())]),
+            peak_memory_bytes: peak_memory_bytes(),
+        };
+        write_atomic(&directory.morph_csv(), csv(&report).as_bytes())?;
+        write_atomic(&directory.result(), &to_json(&report))?;
+        if let Some(left_out) = left_out {
+            observer.warning(&format!("interrupted, and left out: {left_out}"));
+        }
+        Ok(report)
     }
-    let valid = cases.iter().all(|case| case.valid);
-    let stop_reason = if valid { StopReason::Done } else { StopReason::MeshLimit };
-    let report = MorphReport {
-        schema_version: 1,
-        command: "morph",
-        status: stop_reason.status(),
-        stop_reason,
-        quality_of: "elastic body",
-        cases,
-        tuned: tuned.map(|found| found.report),
-        timings_s: BTreeMap::from([("total".to_owned(), clock.elapsed().as_secs_f64())]),
-        peak_memory_bytes: peak_memory_bytes(),
-    };
-    write_atomic(&directory.morph_csv(), csv(&report).as_bytes())?;
-    write_atomic(&directory.result(), &to_json(&report))?;
-    Ok(report)
+
+    /// What the tuner finds, if it is asked; written at once.
+    fn tuned(&self, observer: &mut dyn Observer) -> Result<Option<Found>, Error> {
+        let (Parameters::Tuned, [job]) = (self.parameters, self.jobs.as_slice()) else { return Ok(None) };
+        let found = tune(job.config, job.source, &job.setup, self.options.interrupted, observer)?;
+        write_atomic(&self.directory.tuned(), resolved_toml(&found.config).as_bytes())?;
+        Ok(Some(found))
+    }
+
+    /// Makes one motion and writes both meshes.
+    fn made(
+        &self,
+        index: usize,
+        setup: &MotionSetup,
+        morph: &Morph,
+        observer: &mut dyn Observer,
+    ) -> Result<Walk, Error> {
+        let number = (self.jobs.len() > 1).then_some(index);
+        let interrupted = self.options.interrupted;
+        let mut tell = |line: &str| {
+            observer.note(line);
+            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let walked = walk(setup, morph.increments, morph.least_quality, &mut tell)?;
+        write_atomic(&self.directory.before(number), &vtu(&walked, &walked.before)?)?;
+        write_atomic(&self.directory.after(number), &vtu(&walked, &walked.after)?)?;
+        Ok(walked)
+    }
+
+    /// What a signal left out, in words.
+    fn left_out(
+        &self,
+        cases: &[CaseReport],
+        tuned: Option<&Found>,
+        cut_short: Option<&str>,
+    ) -> Option<String> {
+        let mut parts = Vec::new();
+        if let Some(found) = tuned.filter(|found| !found.left_out.is_empty()) {
+            parts.push(format!("the search with the stiffness {}", found.left_out.join(", ")));
+        }
+        parts.extend(cut_short.map(|name| format!("the rest of the motion `{name}`")));
+        let jobs = &self.jobs[cases.len()..];
+        if tuned.is_some() && !jobs.is_empty() {
+            parts.push("the motion with what was found".to_owned());
+        } else if !jobs.is_empty() {
+            let names: Vec<&str> = jobs.iter().map(|job| job.name).collect();
+            parts.push(format!("{} of {} cases: {}", names.len(), self.jobs.len(), names.join("; ")));
+        }
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
 }
 
 /// The mesh at some places of its nodes, with the displacement of the whole motion, region and quality.

@@ -6,20 +6,22 @@
 //! displacement, `V / N` the body's volume per node and `L` its largest extent: a uniform load of that size displaces a
 //! body of modulus `E_1` by about `u`, whatever the mesh.
 
+use std::ops::ControlFlow;
+
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, add, norm, volume};
 use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
 use super::table::aligned;
-use super::walk::POLICIES;
 use crate::bobyqa::{Search, maximise};
 use crate::config::{Config, Increments, Remesh, Source, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::observer::Observer;
 use crate::setup::{MotionSetup, set_up_motion};
 
-/// Gain of worst quality for which another policy is taken: on equal cells all policies are the same but for rounding.
+/// Gain of worst quality for which another policy is taken: on equal cells the isotropic ones are
+/// the same but for rounding.
 const WORTHWHILE: f64 = 1e-6;
 
 /// Whether the elastic parameters are taken from the configuration or searched.
@@ -37,6 +39,8 @@ pub(super) struct Found {
     pub(super) report: TuneReport,
     pub(super) config: Config,
     pub(super) setup: MotionSetup,
+    /// The stiffnesses that a signal left out, in whole or in part.
+    pub(super) left_out: Vec<&'static str>,
 }
 
 /// What the tuner found.
@@ -104,7 +108,16 @@ struct Variable {
     subregion: usize,
 }
 
-/// Searches elastic parameters for the motion of a set-up.
+/// Says what to do where no parameter can be searched: all motions are the same when every modulus is doubled.
+pub(super) fn nothing_to_search(settings: &Tune, setup: &MotionSetup) -> Option<&'static str> {
+    variables(settings, setup.remesh.subregions.len()).is_empty().then_some(
+        "the tuner compares the stiffnesses and has no parameter to search: the modulus of a single region changes no \
+         motion; add \"poisson\" or \"force\" to morph.tune.parameters, or divide the body into regions",
+    )
+}
+
+/// Searches elastic parameters for the motion of a set-up, until `interrupted` says so; it is asked before each evaluation
+/// but the first.
 ///
 /// # Errors
 /// Whatever the elastic map refuses at the parameters of the configuration.
@@ -112,6 +125,7 @@ pub(super) fn tune(
     config: &Config,
     source: &Source,
     setup: &MotionSetup,
+    interrupted: &dyn Fn() -> bool,
     observer: &mut dyn Observer,
 ) -> Result<Found, Error> {
     let settings = &config.morphing(source)?.morph.tune;
@@ -132,10 +146,17 @@ pub(super) fn tune(
     let mut best = (given.clone(), initial);
     let mut evaluations = 1;
     let mut policies = Vec::new();
-    let others = POLICIES.into_iter().filter(|policy| *policy != given.policy);
-    for policy in std::iter::once(given.policy).chain(others) {
+    let others = StiffnessPolicy::ALL.into_iter().filter(|policy| *policy != given.policy);
+    let mut order = std::iter::once(given.policy).chain(others);
+    let mut left_out = Vec::new();
+    for policy in order.by_ref() {
         let mut own = f64::NEG_INFINITY;
+        let mut stopped = false;
         let mut evaluate = |x: &[f64]| {
+            if interrupted() {
+                stopped = true;
+                return ControlFlow::Break(());
+            }
             evaluations += 1;
             let candidate = with_values(given, policy, &variables, x, unit);
             // A body without stiffness has no motion to compare: worse than every inverted mesh.
@@ -145,13 +166,19 @@ pub(super) fn tune(
                 best = (candidate, quality);
             }
             own = own.max(quality);
-            quality
+            ControlFlow::Continue(quality)
         };
-        evaluate(&start);
-        maximise(&search, &start, evaluate);
-        observer.phase(&format!("stiffness {}: worst quality {own:.4}", policy.name()));
-        policies.push((policy.name(), own));
+        if evaluate(&start).is_continue() {
+            maximise(&search, &start, evaluate);
+            observer.note(&format!("stiffness {}: worst quality {own:.4}", policy.name()));
+            policies.push((policy.name(), own));
+        }
+        if stopped {
+            left_out.push(policy.name());
+            break;
+        }
     }
+    left_out.extend(order.map(StiffnessPolicy::name));
     let (remesh, quality) = best;
     let config = tuned_config(config, &remesh);
     let setup = set_up_motion(&config, source)?;
@@ -168,7 +195,7 @@ pub(super) fn tune(
         policies,
         regions: regions.collect(),
     };
-    Ok(Found { report, config, setup })
+    Ok(Found { report, config, setup, left_out })
 }
 
 /// The variables of a search over so many subregions: all motions are the same when every modulus is doubled, so that of

@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::tet4::{Point, add, volume};
 use fluxmorph_geometry::{ElementId, Topology};
-use fluxmorph_remesh::{
-    Event, Limits, Motion, RemeshError, Rescue, StepToInversion, StiffnessPolicy, Travelled,
-};
+use fluxmorph_remesh::{Event, Limits, Motion, RemeshError, Rescue, StepToInversion, Travelled};
 
 use crate::config::Increments;
 use crate::error::Error;
@@ -40,9 +38,19 @@ pub struct Walk {
     pub inverted: usize,
 }
 
-/// Moves the mesh along the path of a set-up.
+/// Where a sequence of increments came to.
+struct Taken {
+    /// Displacement of all nodes from the undeformed mesh [m].
+    displacement: Vec<Point>,
+    /// Share of the path done.
+    reached: f64,
+    increments: usize,
+    rescues: usize,
+}
+
+/// Moves the mesh along the path of a set-up; no increment but the last of a given number may fall below a quality.
 ///
-/// `tell` is told what happens on the way, a line each.
+/// `tell` is told what happens on the way, a line each, and may end it there.
 ///
 /// # Errors
 /// Whatever the elastic map refuses.
@@ -50,26 +58,24 @@ pub fn walk(
     setup: &MotionSetup,
     increments: Increments,
     least_quality: f64,
-    tell: &mut dyn FnMut(&str),
+    tell: &mut dyn FnMut(&str) -> ControlFlow<()>,
 ) -> Result<Walk, Error> {
     let path = |t: f64| setup.path.at(t);
     let motion = Motion::new(setup.mesh.clone(), setup.remesh.clone())?;
     let step = motion.step(&path(1.0))?;
     let inversion = motion.inversion(&step);
     let (body, equations) = (motion.map().elements().to_vec(), motion.map().equation_count());
-    let (displacement, reached, taken, rescues) = match increments {
-        Increments::Count(1) => (step, 1.0, 1, 0),
-        Increments::Count(count) => equal(motion, &path, count)?,
+    let taken = match increments {
+        Increments::Count(1) => Taken { displacement: step, reached: 1.0, increments: 1, rescues: 0 },
+        Increments::Count(count) => equal(motion, &path, count, least_quality, tell)?,
         Increments::Auto(_) => {
             let limits = Limits { least_quality, ..Limits::default() };
             let Travelled { moved, reached, steps, rescues, .. } =
-                motion.travel(&path, &limits, &mut |event| {
-                    tell(&line(event));
-                    ControlFlow::Continue(())
-                })?;
-            (moved.displacement, reached, steps, rescues)
+                motion.travel(&path, &limits, &mut |event| tell(&line(event)))?;
+            Taken { displacement: moved.displacement, reached, increments: steps, rescues }
         }
     };
+    let Taken { displacement, reached, increments, rescues } = taken;
     let topology = Arc::clone(setup.mesh.topology());
     let before = setup.mesh.points().to_vec();
     let after: Vec<Point> = before.iter().zip(&displacement).map(|(x, u)| add(*x, *u)).collect();
@@ -83,35 +89,45 @@ pub fn walk(
         equations,
         inversion,
         reached,
-        increments: taken,
+        increments,
         rescues,
         inverted,
     })
 }
 
-/// Equal parts of the path, each from the mesh that the one before left: displacement of all nodes from the undeformed
-/// mesh, share of the path done, increments taken, remedies. An increment before the last that breaks the mesh is not
-/// taken, and ends the way.
+/// Equal parts of the path, each from the mesh that the one before left. An increment before the last that breaks the
+/// mesh, or leaves an element of the body below the least quality, is not taken, and ends the way; the last is a result,
+/// however it leaves the mesh.
 fn equal(
     mut motion: Motion,
     path: &dyn Fn(f64) -> Vec<Point>,
     count: usize,
-) -> Result<(Vec<Point>, f64, usize, usize), RemeshError> {
+    least_quality: f64,
+    tell: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Taken, RemeshError> {
     for k in 1..count {
         let t = k as f64 / count as f64;
+        let taken = |motion: &Motion, increments: usize| Taken {
+            displacement: motion.reference_displacement().to_vec(),
+            reached: increments as f64 / count as f64,
+            increments,
+            rescues: 0,
+        };
         let moved = match motion.moved(&path(t)) {
-            Ok(moved) => moved,
-            Err(RemeshError::Inverted { .. }) => {
-                let reached = (k - 1) as f64 / count as f64;
-                return Ok((motion.reference_displacement().to_vec(), reached, k - 1, 0));
-            }
+            Ok(moved) if motion.quality(&moved.mesh).worst >= least_quality => moved,
+            Ok(_) | Err(RemeshError::Inverted { .. }) => return Ok(taken(&motion, k - 1)),
             Err(other) => return Err(other),
         };
+        let quality = motion.quality(&moved.mesh).worst;
         motion = motion.rebased(moved.mesh, moved.displacement, path(t), motion.policy())?;
+        if tell(&format!("increment {k} of {count}: worst quality {quality:.4}")).is_break() {
+            return Ok(taken(&motion, k));
+        }
     }
     let step = motion.step(&path(1.0))?;
-    let whole = motion.reference_displacement().iter().zip(step).map(|(u, step)| add(*u, step)).collect();
-    Ok((whole, 1.0, count, 0))
+    let displacement =
+        motion.reference_displacement().iter().zip(step).map(|(u, step)| add(*u, step)).collect();
+    Ok(Taken { displacement, reached: 1.0, increments: count, rescues: 0 })
 }
 
 fn line(event: &Event) -> String {
@@ -136,6 +152,3 @@ fn line(event: &Event) -> String {
         }
     }
 }
-
-/// The policies that a tuner may choose from.
-pub(super) const POLICIES: [StiffnessPolicy; 4] = StiffnessPolicy::ALL;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{OutputError, RunDirectory, SyncedLog};
+use super::{OutputError, RunDirectory, SyncedLog, csv_text};
 use crate::observer::{Evaluation, column};
 
 /// Both history files of a run.
@@ -64,15 +64,6 @@ fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
         other => other.to_string(),
     };
     columns.iter().map(cell).collect::<Vec<_>>().join(",")
-}
-
-/// A text as a cell: quoted where it holds what separates cells.
-fn csv_text(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::process::{hostname, utc_timestamp};
 use super::{OutputError, RunDirectory, write_atomic};
+use crate::config::Source;
 
 /// The mark by which a run directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -114,7 +115,7 @@ impl Host {
 }
 
 impl Manifest {
-    /// The manifest of a run that starts now.
+    /// The manifest of a run that starts now, without what it reads.
     pub fn started(command: &str, threads: usize) -> Self {
         Self {
             program: PROGRAM.to_owned(),
@@ -132,6 +133,17 @@ impl Manifest {
             finished: None,
             seconds: None,
         }
+    }
+
+    /// The same with the configuration and the overrides of the command line.
+    #[must_use]
+    pub fn reading(mut self, source: &Source) -> Self {
+        self.config = source.documents().first().map(|document| FileHash {
+            path: document.name.clone(),
+            blake3: blake3_hex(document.text.as_bytes()),
+        });
+        self.overrides = source.overrides().map(str::to_owned).collect();
+        self
     }
 
     /// Fill in how the run ended, now; `seconds` is its duration [s].

@@ -1,5 +1,6 @@
 //! The layer through which everything is written: whole files, the history, and the run directory.
 
+mod csv;
 mod design_file;
 mod files;
 mod history;
@@ -10,6 +11,7 @@ mod run_directory;
 
 use std::path::PathBuf;
 
+pub(crate) use csv::csv_text;
 pub use design_file::{DesignFileError, read_design};
 pub use files::{SyncedLog, write_atomic, write_atomic_with};
 pub use history::History;

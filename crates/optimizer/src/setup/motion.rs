@@ -62,11 +62,21 @@ pub fn set_up_motion(config: &Config, source: &Source) -> Result<MotionSetup, Er
             Err(fault) => faults.push(*fault),
         }
     }
+    if morph.motion.is_empty() {
+        let fault = source.fault("morph.motion", "no motion is prescribed");
+        faults.push(fault.expected("at least one table [[morph.motion]]"));
+    }
     source.check(faults)?;
     let (nodes, motions): (Vec<_>, Vec<_>) = moved.into_iter().unzip();
     let guidance = shape::guidance(source, config.design.as_ref(), remesh)?;
     let setup = shape::remesh_setup(source, remesh, &mesh, &nodes, guidance, &mut warnings)?;
-    Ok(MotionSetup { mesh, remesh: setup, path: Path::new(nodes, motions, transforms), warnings })
+    let path = Path::new(nodes, motions, transforms);
+    if path.at(1.0).iter().all(|u| *u == [0.0; 3]) {
+        warnings.push(
+            "the prescribed motion moves no node: every displacement is zero, every factor 1 and every angle 0".to_owned(),
+        );
+    }
+    Ok(MotionSetup { mesh, remesh: setup, path, warnings })
 }
 
 fn transform_of(motion: &PrescribedMotion) -> Transform {

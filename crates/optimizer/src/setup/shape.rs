@@ -81,6 +81,14 @@ pub(super) fn shape(
         source.error(vec![fault.expected(format!("one value for each of the {n} design variables"))])
     })?;
     let quality = QualityReport::of_elements(mesh, &moving).map_or(0.0, |quality| quality.worst);
+    if let Some(minimum) = config.optimizer.minimum_quality.filter(|minimum| quality < *minimum) {
+        let message = format!(
+            "the worst element of the undeformed mesh has the quality {quality:.3e}, below optimizer.minimum_quality = \
+             {minimum}"
+        );
+        let fault = source.fault("optimizer.minimum_quality", message);
+        return Err(source.error(vec![fault.expected(format!("at most {quality:.3e}"))]).into());
+    }
     let limits = Limits {
         inversion_share: inputs.remesh.inversion_share,
         least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),

@@ -168,20 +168,21 @@ impl Paper {
     }
 }
 
-/// The trees of the cases: each the root with the tables of the case laid over it and without cases, with what was laid.
-///
-/// # Errors
-/// The fault of a case that goes through something that is not a table.
-pub(super) fn case_trees(root: &Table) -> Vec<Result<(Table, toml::Table), Box<super::Fault>>> {
-    let cases = match root.get("morph").map(|node| &node.value) {
-        Some(tree::Value::Table(morph)) => match morph.get("case").map(|node| &node.value) {
-            Some(tree::Value::Array(cases)) => cases.as_slice(),
-            _ => &[],
-        },
-        _ => &[],
+/// The trees of the cases, made one at a time: each the root with the tables of the case laid over it and without cases,
+/// with what was laid; the fault of a case that goes through something that is not a table.
+pub(super) fn case_trees(
+    mut root: Table,
+) -> impl Iterator<Item = Result<(Table, toml::Table), Box<super::Fault>>> {
+    let cases = match root.get_mut("morph").map(|node| &mut node.value) {
+        Some(tree::Value::Table(morph)) => morph.remove("case"),
+        _ => None,
     };
-    let laid = |case: &tree::Node| {
-        let tree::Value::Table(case) = &case.value else { return Ok((root.clone(), toml::Table::new())) };
+    let cases = match cases.map(|node| node.value) {
+        Some(tree::Value::Array(cases)) => cases,
+        _ => Vec::new(),
+    };
+    let laid = move |case: tree::Node| {
+        let tree::Value::Table(case) = case.value else { return Ok((root.clone(), toml::Table::new())) };
         let own = |keys: &[&str]| -> Table {
             case.iter()
                 .filter(|(key, _)| keys.contains(&key.as_str()))
@@ -193,11 +194,10 @@ pub(super) fn case_trees(root: &Table) -> Vec<Result<(Table, toml::Table), Box<s
         let mut written = tree::to_toml(&tables);
         written.extend(tree::to_toml(&motion));
         if let Some(tree::Value::Table(morph)) = tree.get_mut("morph").map(|node| &mut node.value) {
-            morph.remove("case");
             morph.extend(motion);
         }
         tree::overlay(&mut tree, tables, "")?;
         Ok((tree, written))
     };
-    cases.iter().map(laid).collect()
+    cases.into_iter().map(laid)
 }

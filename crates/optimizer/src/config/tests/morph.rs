@@ -57,6 +57,24 @@ fn a_motion_needs_no_field_problem_and_is_in_si() {
 }
 
 #[test]
+fn only_a_motion_alone_may_be_without_a_field_problem() {
+    let tables = [
+        ("coils", "[[coils]]\nname = \"c\"\n"),
+        ("objective", "[objective]\n"),
+        ("boundaries", "[boundaries]\n"),
+        ("constraints", "[[constraints]]\n"),
+        ("materials", "[materials.iron]\n"),
+        ("regions", "[regions.block]\nmaterial = \"air\"\n"),
+    ];
+    for (table, text) in tables {
+        let report = report(&format!("{MORPH}{text}"));
+        let fault = report.faults.iter().find(|fault| fault.path == "analysis");
+        let help = fault.and_then(|fault| fault.help.as_deref()).unwrap_or_default();
+        assert!(help.contains(&format!("`{table}`")), "{report}");
+    }
+}
+
+#[test]
 fn a_case_is_the_configuration_with_its_tables_laid_over_it() {
     let (config, source) = config(MORPH);
     let morph = config.morph.as_ref().expect("a motion");
