@@ -44,6 +44,14 @@ pub enum Error {
         /// What it said.
         cause: &'static str,
     },
+    /// The mesh of the first design is refused.
+    #[error(
+        "the first design has no mesh to compute on: {cause}; begin elsewhere, or loosen the limit named"
+    )]
+    FirstDesign {
+        /// Why.
+        cause: String,
+    },
     /// The mesh cannot be taken to a design.
     #[error(
         "the mesh can be taken {:.1} % of the way to the design only; take one nearer to the undeformed shape, enlarge the \
@@ -101,6 +109,7 @@ impl Error {
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
             | Self::DesignUnreached { .. }
+            | Self::FirstDesign { .. }
             | Self::Apart(_)
             | Self::Config(_)
             | Self::Solver(_)

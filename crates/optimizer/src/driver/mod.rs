@@ -259,11 +259,8 @@ impl Search {
             Outcome::Interrupted(Stop::Error(error)) => Err(*error),
             Outcome::Interrupted(Stop::Mesh { cause, wanted }) => {
                 if run.best.is_none() {
-                    // The initial design itself has no valid mesh: nothing to go back to.
-                    return Err(run.problem.moved(&wanted).err().map_or(
-                        Error::Optimisation { cause: "the initial mesh is below optimizer.minimum_quality" },
-                        Error::from,
-                    ));
+                    // There is nothing to go back to.
+                    return Err(Error::FirstDesign { cause });
                 }
                 self.ftol_rel = RESTART_TOLERANCE * settings.ftol_rel;
                 self.refused = Some((cause.clone(), wanted.clone()));
