@@ -61,7 +61,8 @@ fn phases(name: &str) {
     let value = objective.terms[0].functional.evaluate(model, &mesh, &state).expect("it is finite");
     let (cpu, wall, lambda) = least(|| adjoint::solve(&system, &value.derivative).expect("it converges"));
     show(&format!("adjoint, {} iterations", lambda.report().iterations), cpu, wall);
-    let (cpu, wall, nodal) = least(|| adjoint::node_gradient(model, &mesh, &state, &lambda, &shape.moving));
+    let (cpu, wall, nodal) =
+        least(|| adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion.moving()));
     show("gradient at nodes", cpu, wall);
     let (cpu, wall, _) =
         least(|| shape.surface.gradient(&shape.motion.map().gradient(&nodal).expect("it converges")));

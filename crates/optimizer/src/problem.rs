@@ -37,8 +37,6 @@ pub struct Shape {
     pub motion: Motion,
     /// How far a design may lie from the reference of its round, and how many rounds there may be.
     pub limits: Limits,
-    /// Elements of the elastic body, and those beside it that share a node that may move; ascending.
-    pub moving: Vec<ElementId>,
     /// Thickness of the designed body, where it has one.
     pub thickness: Option<Thickness>,
     /// Lower bound of every variable [m].
@@ -155,14 +153,14 @@ impl Problem {
             None => Ok(Moved {
                 mesh: self.original.clone(),
                 displacement: vec![[0.0; 3]; self.original.points().len()],
-                inversion: StepToInversion { step: f64::INFINITY, element: None },
+                inversion: StepToInversion::NEVER,
             }),
         }
     }
 
     /// Elements of which a node may move, ascending; empty without a shape.
     pub fn moving_elements(&self) -> &[ElementId] {
-        self.shape.as_ref().map_or(&[], |shape| &shape.moving)
+        self.shape.as_ref().map_or(&[], |shape| shape.motion.moving())
     }
 
     /// Bytes that an evaluation needs, about: matrices, factors, and the arrays over nodes and elements.
@@ -177,11 +175,10 @@ impl Problem {
 
     /// Quality of the elements that may move, or of all where nothing moves.
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
-        match self.moving_elements() {
-            [] => QualityReport::of_mesh(mesh),
-            moving => QualityReport::of_elements(mesh, moving),
+        match &self.shape {
+            Some(shape) => shape.motion.quality(mesh),
+            None => QualityReport::of_mesh(mesh).expect("a mesh has elements"),
         }
-        .expect("a mesh and a remesh region have elements")
     }
 
     /// Field, objective, constraints and, if wanted, gradients of a design.
@@ -392,7 +389,7 @@ impl Gathered {
         let lambda = adjoint::solve(system, &right_side)?;
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
-        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, &shape.moving);
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving());
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
         Ok(())

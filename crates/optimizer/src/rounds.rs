@@ -72,7 +72,6 @@ impl RoundEvent {
             Rescue::Policy { .. } => RoundKind::Policy,
             Rescue::Smoothing { .. } => RoundKind::Smoothing,
             Rescue::Guided { .. } => RoundKind::Guided,
-            _ => RoundKind::SmallerSteps,
         };
         let stiffness = match rescued.rescue {
             Rescue::Policy { to, .. } => to.name().to_owned(),

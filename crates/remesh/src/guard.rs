@@ -23,6 +23,11 @@ pub struct StepToInversion {
     pub element: Option<ElementId>,
 }
 
+impl StepToInversion {
+    /// No element ever inverts.
+    pub const NEVER: Self = Self { step: f64::INFINITY, element: None };
+}
+
 /// The smallest multiple of `displacement` [m], shape `(n_nodes, 3)`, at which an element of the mesh loses its volume.
 ///
 /// Exact up to rounding; the same bits for any number of threads. A displacement that is not finite has the step 0.

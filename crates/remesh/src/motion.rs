@@ -157,7 +157,7 @@ impl Motion {
         Moved {
             mesh: self.reference.clone(),
             displacement: self.displacement.clone(),
-            inversion: StepToInversion { step: f64::INFINITY, element: None },
+            inversion: StepToInversion::NEVER,
         }
     }
 

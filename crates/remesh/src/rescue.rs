@@ -30,13 +30,7 @@ const WORN_OUT: f64 = 0.03;
 
 /// A remedy that was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Rescue {
-    /// Steps of a smaller share of what was wanted.
-    SmallerSteps {
-        /// The share.
-        share: f64,
-    },
     /// Another way in which stiffness follows element size.
     Policy {
         /// Until now.

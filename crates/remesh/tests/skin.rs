@@ -3,29 +3,12 @@
 
 mod support;
 
-use std::collections::BTreeMap;
-
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{ElasticMap, StiffnessPolicy, check_step, step_to_inversion};
-use support::Point;
+use support::{Point, plate_columns};
 
 const LAYERS: usize = 8;
-
-/// Nodes of each grid column of the plate, bottom to top.
-fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
-    let mut columns = BTreeMap::<(u64, u64), Vec<NodeId>>::new();
-    let plate = mesh.topology().region("plate").unwrap();
-    let mut nodes: Vec<NodeId> =
-        mesh.topology().elements_of(plate).into_iter().flat_map(|e| mesh.topology().tet(e)).collect();
-    nodes.sort_by(|a, b| mesh.point(*a)[2].total_cmp(&mesh.point(*b)[2]).then(a.cmp(b)));
-    nodes.dedup();
-    for node in nodes {
-        let p = mesh.point(node);
-        columns.entry((p[0].to_bits(), p[1].to_bits())).or_default().push(node);
-    }
-    columns.into_values().collect()
-}
 
 /// Smallest thickness after / before of each layer, bottom to top, over all columns.
 fn retained(mesh: &Mesh, moved: &Mesh) -> [f64; LAYERS] {

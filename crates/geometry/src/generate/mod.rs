@@ -8,6 +8,8 @@ pub mod block;
 pub mod boxes;
 pub mod grading;
 pub mod grid;
+#[cfg(test)]
+mod measures;
 pub mod shield;
 mod shield_checks;
 pub mod sizing;

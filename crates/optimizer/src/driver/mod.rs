@@ -18,7 +18,7 @@
 mod run;
 mod trust;
 
-use fluxmorph_remesh::{Rescue, Rescued, Rung};
+use fluxmorph_remesh::Rung;
 
 use crate::algorithm::{self, Ending, Minimisation, Outcome, Sample};
 use crate::cli::ExitCode;
@@ -314,13 +314,10 @@ impl Search {
             let scale = SHRINK * self.trust.scale;
             self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
             let shape = run.shape();
-            let quality = run.problem.quality(shape.motion.reference()).worst;
             let step = shape.motion.step(&shape.displacement(wanted))?;
             let admitted = shape.motion.admitted(&step, &shape.limits);
-            let rescue = Rescue::SmallerSteps { share: scale };
-            let rescued = Rescued { rescue, quality: [quality; 2], admitted: [admitted; 2] };
-            let event = self.event(run, cause).with(&rescued);
-            run.tell(event);
+            let event = self.event(run, cause);
+            run.tell(RoundEvent { kind: RoundKind::SmallerSteps, admitted: Some([admitted; 2]), ..event });
             return Ok(None);
         }
         let remedy = if run.has_rounds_left() {

@@ -145,7 +145,6 @@ fn line(event: &Event) -> String {
                 Rescue::Guided { axis } => {
                     format!("the whole way anew, along {} only", ["x", "y", "z"][axis])
                 }
-                _ => "smaller steps".to_owned(),
             };
             let [before, after] = rescued.quality;
             format!("rescue: {what}, worst quality {before:.4} -> {after:.4}")

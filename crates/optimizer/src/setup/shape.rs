@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
@@ -70,8 +69,7 @@ pub(super) fn shape(
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
     let motion = Motion::new(mesh.clone(), setup)?;
-    let moving = motion.moving().to_vec();
-    overlap_faults(inputs, &moving, model, observed)?;
+    overlap_faults(inputs, motion.moving(), model, observed)?;
     source.check(held_node_fault(inputs, &surface, motion.map(), model).into_iter().collect())?;
     let thickness = body(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
@@ -80,7 +78,7 @@ pub(super) fn shape(
         let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
         source.error(vec![fault.expected(format!("one value for each of the {n} design variables"))])
     })?;
-    let quality = QualityReport::of_elements(mesh, &moving).map_or(0.0, |quality| quality.worst);
+    let quality = motion.quality(mesh).worst;
     if let Some(minimum) = config.optimizer.minimum_quality.filter(|minimum| quality < *minimum) {
         let message = format!(
             "the worst element of the undeformed mesh has the quality {quality:.3e}, below optimizer.minimum_quality = \
@@ -99,7 +97,6 @@ pub(super) fn shape(
         surface,
         motion,
         limits,
-        moving,
         thickness,
         lower: vec![design.lower; n],
         upper: vec![design.upper; n],
@@ -357,9 +354,9 @@ fn check_bounds(source: &Source, shape: &Shape) -> Result<(), Error> {
         let at = bound[0] * 1e3;
         match shape.motion.moved(&shape.displacement(bound)) {
             Ok(moved) => {
-                let quality = QualityReport::of_elements(&moved.mesh, &shape.moving);
+                let quality = shape.motion.quality(&moved.mesh);
                 let least = shape.limits.least_quality;
-                if let Some(quality) = quality.filter(|q| q.worst < least) {
+                if quality.worst < least {
                     let message = format!(
                         "`{key}`: at {at:.3} mm element {} has the quality {:.2e}",
                         quality.worst_element, quality.worst

@@ -1,6 +1,7 @@
 //! Meshes and vectors for the tests of this crate.
 #![allow(dead_code, unreachable_pub)]
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shield};
@@ -131,4 +132,19 @@ pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, pois
         boundaries: ["x_min", "y_min", "plate_side"].map(slide).to_vec(),
         ..RemeshSetup::default()
     }
+}
+
+/// Nodes of each grid column of the plate, bottom to top.
+pub fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
+    let mut columns = BTreeMap::<(u64, u64), Vec<NodeId>>::new();
+    let plate = mesh.topology().region("plate").expect("a shield");
+    let mut nodes: Vec<NodeId> =
+        mesh.topology().elements_of(plate).into_iter().flat_map(|e| mesh.topology().tet(e)).collect();
+    nodes.sort_by(|a, b| mesh.point(*a)[2].total_cmp(&mesh.point(*b)[2]).then(a.cmp(b)));
+    nodes.dedup();
+    for node in nodes {
+        let p = mesh.point(node);
+        columns.entry((p[0].to_bits(), p[1].to_bits())).or_default().push(node);
+    }
+    columns.into_values().collect()
 }

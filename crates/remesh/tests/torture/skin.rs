@@ -6,6 +6,7 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{Guidance, Limits, StiffnessPolicy};
 
 use crate::cases::{alternating_control_points, shield_parameters};
+use crate::support::plate_columns;
 
 /// The layers of the moved face from outside to inside, and how much of their thickness they keep.
 pub struct Kept {
@@ -58,19 +59,4 @@ pub fn kept(p: &ShieldParameters, policy: StiffnessPolicy, guidance: Guidance) -
         }
     };
     Kept { policy, guidance, layers: (0..p.skin.len()).map(of_layer).collect() }
-}
-
-/// Grid columns of the plate: its nodes at each place of the lower face, bottom to top.
-fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
-    let mut columns = std::collections::BTreeMap::<(u64, u64), Vec<NodeId>>::new();
-    let plate = mesh.topology().region("plate").expect("it is there");
-    let mut nodes: Vec<NodeId> =
-        mesh.topology().elements_of(plate).into_iter().flat_map(|e| mesh.topology().tet(e)).collect();
-    nodes.sort_by(|a, b| mesh.point(*a)[2].total_cmp(&mesh.point(*b)[2]).then(a.cmp(b)));
-    nodes.dedup();
-    for node in nodes {
-        let p = mesh.point(node);
-        columns.entry((p[0].to_bits(), p[1].to_bits())).or_default().push(node);
-    }
-    columns.into_values().collect()
 }
