@@ -6,6 +6,7 @@
 //! [`io`]; [`quality`] judges them (Eq. 4). [`fem`] is the kernel that the elastic and the electromagnetic problem
 //! share, as the paper's appendix suggests.
 
+pub mod box_tree;
 pub mod error;
 mod facets;
 pub mod fem;
@@ -13,6 +14,7 @@ pub mod generate;
 pub mod ids;
 pub mod incidence;
 pub mod io;
+pub mod locate;
 pub mod mesh;
 pub mod quality;
 pub mod tet4;

@@ -46,15 +46,33 @@ fn a_shield_reads_back_bit_for_bit() {
 }
 
 #[test]
-fn arrays_that_fill_their_blocks_read_back_and_are_not_compressed() {
-    // 3072 tets: 96 KiB of connectivity, three full blocks of the compressor.
-    let mesh = block(&BlockParameters::default()).expect("valid");
-    round_trip(&mesh);
-    let text = String::from_utf8(vtu_bytes(&mesh, &[], &[]).expect("no arrays")).expect("XML in UTF-8");
-    assert!(!text.contains("compressor"));
-    let mesh = block(&BlockParameters { cells: [8, 8, 7], ..BlockParameters::default() }).expect("valid");
+fn arrays_that_would_fill_whole_blocks_read_back() {
+    // Connectivity of 6 and 12 times 64 KiB; in the second, scalars of the elements of 3 times 64 KiB.
+    for cells in [[8, 16, 16], [16; 3]] {
+        let mesh = block(&BlockParameters { cells, ..BlockParameters::default() }).expect("valid");
+        assert_eq!(32 * mesh.topology().tets().len() % 65_536, 0);
+        round_trip(&mesh);
+    }
+}
+
+#[test]
+fn the_header_says_how_arrays_are_stored() {
+    let mesh = block(&BlockParameters { cells: [1; 3], ..BlockParameters::default() }).expect("valid");
     let text = String::from_utf8(vtu_bytes(&mesh, &[], &[]).expect("no arrays")).expect("XML in UTF-8");
     assert!(text.contains("compressor=\"vtkZLibDataCompressor\"") && text.contains("header_type=\"UInt64\""));
+    assert!(!text.contains("appended"));
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_number_of_threads() {
+    let mesh = shield(&ShieldParameters { refinement: 0.5, ..ShieldParameters::default() }).expect("valid");
+    let qualities = quality::qualities(&mesh);
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| vtu_bytes(&mesh, &[], &[scalar("quality", &qualities)])).expect("finite")
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(4));
 }
 
 #[test]

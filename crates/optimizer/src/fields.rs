@@ -4,8 +4,9 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::io::{ArrayData, Field, vtu_bytes};
 use fluxmorph_geometry::quality::qualities;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, MeshError};
+use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 use fluxmorph_solver::{FieldModel, FieldSolution};
+use rayon::prelude::*;
 
 use crate::problem::{Analysis, Problem};
 
@@ -63,12 +64,14 @@ struct StateArrays {
 
 impl StateArrays {
     fn new(model: &FieldModel, solution: &FieldSolution, mesh: &Mesh, index: usize) -> Self {
-        let potentials: Vec<[c64; 4]> =
-            mesh.topology().nodes().map(|n| solution.potentials(model, n)).collect();
-        let a: Vec<[c64; 3]> = potentials.iter().map(|p| [p[0], p[1], p[2]]).collect();
+        let potentials: Vec<[c64; 4]> = (0..mesh.points().len())
+            .into_par_iter()
+            .map(|i| solution.potentials(model, NodeId::new(i)))
+            .collect();
+        let a: Vec<[c64; 3]> = potentials.par_iter().map(|p| [p[0], p[1], p[2]]).collect();
         let b = parts(&solution.flux_densities(model, mesh));
         let magnitude = |(re, im): (&Point, &Point)| re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt();
-        let b_abs = b[0].iter().zip(&b[1]).map(magnitude).collect();
+        let b_abs = b[0].par_iter().zip(&b[1]).map(magnitude).collect();
         let suffix = match index {
             0 => String::new(),
             _ => suffix(model.angular_frequency()),
@@ -118,7 +121,7 @@ fn suffix(angular_frequency: f64) -> String {
 
 /// Real and imaginary parts.
 fn parts(values: &[[c64; 3]]) -> [Vec<Point>; 2] {
-    [values.iter().map(|v| v.map(|c| c.re)).collect(), values.iter().map(|v| v.map(|c| c.im)).collect()]
+    [|c: c64| c.re, |c: c64| c.im].map(|part| values.par_iter().map(|v| v.map(part)).collect())
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fluxmorph_geometry::io::pvd_text;
+use fluxmorph_geometry::locate::{Located, locate};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::{SolverError, recovery};
 
@@ -280,9 +282,11 @@ impl<'a> Session<'a> {
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
         let mesh = &analysis.mesh;
+        let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
+        let located = locate(mesh, &places);
         let states = (0..problem.states.len())
-            .map(|index| self.state_result(index, analysis, observer))
-            .collect::<Result<Vec<_>, Error>>()?;
+            .map(|index| self.state_result(index, analysis, &located, observer))
+            .collect::<Vec<_>>();
         let StateResult { probes, losses_w, .. } = states[0].clone();
         let design = match (&problem.shape, values) {
             (Some(shape), Some(values)) => Some(DesignResult {
@@ -331,45 +335,48 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Losses and probes of one state.
+    /// Losses and probes of one state; `located` has an entry for every point of every probe.
     fn state_result(
         &self,
         index: usize,
         analysis: &Analysis,
+        located: &[Option<Located>],
         observer: &mut dyn Observer,
-    ) -> Result<StateResult, Error> {
+    ) -> StateResult {
         let (model, solution) = (&self.setup.problem.states[index], &analysis.solutions[index]);
         let mesh = &analysis.mesh;
+        let mut located = located.iter();
         let probes = self
             .config
             .probes
             .iter()
             .map(|probe| {
-                let at = |&point| match recovery::probe(solution, model, mesh, &probe.name, &[point]) {
-                    Ok(b) => Ok(b.first().copied()),
+                let mut at = |&point| match located.next().copied().flatten() {
+                    Some((e, _)) => Some(recovery::recovered_flux_density(solution, model, mesh, e, point)),
                     // It was inside before the mesh moved: the result of a whole run is worth more than this point.
-                    Err(error @ SolverError::ProbeOutside { .. }) => {
+                    None => {
                         if index == 0 {
+                            let ([lower, upper], probe) = (mesh.bounding_box(), probe.name.clone());
+                            let error = SolverError::ProbeOutside { probe, point, lower, upper };
                             observer.warning(&format!("{error}: its field is left out"));
                         }
-                        Ok(None)
+                        None
                     }
-                    Err(error) => Err(error.into()),
                 };
-                let b = probe.points.iter().map(at).collect::<Result<Vec<_>, Error>>()?;
-                Ok(ProbeResult {
+                let b: Vec<_> = probe.points.iter().map(&mut at).collect();
+                ProbeResult {
                     name: probe.name.clone(),
                     points_m: probe.points.clone(),
                     b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
                     b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
-                })
+                }
             })
-            .collect::<Result<_, Error>>()?;
-        Ok(StateResult {
+            .collect();
+        StateResult {
             frequency_hz: self.config.analysis.frequencies()[index],
             losses_w: solution.losses(model, mesh).into_iter().collect(),
             probes,
-        })
+        }
     }
 }
 

@@ -4,6 +4,7 @@
 //! (docs/theory.md), so the thickness of a design is the initial one plus the node's height: exactly where one direction
 //! moves all nodes, and along normals in the same sense, each along its own. A node without direction has no thickness.
 
+use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 
@@ -24,13 +25,14 @@ impl Thickness {
     pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
         let topology = mesh.topology();
         let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
-        let faces: Vec<[Point; 3]> = topology
+        let triangles: Vec<[Point; 3]> = topology
             .facets()
             .iter()
             .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
             .filter(|f| !f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
             .map(|f| f.nodes.map(|n| mesh.point(n)))
             .collect();
+        let faces = BoxTree::new(triangles.iter().map(reach).collect());
         let initial = surface
             .nodes()
             .iter()
@@ -40,7 +42,8 @@ impl Thickness {
                     return Some(None);
                 }
                 let (origin, back) = (mesh.point(node), direction.map(|d| -d));
-                faces.iter().filter_map(|face| distance(origin, back, face)).min_by(f64::total_cmp).map(Some)
+                let hits = faces.hits(origin, back).into_iter();
+                hits.filter_map(|i| distance(origin, back, &triangles[i])).min_by(f64::total_cmp).map(Some)
             })
             .collect::<Option<Vec<_>>>()?;
         initial.iter().any(Option::is_some).then_some(())?;
@@ -58,6 +61,12 @@ impl Thickness {
             .map(|(i, t)| t + heights[i])
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
+}
+
+/// A box that holds every place where a ray counts as hitting a triangle.
+fn reach(triangle: &[Point; 3]) -> AxisBox {
+    let tight = AxisBox::around(triangle);
+    tight.grown(10.0 * RIM_TOLERANCE * tight.extent())
 }
 
 /// Distance along the ray at which it meets a triangle that it does not touch at its origin.

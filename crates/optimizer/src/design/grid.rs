@@ -3,6 +3,7 @@
 //! The grid lies in the two coordinates across the axis that the nodes' directions follow most, in ascending order. Lives here:
 //! cells, weights and the grid's points. Does not live here: what a row of weights is used for.
 
+use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::tet4::Point;
 
 use super::{DesignError, Row, axis_name};
@@ -98,14 +99,14 @@ impl Grid {
             let (low, high) = self.limits[side];
             low + (high - low) * k as f64 / (self.counts[side] - 1) as f64
         };
+        let flat = BoxTree::of_points(&self.flat(places));
         (0..n * m)
             .map(|k| {
-                let (x, y) = (at(k / m, 0), at(k % m, 1));
-                let distance = |p: &Point| (p[u] - x).hypot(p[v] - y);
-                let nearest = places.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-                let mut point = nearest.copied().unwrap_or_default();
-                (point[u], point[v]) = (x, y);
-                point
+                let mut seen = [0.0; 3];
+                (seen[u], seen[v]) = (at(k / m, 0), at(k % m, 1));
+                let nearest = flat.nearest(seen).map_or(0.0, |(i, _)| places[i][self.along]);
+                seen[self.along] = nearest;
+                seen
             })
             .collect()
     }

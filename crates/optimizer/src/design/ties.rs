@@ -3,7 +3,8 @@
 //! Mirrors are normal to coordinate axes, one an axis at most; so they commute, and the images of a point are at most
 //! eight. A point on a mirror is its own partner.
 
-use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::box_tree::BoxTree;
+use fluxmorph_geometry::tet4::{Point, norm};
 
 use super::{DesignError, Mirror, Row, axis_name};
 
@@ -32,25 +33,15 @@ pub(super) fn pairs(
         })
         .fold(0.0, f64::max);
     let tolerance = TOLERANCE * extent;
-    // Sorted along the longest way through the points a partner lies in a narrow window.
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    order.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]).then(a.cmp(&b)));
-    let nearest = |image: Point, among: &[usize]| {
-        let distance = |&i: &usize| (norm(sub(points[i], image)), i);
-        among.iter().map(distance).min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
-    };
+    let tree = BoxTree::of_points(points);
     let partner = |mirror: &Mirror, point: Point| {
-        let image = mirror.image(point);
-        let first = order.partition_point(|&i| points[i][0] < image[0] - tolerance);
-        let last = order.partition_point(|&i| points[i][0] <= image[0] + tolerance);
-        match nearest(image, &order[first..last]) {
-            Some((distance, i)) if distance <= tolerance => Ok(i),
-            _ => {
-                let distance = nearest(image, &order).map_or(f64::INFINITY, |(distance, _)| distance);
-                let (axis, at) = (axis_name(mirror.axis), mirror.at);
-                Err(DesignError::NoPartner { what, point, axis, at, distance })
-            }
+        let (i, square) = tree.nearest(mirror.image(point)).unwrap_or((0, f64::INFINITY));
+        let distance = square.sqrt();
+        if distance <= tolerance {
+            return Ok(i);
         }
+        let (axis, at) = (axis_name(mirror.axis), mirror.at);
+        Err(DesignError::NoPartner { what, point, axis, at, distance })
     };
     mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
 }

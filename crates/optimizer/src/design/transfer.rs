@@ -7,6 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -81,38 +82,24 @@ impl Triangulation {
 struct Pieces<'a> {
     places: &'a [Point],
     pieces: Vec<Vec<usize>>,
-    /// Width of the cells [m].
-    width: f64,
-    /// Every piece in each cell that its bounding box, as much wider as a node may lie apart, has a part in.
-    cells: BTreeMap<[i64; 3], Vec<usize>>,
+    /// The box of every piece, as much wider as a node may lie apart.
+    boxes: BoxTree,
 }
 
 impl<'a> Pieces<'a> {
     fn new(places: &'a [Point], pieces: Vec<Vec<usize>>) -> Self {
-        let width = pieces.iter().map(|piece| longest_edge(places, piece)).fold(f64::MIN_POSITIVE, f64::max);
-        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
-        for (number, piece) in pieces.iter().enumerate() {
-            let margin = NEAR * longest_edge(places, piece);
-            let bound = |d: usize, pick: fn(f64, f64) -> f64, start: f64| {
-                piece.iter().map(|&n| places[n][d]).fold(start, pick)
-            };
-            let least = cell(std::array::from_fn(|d| bound(d, f64::min, f64::INFINITY) - margin), width);
-            let most = cell(std::array::from_fn(|d| bound(d, f64::max, f64::NEG_INFINITY) + margin), width);
-            for x in least[0]..=most[0] {
-                for y in least[1]..=most[1] {
-                    for z in least[2]..=most[2] {
-                        cells.entry([x, y, z]).or_default().push(number);
-                    }
-                }
-            }
-        }
-        Self { places, pieces, width, cells }
+        let around = |piece: &Vec<usize>| {
+            let corners: Vec<Point> = piece.iter().map(|&n| places[n]).collect();
+            AxisBox::around(&corners).grown(NEAR * longest_edge(places, piece))
+        };
+        let boxes = BoxTree::new(pieces.iter().map(around).collect());
+        Self { places, pieces, boxes }
     }
 
     /// Nodes and their weights at the point of the pieces that lies nearest, the first of equals; `None` without one near.
     fn nearest(&self, place: Point) -> Option<Vec<(usize, f64)>> {
         let mut best: Option<(f64, Vec<(usize, f64)>)> = None;
-        for &number in self.cells.get(&cell(place, self.width)).into_iter().flatten() {
+        for number in self.boxes.containing(place) {
             let piece = &self.pieces[number];
             let corners: Vec<Point> = piece.iter().map(|&n| self.places[n]).collect();
             let weights = nearest_point(&corners, place);
@@ -126,10 +113,6 @@ impl<'a> Pieces<'a> {
         }
         best.map(|(_, weights)| weights)
     }
-}
-
-fn cell(place: Point, width: f64) -> [i64; 3] {
-    place.map(|c| (c / width).floor() as i64)
 }
 
 /// Length of the longest edge of a triangle, or of an edge [m].

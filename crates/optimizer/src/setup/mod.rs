@@ -15,9 +15,9 @@ pub(crate) use design::triangulation as design_triangulation;
 pub use motion::{MotionSetup, set_up_motion};
 
 use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
-use fluxmorph_solver::recovery::locate;
 use fluxmorph_solver::{FieldModel, Material};
 
 use crate::config::{self, Config, Fault, RegionModel, Source};
@@ -206,27 +206,39 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
 /// Every probe point that no element holds, before a run is spent on it.
 fn probe_faults(config: &Config, source: &Source, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for (i, probe) in config.probes.iter().enumerate() {
-        for (j, &point) in probe.points.iter().enumerate().filter(|(_, p)| locate(mesh, **p).is_none()) {
-            let at = millimetres(point);
-            let name = &probe.name;
-            let (message, expected) = match locate(full_mesh, point) {
-                Some(_) => (
-                    format!(
-                        "the point {at} of the probe `{name}` lies in a region that its impedance surface replaces"
-                    ),
-                    "a point in a region that is meshed".to_owned(),
+    let points: Vec<(usize, usize, [f64; 3])> = config
+        .probes
+        .iter()
+        .enumerate()
+        .flat_map(|(i, probe)| probe.points.iter().enumerate().map(move |(j, &point)| (i, j, point)))
+        .collect();
+    let places: Vec<[f64; 3]> = points.iter().map(|&(_, _, point)| point).collect();
+    let outside: Vec<_> = points
+        .iter()
+        .zip(locate(mesh, &places))
+        .filter(|(_, found)| found.is_none())
+        .map(|(p, _)| *p)
+        .collect();
+    let places: Vec<[f64; 3]> = outside.iter().map(|&(_, _, point)| point).collect();
+    for ((i, j, point), replaced) in outside.into_iter().zip(locate(full_mesh, &places)) {
+        let at = millimetres(point);
+        let name = &config.probes[i].name;
+        let (message, expected) = match replaced {
+            Some(_) => (
+                format!(
+                    "the point {at} of the probe `{name}` lies in a region that its impedance surface replaces"
                 ),
-                None => {
-                    let [lower, upper] = full_mesh.bounding_box().map(millimetres);
-                    (
-                        format!("the point {at} of the probe `{name}` lies outside the mesh"),
-                        format!("a point inside the mesh, which goes from {lower} to {upper}"),
-                    )
-                }
-            };
-            faults.push(source.fault(&format!("probes[{i}].points[{j}]"), message).expected(expected));
-        }
+                "a point in a region that is meshed".to_owned(),
+            ),
+            None => {
+                let [lower, upper] = full_mesh.bounding_box().map(millimetres);
+                (
+                    format!("the point {at} of the probe `{name}` lies outside the mesh"),
+                    format!("a point inside the mesh, which goes from {lower} to {upper}"),
+                )
+            }
+        };
+        faults.push(source.fault(&format!("probes[{i}].points[{j}]"), message).expected(expected));
     }
     faults
 }

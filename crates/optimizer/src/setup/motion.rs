@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
@@ -121,14 +122,14 @@ fn nodes_of(source: &Source, path: &str, target: &Target, mesh: &Mesh) -> Result
         }
         Target::Nodes(points) => {
             let mut nodes = Vec::new();
+            let tree = BoxTree::of_points(mesh.points());
             for (i, &point) in points.iter().enumerate() {
-                let at = |node: &NodeId| norm(sub(mesh.point(*node), point));
-                let nearest = topology.nodes().min_by(|a, b| at(a).total_cmp(&at(b)));
-                match nearest.filter(|node| at(node) <= near) {
+                let nearest = tree.nearest(point).map(|(i, square)| (NodeId::new(i), square.sqrt()));
+                match nearest.filter(|&(_, distance)| distance <= near).map(|(node, _)| node) {
                     Some(node) => nodes.push(node),
                     None => {
                         let place =
-                            nearest.map_or_else(|| "nowhere".to_owned(), |n| millimetres(mesh.point(n)));
+                            nearest.map_or_else(|| "nowhere".to_owned(), |(n, _)| millimetres(mesh.point(n)));
                         let message = format!("there is no node at {}", millimetres(point));
                         let fault = source.fault(&format!("{path}.nodes[{i}]"), message);
                         return Err(Box::new(
