@@ -36,9 +36,13 @@ test-pyvista:
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
 
-# CPU time of assembly, factor, solve, adjoint, gradient and remesh
+# CPU time and memory of design steps up to a million tetrahedra; writes docs/performance.md
 bench:
-    cargo bench --workspace
+    cargo bench --bench scaling
+
+# The kernels one by one, and the sparse factors
+bench-kernels:
+    cargo bench --workspace --bench kernels --bench ldlt --bench elastic --bench msh --bench vtu --bench setup
 
 # A first optimisation, in seconds (it ends at its limit of evaluations): results in configs/runs/shield_quick
 demo:

@@ -95,8 +95,8 @@ impl Slab {
                 }
             }
         }
-        let system = model.prepare(model.assemble(mesh)).expect("a definite system");
-        let solution = model.solve_prepared(&system, &load).expect("the iteration converges");
+        let mut system = model.prepare(model.assemble(mesh)).expect("a definite system");
+        let solution = model.solve_prepared(&mut system, &load).expect("the iteration converges");
         let losses = solution.losses(&model, mesh);
         losses.iter().map(|(_, loss)| loss).sum::<f64>() / area
     }

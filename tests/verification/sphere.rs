@@ -92,14 +92,14 @@ impl Solid {
 pub(crate) fn solid(name: &str, order: Order, refinement: f64, bars: [f64; 3]) -> Vec<Row> {
     let sphere = Solid::new(name, order, refinement);
     let Solid { data, radius, mesh, model } = &sphere;
-    let (solution, system) = model.solve(mesh).expect("it converges");
+    let (solution, mut system) = model.solve(mesh).expect("it converges");
     let case = Case::new(format!("sphere, {name}, {order:?}"), mesh, model);
     let at = |point: Point| probe(&solution, model, mesh, name, &[point]).expect("a point of the mesh")[0][2];
     let dipole = complex(&data["dipole_T_m3"]);
     let far = 1.5 * radius;
     let [field_bar, loss_bar, derivative_bar] = bars;
     let value = sphere.loss().evaluate(model, mesh, &solution).expect("a finite loss");
-    let lambda = adjoint::solve(&system, &value.derivative).expect("it converges");
+    let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
     let moving: Vec<ElementId> = mesh.topology().elements().collect();
     let implicit = adjoint::node_gradient(model, mesh, &solution, &lambda, &moving);
     let explicit = value.explicit.expect("a loss of a region that moves");

@@ -77,6 +77,16 @@ pub enum MeshError {
         /// What is expected, and what to do.
         expected: String,
     },
+    /// A node with more elements than any mesh of a device has.
+    #[error("node {} belongs to {tets} tetrahedra; at most {most} may meet at one: the mesh is corrupt or needs remeshing there", node.0)]
+    CrowdedNode {
+        /// The node.
+        node: NodeId,
+        /// Tetrahedra around it.
+        tets: usize,
+        /// Most there may be.
+        most: usize,
+    },
     /// A sparse factorisation failed.
     #[error("the sparse factorisation of {unknowns} unknowns failed: {cause}")]
     Factorisation {

@@ -17,6 +17,9 @@ pub const NORMALISATION: f64 = 8.47967;
 /// Number of equal bins of `0 ≤ q ≤ 1` in [`QualityReport::histogram`].
 pub const HISTOGRAM_BINS: usize = 10;
 
+/// Elements per parallel task.
+const CHUNK: usize = 4096;
+
 /// Quality `q` of one tetrahedron (Eq. 4): a pure number, its sign that of the volume.
 ///
 /// A tetrahedron whose four vertices coincide has the quality 0.
@@ -80,32 +83,62 @@ impl QualityReport {
     pub fn of_points(topology: &Topology, points: &[Point], elements: &[ElementId]) -> Option<Self> {
         assert_eq!(points.len(), topology.node_count(), "one point per node");
         let vertices = |e: ElementId| topology.tet(e).map(|n| points[n.index()]);
-        let values: Vec<f64> = elements.par_iter().map(|&e| quality(vertices(e))).collect();
-        let (&first, &worst_element) = (values.first()?, elements.first()?);
-        let mut report = Self {
-            elements: elements.len(),
-            worst: first,
+        let of_chunk = |chunk: &[ElementId]| -> Option<Self> {
+            let &first = chunk.first()?;
+            let mut report = Self::starting_from(first, quality(vertices(first)));
+            report.elements = chunk.len();
+            for &element in chunk {
+                report.count(element, quality(vertices(element)));
+            }
+            Some(report)
+        };
+        // Minima and counts: the chunks combine to the same report whatever they are.
+        let chunks: Vec<Self> = elements.par_chunks(CHUNK).filter_map(of_chunk).collect();
+        let mut report = chunks.into_iter().reduce(Self::with)?;
+        report.worst_centroid = tet4::centroid(vertices(report.worst_element));
+        Some(report)
+    }
+
+    /// A report on nothing yet, with a first candidate for the worst element.
+    fn starting_from(worst_element: ElementId, worst: f64) -> Self {
+        Self {
+            elements: 0,
+            worst,
             worst_element,
             worst_centroid: [0.0; 3],
             histogram: [0; HISTOGRAM_BINS],
             poor: 0,
             fair: 0,
             good: 0,
-        };
-        for (&q, &element) in values.iter().zip(elements) {
-            if (q, element) < (report.worst, report.worst_element) {
-                (report.worst, report.worst_element) = (q, element);
-            }
-            let bin = (q * HISTOGRAM_BINS as f64).clamp(0.0, (HISTOGRAM_BINS - 1) as f64);
-            report.histogram[bin as usize] += 1;
-            match q {
-                q if q >= 0.6 => report.good += 1,
-                q if q > 0.3 => report.fair += 1,
-                _ => report.poor += 1,
-            }
         }
-        report.worst_centroid = tet4::centroid(vertices(report.worst_element));
-        Some(report)
+    }
+
+    fn count(&mut self, element: ElementId, q: f64) {
+        if (q, element) < (self.worst, self.worst_element) {
+            (self.worst, self.worst_element) = (q, element);
+        }
+        let bin = (q * HISTOGRAM_BINS as f64).clamp(0.0, (HISTOGRAM_BINS - 1) as f64);
+        self.histogram[bin as usize] += 1;
+        match q {
+            q if q >= 0.6 => self.good += 1,
+            q if q > 0.3 => self.fair += 1,
+            _ => self.poor += 1,
+        }
+    }
+
+    /// The report on the elements of both.
+    fn with(mut self, other: Self) -> Self {
+        if (other.worst, other.worst_element) < (self.worst, self.worst_element) {
+            (self.worst, self.worst_element) = (other.worst, other.worst_element);
+        }
+        for (own, count) in self.histogram.iter_mut().zip(other.histogram) {
+            *own += count;
+        }
+        self.elements += other.elements;
+        self.poor += other.poor;
+        self.fair += other.fair;
+        self.good += other.good;
+        self
     }
 
     /// Shares of poor (`q ≤ 0.3`), fair and good (`q ≥ 0.6`) elements; they add up to 1.

@@ -54,6 +54,9 @@ pub struct Topology {
     facets: Vec<Facet>,
 }
 
+/// Most tetrahedra around a node: a hundred times what a mesh has, and few enough for 16-bit places in its matrix rows.
+const MOST_AROUND: usize = 4096;
+
 impl Topology {
     /// A topology of `node_count` nodes.
     ///
@@ -77,6 +80,14 @@ impl Topology {
             return Err(MeshError::DanglingNode { node, nodes: node_count });
         }
         let incidence = Incidence::new(node_count, &tets);
+        let crowded = (0..node_count).map(NodeId::new).find(|&n| incidence.around(n).len() > MOST_AROUND);
+        if let Some(node) = crowded {
+            return Err(MeshError::CrowdedNode {
+                node,
+                tets: incidence.around(node).len(),
+                most: MOST_AROUND,
+            });
+        }
         let facets = find_facets(node_count, &tets, &region_of)?;
         Ok(Self {
             node_count,

@@ -13,6 +13,7 @@ use fluxmorph_geometry::tet4::Point;
 use crate::config::{Config, MeshConfig, Source};
 use crate::design::Triangulation;
 use crate::error::Error;
+use crate::memory::Memory;
 use crate::observer::Observer;
 use crate::output::{ObjectiveResult, StopReason, Verification};
 use crate::problem::{Problem, Want};
@@ -151,11 +152,12 @@ impl Gain<'_> {
         // They decide nothing here.
         problem.constraints = Vec::new();
         let mut values = [0.0; 2];
+        let mut memory = Memory::default();
         for (value, displacement) in values.iter_mut().zip(displacements) {
             if interrupted() {
                 return Ok(None);
             }
-            *value = objective_at(&mut problem, displacement)?;
+            *value = objective_at(&mut problem, &mut memory, displacement)?;
         }
         let [initial, best] = values;
         let ratio = best / initial;
@@ -182,14 +184,14 @@ fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
 }
 
 /// The objective at a shape, reached from the undeformed mesh.
-fn objective_at(problem: &mut Problem, displacement: Vec<Point>) -> Result<f64, Error> {
+fn objective_at(problem: &mut Problem, memory: &mut Memory, displacement: Vec<Point>) -> Result<f64, Error> {
     let undeformed = problem.shape.as_ref().map(|shape| shape.motion.clone());
     problem.approach_displacement(displacement.clone())?;
     let moved = match &problem.shape {
         Some(shape) => shape.motion.moved(&displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse(&[], moved, Want::Value)?;
+    let analysis = problem.analyse_with(memory, &[], moved, Want::Value)?;
     if let (Some(shape), Some(motion)) = (&mut problem.shape, undeformed) {
         shape.motion = motion;
     }

@@ -13,12 +13,13 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
-use fluxmorph_solver::linear::PreparedSystem;
+use fluxmorph_solver::linear::{PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, SolverError, adjoint};
 
 use crate::constraint::{Bound, Constraint, Limit, Quantity};
 use crate::design::DesignSurface;
 use crate::error::Error;
+use crate::memory::Memory;
 use crate::objective::{Term, WeightedSum};
 use crate::thickness::Thickness;
 
@@ -117,6 +118,8 @@ pub struct Analysis {
     pub linear_iterations: usize,
     /// Largest true relative residual of the linear solves.
     pub worst_residual: f64,
+    /// Methods of the linear solver that failed, and what took their place.
+    pub solver_events: Vec<SolverEvent>,
     /// Where the time went.
     pub timings: Timings,
 }
@@ -167,8 +170,9 @@ impl Problem {
     pub fn memory_estimate(&self) -> usize {
         let elements = self.original.topology().tets().len();
         let nodes = self.original.points().len();
-        // One state after the other is factored.
-        let systems = self.states.iter().map(FieldModel::memory_estimate).max().unwrap_or_default();
+        // Every state keeps its factor for the next design.
+        let of_state = |model: &FieldModel| model.linear_solver().memory_estimate().unwrap_or_default();
+        let systems = self.states.iter().map(of_state).sum::<usize>();
         let elastic = self.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
         systems + elastic + elements * BYTES_PER_ELEMENT + nodes * BYTES_PER_NODE
     }
@@ -186,10 +190,18 @@ impl Problem {
     /// # Errors
     /// [`Error::Remesh`] when the mesh would break, [`Error::Solver`] when the field cannot be computed.
     pub fn evaluate(&self, p: &[f64], want: Want) -> Result<Analysis, Error> {
+        self.evaluate_with(&mut Memory::default(), p, want)
+    }
+
+    /// As [`Problem::evaluate`], with what the linear solvers remember of the design before.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`]; the memory is then empty where the solver failed.
+    pub fn evaluate_with(&self, memory: &mut Memory, p: &[f64], want: Want) -> Result<Analysis, Error> {
         let clock = Instant::now();
         let moved = self.moved(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.analyse(p, moved, want)?;
+        let mut analysis = self.analyse_with(memory, p, moved, want)?;
         analysis.timings.remesh += remesh;
         Ok(analysis)
     }
@@ -199,8 +211,23 @@ impl Problem {
     /// # Errors
     /// [`Error::Solver`] when the field cannot be computed, [`Error::Remesh`] when the elastic gradient cannot.
     pub fn analyse(&self, p: &[f64], moved: Moved, want: Want) -> Result<Analysis, Error> {
+        self.analyse_with(&mut Memory::default(), p, moved, want)
+    }
+
+    /// As [`Problem::analyse`], with what the linear solvers remember of the design before.
+    ///
+    /// # Errors
+    /// As [`Problem::analyse`]; the memory is then empty where the solver failed.
+    pub fn analyse_with(
+        &self,
+        memory: &mut Memory,
+        p: &[f64],
+        moved: Moved,
+        want: Want,
+    ) -> Result<Analysis, Error> {
         let Moved { mesh, displacement, inversion } = moved;
         let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default() };
+        let mut events = Vec::new();
         let shape = self.shape.as_ref().filter(|_| want == Want::Gradient);
         let mut solutions = Vec::with_capacity(self.states.len());
         let terms: &[Term] = self.objective.as_ref().map_or(&[], |sum| &sum.terms);
@@ -213,17 +240,20 @@ impl Problem {
             let mut clock = Lap::start();
             let (matrix, load) = (model.assemble(&mesh), model.load(&mesh));
             work.timings.assembly += clock.lap();
-            let system = model.prepare(matrix)?;
+            let mut system = model.prepare_with(matrix, memory.of_state(index))?;
             work.timings.factor += clock.lap();
-            let state = model.solve_prepared(&system, &load)?;
+            let state = model.solve_prepared(&mut system, &load)?;
             work.report.include(&state);
             work.timings.state += clock.lap();
-            let solved = Solved { index, model, system, state };
-            objective.add(&mut work, &solved, &all, shape)?;
+            let mut solved = Solved { index, model, system, state };
+            objective.add(&mut work, &mut solved, &all, shape)?;
             for (gathered, (_, term)) in constrained.iter_mut().zip(&fields) {
-                gathered.add(&mut work, &solved, &[(0, *term)], shape)?;
+                gathered.add(&mut work, &mut solved, &[(0, *term)], shape)?;
             }
-            solutions.push(solved.state);
+            let Solved { system, state, .. } = solved;
+            events.extend_from_slice(system.events());
+            memory.keep(index, system);
+            solutions.push(state);
         }
         let Work { mut timings, report, .. } = work;
         let mut clock = Lap::start();
@@ -251,6 +281,7 @@ impl Problem {
             quality,
             linear_iterations: report.iterations,
             worst_residual: report.residual,
+            solver_events: events,
             timings,
         })
     }
@@ -364,7 +395,7 @@ impl Gathered {
     fn add(
         &mut self,
         work: &mut Work<'_>,
-        solved: &Solved<'_>,
+        solved: &mut Solved<'_>,
         terms: &[(usize, &Term)],
         shape: Option<&Shape>,
     ) -> Result<(), SolverError> {

@@ -87,7 +87,7 @@ pub fn run(
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
             rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
-            linear_solver: LinearSolverResult { worst_residual: optimised.worst_residual },
+            linear_solver: linear_solver(problem, optimised.worst_residual),
             ..session.result(
                 optimised.stop_reason,
                 &best.analysis,
@@ -142,6 +142,9 @@ pub fn solve(
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
         let analysis = problem.analyse(p, moved, Want::Gradient)?;
+        for event in &analysis.solver_events {
+            observer.notice(&event.to_string());
+        }
         let bounds = problem.bounds(p, &analysis)?;
         if config.output.fields != FieldsKept::Nothing {
             write_field(&session.directory, 0, problem, &analysis)?;
@@ -320,7 +323,7 @@ impl<'a> Session<'a> {
             probes,
             losses_w,
             states: if states.len() > 1 { states } else { Vec::new() },
-            linear_solver: LinearSolverResult { worst_residual: analysis.worst_residual },
+            linear_solver: linear_solver(problem, analysis.worst_residual),
             timings_s: BTreeMap::from([
                 ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
                 ("setup".to_owned(), self.setup_seconds),
@@ -493,4 +496,10 @@ pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
     bytes.extend(topology.tets().iter().flatten().flat_map(|n| n.0.to_le_bytes()));
     bytes.extend(topology.region_of().iter().flat_map(|RegionId(r)| r.to_le_bytes()));
     MeshHash { origin, blake3: blake3_hex(&bytes), nodes: topology.node_count(), tets: topology.tets().len() }
+}
+
+/// How the linear systems were solved.
+fn linear_solver(problem: &Problem, worst_residual: f64) -> LinearSolverResult {
+    let methods = problem.states.iter().map(|model| model.linear_solver().method().name().to_owned());
+    LinearSolverResult { methods: methods.collect(), worst_residual }
 }

@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 use crate::constraint::Quantity;
 use crate::error::Error;
+use crate::memory::Memory;
 use crate::problem::{Analysis, Problem, Want};
 
 /// Remainders over F(p) that count as rounding: above the solver's tolerance, and a thousand times below what a first
@@ -126,8 +127,9 @@ pub fn certify(
     settings: &Settings,
     progress: impl FnMut(usize, &Direction),
 ) -> Result<Certificate, Error> {
-    let base = problem.evaluate(p, Want::Gradient)?;
-    let value = |p: &[f64]| Ok(numbers(&problem.evaluate(p, Want::Value)?)[0]);
+    let mut memory = Memory::default();
+    let base = problem.evaluate_with(&mut memory, p, Want::Gradient)?;
+    let value = |p: &[f64]| Ok(numbers(&problem.evaluate_with(&mut memory.lent(), p, Want::Value)?)[0]);
     let objective = base.objective.expect("a certificate needs an objective");
     let gradient = base.gradient.as_ref().expect("the gradient was asked for");
     measure(&value, p, objective, gradient, &span(problem), settings, progress)
@@ -149,7 +151,8 @@ pub fn certify_all(
     settings: &Settings,
     mut progress: impl FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
-    let base = problem.evaluate(p, Want::Gradient)?;
+    let mut memory = Memory::default();
+    let base = problem.evaluate_with(&mut memory, p, Want::Gradient)?;
     let span = span(problem);
     let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
     let value = |p: &[f64], index: usize| -> Result<f64, Error> {
@@ -157,7 +160,7 @@ pub fn certify_all(
         if let Some(values) = known.borrow().get(&key) {
             return Ok(values[index]);
         }
-        let values = numbers(&problem.evaluate(p, Want::Value)?);
+        let values = numbers(&problem.evaluate_with(&mut memory.lent(), p, Want::Value)?);
         let value = values[index];
         known.borrow_mut().insert(key, values);
         Ok(value)

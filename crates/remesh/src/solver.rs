@@ -74,7 +74,7 @@ impl SolverAnalysis {
             SolverChoice::ComponentBlocks => false,
         };
         Ok(if direct {
-            Self::Direct(CholeskyAnalysis::new(structure)?)
+            Self::Direct(CholeskyAnalysis::of_nodes(structure, unknowns)?)
         } else {
             Self::ComponentBlocks(ComponentAnalysis::new(unknowns, structure)?)
         })

@@ -9,7 +9,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use rayon::prelude::*;
 
 use crate::element::lagrange::Lagrange;
@@ -25,7 +25,7 @@ use crate::surface::SurfaceTerm;
 ///
 /// # Errors
 /// As [`PreparedSystem::solve`].
-pub fn solve(system: &PreparedSystem, derivative: &[c64]) -> Result<FieldSolution, SolverError> {
+pub fn solve(system: &mut PreparedSystem, derivative: &[c64]) -> Result<FieldSolution, SolverError> {
     let (values, report): (Vec<c64>, LinearSolverReport) = system.solve(derivative)?;
     Ok(FieldSolution::adjoint(values, report))
 }
@@ -57,42 +57,84 @@ pub fn node_gradient(
 /// [`node_gradient`] on elements with `N` and faces with `F` nodes.
 fn gradient_of_order<const N: usize, const F: usize>(
     (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
-    nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F],
+    nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F] + Sync,
     (model, mesh): (&FieldModel, &Mesh),
     (state, adjoint): (&FieldSolution, &FieldSolution),
     moving: &[ElementId],
 ) -> Vec<Point> {
     let topology = model.topology();
-    let mut gradient = vec![[0.0; 3]; topology.node_count()];
-    let mut add = |nodes: &[NodeId], terms: &[Complex3], factor: f64| {
-        for (node, term) in nodes.iter().zip(terms) {
-            for d in 0..3 {
-                gradient[node.index()][d] += factor * term[d].re;
-            }
-        }
-    };
-    let contributions: Vec<[Complex3; 4]> = moving
+    let contributions: Vec<[Point; 4]> = moving
         .par_iter()
         .map(|&e| {
             let (tet, law) = (Tet4::new(mesh.vertices(e)), model.coefficients_of(e));
             let (l, u) = (adjoint.element_field(model, e), state.element_field(model, e));
-            point::shape_derivative(tet_shape, &tet, law, &l, &u)
+            scaled(-2.0, &point::shape_derivative(tet_shape, &tet, law, &l, &u))
         })
         .collect();
-    for (&e, terms) in moving.iter().zip(&contributions) {
-        add(&topology.tet(e), terms, -2.0);
-    }
+    let mut gradient = gathered(topology, moving, &contributions);
+    let mut add = |nodes: &[NodeId], terms: &[Point]| {
+        for (node, term) in nodes.iter().zip(terms) {
+            for d in 0..3 {
+                gradient[node.index()][d] += term[d];
+            }
+        }
+    };
     let magnets =
         model.sources().shape_derivatives(tet_shape, mesh, moving, |e| adjoint.element_field(model, e));
     for (e, terms) in magnets {
-        add(&topology.tet(e), &terms, 2.0);
+        add(&topology.tet(e), &scaled(2.0, &terms));
     }
-    for (triangle, term) in model.surface() {
-        let field = |s: &FieldSolution| s.nodal_field(model, nodes_of(triangle)).vector_potential;
-        let vertices = triangle.map(|n| mesh.point(n));
-        add(&triangle, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)), -2.0);
+    let surface: Vec<([NodeId; 3], SurfaceTerm)> = model.surface().collect();
+    let contributions: Vec<[Point; 3]> = surface
+        .par_iter()
+        .map(|&(triangle, term)| {
+            let nodes = nodes_of(triangle);
+            let field = |s: &FieldSolution| s.nodal_field(model, nodes).vector_potential;
+            let vertices = triangle.map(|n| mesh.point(n));
+            scaled(-2.0, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)))
+        })
+        .collect();
+    for ((triangle, _), terms) in surface.iter().zip(&contributions) {
+        add(triangle, terms);
     }
     gradient
+}
+
+/// The real part of some terms, times a factor.
+#[inline]
+fn scaled<const M: usize>(factor: f64, terms: &[Complex3; M]) -> [Point; M] {
+    terms.map(|term| term.map(|c| factor * c.re))
+}
+
+/// The sum at every node of the contributions of the elements around it, shape `(n_nodes, 3)`.
+///
+/// `elements` is ascending and has one contribution each. Every node gathers its own in ascending order of the elements:
+/// the bits do not depend on the threads.
+fn gathered(topology: &Topology, elements: &[ElementId], contributions: &[[Point; 4]]) -> Vec<Point> {
+    const NOT_LISTED: u32 = u32::MAX;
+    let mut position = vec![NOT_LISTED; topology.tets().len()];
+    for (i, e) in (0..).zip(elements) {
+        position[e.index()] = i;
+    }
+    let sum_at = |node: NodeId| {
+        let mut sum = [0.0; 3];
+        for &e in topology.elements_around(node) {
+            let i = position[e.index()];
+            if i == NOT_LISTED {
+                continue;
+            }
+            for (n, term) in topology.tet(e).iter().zip(&contributions[i as usize]) {
+                if *n == node {
+                    for d in 0..3 {
+                        sum[d] += term[d];
+                    }
+                }
+            }
+        }
+        sum
+    };
+    let nodes: Vec<NodeId> = topology.nodes().collect();
+    nodes.into_par_iter().map(sum_at).collect()
 }
 
 /// `∂/∂x_k (λᵀ M u)` of one surface term.
@@ -107,6 +149,37 @@ fn surface_derivative<const N: usize>(
         SurfaceTerm::Interface(jump) => interface::shape_derivative(shape, jump, adjoint, state),
         SurfaceTerm::Impedance(coefficient, _) => {
             impedance::shape_derivative(shape, vertices, coefficient, adjoint, state)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fluxmorph_geometry::generate::{BlockParameters, block};
+
+    use super::*;
+
+    #[test]
+    fn gathered_contributions_have_the_bits_of_a_serial_sum_for_any_number_of_threads() {
+        let mesh =
+            block(&BlockParameters { cells: [4, 3, 5], ..BlockParameters::default() }).expect("a block");
+        let topology = mesh.topology();
+        let elements: Vec<ElementId> = topology.elements().filter(|e| e.index() % 7 != 3).collect();
+        let term = |i: usize| (0.37 * i as f64).sin() * 1e3_f64.powi(i as i32 % 5);
+        let contributions: Vec<[Point; 4]> = (0..elements.len())
+            .map(|i| std::array::from_fn(|a| std::array::from_fn(|d| term(12 * i + 3 * a + d))))
+            .collect();
+        let mut serial = vec![[0.0; 3]; topology.node_count()];
+        for (&e, terms) in elements.iter().zip(&contributions) {
+            for (node, term) in topology.tet(e).iter().zip(terms) {
+                for d in 0..3 {
+                    serial[node.index()][d] += term[d];
+                }
+            }
+        }
+        for threads in [1, 2, 4] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            assert_eq!(pool.install(|| gathered(topology, &elements, &contributions)), serial);
         }
     }
 }

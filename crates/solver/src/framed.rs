@@ -38,4 +38,9 @@ impl<L: LocalMatrix<c64, N, 4>, const N: usize> LocalMatrix<c64, N, 4> for Frame
         }
         block
     }
+
+    #[inline]
+    fn scalars(&self) -> Option<[[f64; N]; N]> {
+        if self.frames.iter().all(Option::is_none) { self.matrix.scalars() } else { None }
+    }
 }

@@ -7,13 +7,14 @@
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh};
+use rayon::prelude::*;
 
 use crate::coil::{Coil, SourceTerms};
 use crate::element::lagrange::Lagrange;
 use crate::element::volume::NodalField;
 use crate::element::{Complex3, point};
 use crate::error::SolverError;
-use crate::space::Space;
+use crate::space::{Order, Space};
 use crate::unknowns::Unknowns;
 
 /// All sources of a model, per element.
@@ -51,34 +52,39 @@ impl Sources {
 
     /// The load [A m], added to `load`.
     pub(crate) fn add_load(&self, space: &Space, unknowns: &Unknowns, mesh: &Mesh, load: &mut [c64]) {
-        let mut add = |e: ElementId, values: &[Complex3]| {
+        match space.order() {
+            Order::Linear => self.add_load_of_order(Lagrange::<4, 4>::tet(), space, unknowns, mesh, load),
+            Order::Quadratic => self.add_load_of_order(Lagrange::<10, 4>::tet(), space, unknowns, mesh, load),
+        }
+    }
+
+    /// [`Self::add_load`] on elements with `N` nodes: element loads in parallel, then added in their order.
+    fn add_load_of_order<const N: usize>(
+        &self,
+        shape: &'static Lagrange<N, 4>,
+        space: &Space,
+        unknowns: &Unknowns,
+        mesh: &Mesh,
+        load: &mut [c64],
+    ) {
+        let mut add = |(e, values): (ElementId, [Complex3; N])| {
             for (&node, f) in space.nodes_of(e).iter().zip(values) {
                 unknowns.scatter_add(load, node, [f[0], f[1], f[2], c64::default()]);
             }
         };
         let tet = |e: ElementId| Tet4::new(mesh.vertices(e));
-        let linear = space.linear_tets().is_some();
-        let mut add_curl = |e: ElementId, moments: &[Complex3; 4]| {
-            if linear {
-                add(e, &point::curl_load(Lagrange::<4, 4>::tet(), &tet(e), moments));
-            } else {
-                add(e, &point::curl_load(Lagrange::<10, 4>::tet(), &tet(e), moments));
-            }
+        let of_coil =
+            |(e, moments): &(ElementId, [Complex3; 4])| (*e, point::curl_load(shape, &tet(*e), moments));
+        let of_magnet = |(e, source): &(ElementId, Point)| {
+            let tet = tet(*e);
+            let share = 0.25 * tet.volume;
+            (*e, point::curl_load(shape, &tet, &[source.map(|t| c64::from(share * t)); 4]))
         };
-        for (e, moments) in &self.coils.moments {
-            add_curl(*e, moments);
-        }
-        for (e, source) in &self.magnets {
-            let share = 0.25 * tet(*e).volume;
-            add_curl(*e, &[source.map(|t| c64::from(share * t)); 4]);
-        }
-        for (e, current) in &self.coils.currents {
-            if linear {
-                add(*e, &point::current_load(Lagrange::<4, 4>::tet(), &tet(*e), current));
-            } else {
-                add(*e, &point::current_load(Lagrange::<10, 4>::tet(), &tet(*e), current));
-            }
-        }
+        let of_region =
+            |(e, current): &(ElementId, Complex3)| (*e, point::current_load(shape, &tet(*e), current));
+        self.coils.moments.par_iter().map(of_coil).collect::<Vec<_>>().into_iter().for_each(&mut add);
+        self.magnets.par_iter().map(of_magnet).collect::<Vec<_>>().into_iter().for_each(&mut add);
+        self.coils.currents.par_iter().map(of_region).collect::<Vec<_>>().into_iter().for_each(add);
     }
 
     /// `∂/∂x_k (λᵀ f)` of the magnets among `moving` (ascending), per element.

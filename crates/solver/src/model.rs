@@ -1,32 +1,31 @@
 //! The field problem on a topology: what does not change while the mesh moves.
 //!
-//! Lives here: the choice of coefficients from materials, of surface terms from interfaces, equation numbers, pattern
-//! and assembly of matrix and load. Does not live here: element formulas ([`crate::element`]), what is done with a
-//! solution ([`crate::solution`], [`crate::functional`]).
+//! Lives here: the set-up and its checks, and what a model has at one frequency (weak form) and at all (spaces with
+//! their unknowns and patterns, sources, analysis of the linear solver). Does not live here: assembly (`discretisation`),
+//! element formulas ([`crate::element`]), the linear solver ([`crate::linear`]), what is done with a solution
+//! ([`crate::solution`], [`crate::functional`]).
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::fem::{
-    BlockPattern, BoundGroup, Coupling, CsrMatrix, ElementGroup, LocalMatrix, c64,
-};
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::boundary::Boundary;
 use crate::coil::{Coil, Condition, ConditionedSurface, planes};
-use crate::element::lagrange::Lagrange;
-use crate::element::quadratic::LagrangeTet;
-use crate::element::volume::{AphiTet, Coefficients};
-use crate::element::{impedance::ImpedanceTriangle, interface::InterfaceTriangle};
+use crate::discretisation::Discretisation;
+use crate::element::volume::Coefficients;
 use crate::error::SolverError;
-use crate::framed::Framed;
-use crate::linear::{LinearSolverSettings, PreparedSystem, SystemAnalysis};
+use crate::linear::{
+    FieldKind, LinearSolverSettings, PreparedSystem, SolverMemory, SystemAnalysis, SystemPattern,
+};
 use crate::load::Sources;
 use crate::material::Material;
 use crate::solution::FieldSolution;
 use crate::space::{Order, Space};
-use crate::surface::{Conductor, SurfaceMatrix, SurfaceTerm, Surfaces};
-use crate::unknowns::{PSI, Unknowns};
+use crate::surface::{Conductor, SurfaceTerm};
+use crate::unknowns::Unknowns;
+use crate::weak_form::WeakForm;
 
 /// Everything that defines a field problem beside the mesh.
 #[derive(Clone, Debug)]
@@ -71,29 +70,18 @@ impl Default for FieldModelSetup {
 /// A field problem, ready to be solved on any mesh with its topology.
 #[derive(Debug)]
 pub struct FieldModel {
-    topology: Arc<Topology>,
-    space: Space,
+    setup: FieldModelSetup,
     angular_frequency: f64,
-    coefficients: Vec<Coefficients>,
-    materials: Vec<Material>,
-    remanence: Vec<Point>,
-    conductors: Vec<Conductor>,
-    coils: Vec<Coil>,
-    unknowns: Unknowns,
-    pattern: BlockPattern<4>,
-    groups: Groups,
-    surfaces: Surfaces,
-    sources: Sources,
-    /// Elements and surface triangles with a node whose `A` is prescribed.
-    lifted: (Vec<ElementId>, Vec<usize>),
-    analysis: SystemAnalysis,
+    weak_form: WeakForm,
+    shared: Arc<Shared>,
 }
 
-/// Elements and surface triangles bound to the pattern, by order.
+/// What all frequencies above zero have in common.
 #[derive(Debug)]
-enum Groups {
-    Linear { tets: BoundGroup<4>, triangles: BoundGroup<3> },
-    Quadratic { tets: BoundGroup<10>, triangles: BoundGroup<6> },
+struct Shared {
+    fine: Discretisation,
+    sources: Sources,
+    analysis: Arc<SystemAnalysis>,
 }
 
 impl FieldModel {
@@ -102,180 +90,84 @@ impl FieldModel {
     /// # Errors
     /// [`SolverError`] names what is missing or out of range.
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
-        check(mesh, &setup)?;
-        let topology = Arc::clone(mesh.topology());
-        let space = Space::new(&topology, setup.order);
-        let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
-        let coefficients: Vec<Coefficients> = setup
-            .materials
+        let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
+        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries)?;
+        let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
+        let pattern = SystemPattern {
+            structure: fine.pattern.structure(),
+            reference: &|| fine.assemble(&weak_form, mesh),
+            prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
+        };
+        let analysis = SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?;
+        let analysis = Arc::new(analysis);
+        let magnetisation: Vec<Point> = setup
+            .remanence
             .iter()
-            .map(|m| Coefficients {
-                reluctivity: m.reluctivity(),
-                extra_penalty: (setup.penalty - 1.0) * m.reluctivity(),
-                eddy: c64::new(0.0, angular_frequency * m.conductivity),
-            })
+            .zip(&setup.materials)
+            .map(|(b, m)| b.map(|b| m.reluctivity() * b))
             .collect();
-        let conducting =
-            |e: ElementId| coefficients[topology.region_of()[e.index()].index()].eddy != c64::default();
-        let conductor_elements: Vec<ElementId> = topology.elements().filter(|&e| conducting(e)).collect();
-        let unknowns = Unknowns::new(mesh, &space, &conductor_elements, &setup.boundaries)?;
-
-        let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
-        let couplings = topology
-            .elements()
-            .map(|e| {
-                let decoupled = setup.penalty == 1.0 && !turned(space.nodes_of(e));
-                let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
-                if conducting(e) { potential.union(with_psi()) } else { potential }
-            })
-            .collect();
-        let surfaces = Surfaces::new(
-            mesh,
-            &coefficients,
-            &setup.boundaries,
-            &setup.impedance_surfaces,
-            angular_frequency,
-        )?;
-        let (pattern, groups) = pattern(&space, &unknowns, couplings, &surfaces);
-        let analysis = SystemAnalysis::new(pattern.structure(), setup.linear_solver)?;
-        let magnetisation: Vec<Point> =
-            setup.remanence.iter().zip(&coefficients).map(|(b, c)| b.map(|b| c.reluctivity * b)).collect();
         let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
         check_sources(mesh, &setup)?;
-        let lifted = lifted(&topology, &space, &unknowns, &surfaces);
-        Ok(Self {
-            topology,
-            space,
-            angular_frequency,
-            coefficients,
-            materials: setup.materials,
-            remanence: setup.remanence,
-            conductors: setup.impedance_surfaces,
-            coils: setup.coils,
-            unknowns,
-            pattern,
-            groups,
-            surfaces,
-            sources,
-            lifted,
-            analysis,
-        })
+        let shared = Arc::new(Shared { fine, sources, analysis });
+        Ok(Self { setup, angular_frequency, weak_form, shared })
+    }
+
+    /// The same problem at another frequency [Hz]; between frequencies above zero, equation numbers, pattern, symbolic
+    /// factor and coil integrals are shared.
+    ///
+    /// # Errors
+    /// As [`FieldModel::new`].
+    pub fn at_frequency(&self, mesh: &Mesh, frequency: f64) -> Result<Self, SolverError> {
+        let setup = FieldModelSetup { frequency, ..self.setup.clone() };
+        if frequency == 0.0 || self.angular_frequency == 0.0 {
+            return Self::new(mesh, setup);
+        }
+        let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
+        Ok(Self { setup, angular_frequency, weak_form, shared: Arc::clone(&self.shared) })
+    }
+
+    /// Checks a set-up; `ω` [rad/s] and the weak form.
+    fn weak_form(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(f64, WeakForm), SolverError> {
+        check(mesh, setup)?;
+        let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
+        let numbers = (angular_frequency, setup.penalty);
+        let form =
+            WeakForm::new(mesh, numbers, &setup.materials, &setup.boundaries, &setup.impedance_surfaces)?;
+        Ok((angular_frequency, form))
     }
 
     /// Assembles the matrix on a mesh with this model's topology.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {
-        let mut matrix = CsrMatrix::zeros(self.pattern.structure());
-        let values = &mut matrix.values;
-        match &self.groups {
-            Groups::Linear { tets, triangles } => {
-                self.add_group(tets, values, |e| self.linear_tet(mesh, e));
-                self.add_group(triangles, values, |t| {
-                    self.surface_matrix(Lagrange::<3, 3>::triangle(), mesh, t.index())
-                });
-            }
-            Groups::Quadratic { tets, triangles } => {
-                self.add_group(tets, values, |e| self.quadratic_tet(mesh, e));
-                self.add_group(triangles, values, |t| {
-                    self.surface_matrix(Lagrange::<6, 3>::triangle(), mesh, t.index())
-                });
-            }
-        }
-        matrix
-    }
-
-    /// Assembles one group, turned into the frames of the nodes where some have their own.
-    fn add_group<const N: usize, L: LocalMatrix<c64, N, 4>>(
-        &self,
-        group: &BoundGroup<N>,
-        values: &mut [c64],
-        matrix: impl Fn(ElementId) -> L + Sync,
-    ) {
-        if self.unknowns.has_frames() {
-            self.pattern.assemble(group, values, |e| {
-                Framed::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
-            });
-        } else {
-            self.pattern.assemble(group, values, matrix);
-        }
-    }
-
-    fn linear_tet(&self, mesh: &Mesh, e: ElementId) -> AphiTet {
-        AphiTet::new(Tet4::new(mesh.vertices(e)), *self.coefficients_of(e))
-    }
-
-    fn quadratic_tet(&self, mesh: &Mesh, e: ElementId) -> LagrangeTet<10> {
-        let tet = Tet4::new(mesh.vertices(e));
-        LagrangeTet::new(Lagrange::<10, 4>::tet(), tet, *self.coefficients_of(e))
-    }
-
-    fn surface_matrix<const N: usize>(
-        &self,
-        shape: &'static Lagrange<N, 3>,
-        mesh: &Mesh,
-        triangle: usize,
-    ) -> SurfaceMatrix<N> {
-        let vertices = self.surfaces.triangles[triangle].map(|n| mesh.point(n));
-        match self.surfaces.terms[triangle] {
-            SurfaceTerm::Interface(jump) => {
-                SurfaceMatrix::Interface(InterfaceTriangle::new(shape, vertices, jump))
-            }
-            SurfaceTerm::Impedance(coefficient, _) => {
-                SurfaceMatrix::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient))
-            }
-        }
+        self.shared.fine.assemble(&self.weak_form, mesh)
     }
 
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
-        let mut load = vec![c64::default(); self.unknowns.dofs.count()];
-        self.sources.add_load(&self.space, &self.unknowns, mesh, &mut load);
-        let (elements, triangles) = &self.lifted;
-        match &self.groups {
-            Groups::Linear { triangles: bound, .. } => {
-                for &e in elements {
-                    self.subtract_lift(self.space.nodes_of(e), &self.linear_tet(mesh, e), &mut load);
-                }
-                for &t in triangles {
-                    let matrix = self.surface_matrix(Lagrange::<3, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, &mut load);
-                }
-            }
-            Groups::Quadratic { triangles: bound, .. } => {
-                for &e in elements {
-                    self.subtract_lift(self.space.nodes_of(e), &self.quadratic_tet(mesh, e), &mut load);
-                }
-                for &t in triangles {
-                    let matrix = self.surface_matrix(Lagrange::<6, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, &mut load);
-                }
-            }
-        }
+        let Shared { fine, sources, .. } = &*self.shared;
+        let mut load = vec![c64::default(); fine.unknowns.dofs.count()];
+        sources.add_load(&fine.space, &fine.unknowns, mesh, &mut load);
+        fine.lift(&self.weak_form, mesh, &mut load);
         load
     }
 
-    /// `f −= K A_prescribed` for one element.
-    fn subtract_lift<const N: usize>(
-        &self,
-        nodes: &[NodeId],
-        matrix: &impl LocalMatrix<c64, N, 4>,
-        load: &mut [c64],
-    ) {
-        for (b, &from) in nodes.iter().enumerate() {
-            let Some(potential) = self.unknowns.prescribed_at(from) else { continue };
-            for (a, &to) in nodes.iter().enumerate() {
-                let block = matrix.block(a, b);
-                let row = |i: usize| -> c64 { (0..3).map(|j| -block[i][j] * potential[j]).sum() };
-                self.unknowns.scatter_add(load, to, [row(0), row(1), row(2), row(PSI)]);
-            }
-        }
-    }
-
-    /// Factors what the linear solver needs for a mesh; shared by the state and its adjoint.
+    /// Makes what the linear solver needs for a mesh; shared by the state and its adjoint.
     ///
     /// # Errors
-    /// As [`PreparedSystem::new`].
+    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular.
     pub fn prepare(&self, matrix: CsrMatrix<c64>) -> Result<PreparedSystem, SolverError> {
-        PreparedSystem::new(&self.analysis, matrix)
+        self.prepare_with(matrix, &mut SolverMemory::default())
+    }
+
+    /// As [`FieldModel::prepare`], with what is remembered of an earlier mesh or of another frequency.
+    ///
+    /// # Errors
+    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular.
+    pub fn prepare_with(
+        &self,
+        matrix: CsrMatrix<c64>,
+        memory: &mut SolverMemory,
+    ) -> Result<PreparedSystem, SolverError> {
+        PreparedSystem::new(&self.shared.analysis, matrix, memory)
     }
 
     /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
@@ -283,8 +175,8 @@ impl FieldModel {
     /// # Errors
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-        let system = self.prepare(self.assemble(mesh))?;
-        let state = self.solve_prepared(&system, &self.load(mesh))?;
+        let mut system = self.prepare(self.assemble(mesh))?;
+        let state = self.solve_prepared(&mut system, &self.load(mesh))?;
         Ok((state, system))
     }
 
@@ -294,31 +186,36 @@ impl FieldModel {
     /// As [`PreparedSystem::solve`].
     pub fn solve_prepared(
         &self,
-        system: &PreparedSystem,
+        system: &mut PreparedSystem,
         load: &[c64],
     ) -> Result<FieldSolution, SolverError> {
         let (values, report) = system.solve(load)?;
         Ok(FieldSolution::state(values, report))
     }
 
+    /// What defines the problem.
+    pub fn setup(&self) -> &FieldModelSetup {
+        &self.setup
+    }
+
     /// Number of unknowns.
     pub fn unknown_count(&self) -> usize {
-        self.unknowns.dofs.count()
+        self.unknowns().dofs.count()
     }
 
     /// Equation numbers, fixed values and grounded nodes.
     pub fn unknowns(&self) -> &Unknowns {
-        &self.unknowns
+        &self.shared.fine.unknowns
     }
 
     /// The nodes that carry the unknowns.
     pub fn space(&self) -> &Space {
-        &self.space
+        &self.shared.fine.space
     }
 
     /// The topology the model was set up on.
     pub fn topology(&self) -> &Arc<Topology> {
-        &self.topology
+        self.weak_form.topology()
     }
 
     /// `ω` [rad/s].
@@ -328,99 +225,53 @@ impl FieldModel {
 
     /// Material of every region.
     pub fn materials(&self) -> &[Material] {
-        &self.materials
+        &self.setup.materials
     }
 
     /// `B_r` [T] of the region of an element.
     pub fn remanence_of(&self, e: ElementId) -> Point {
-        let region = self.topology.region_of()[e.index()];
-        self.remanence.get(region.index()).copied().unwrap_or_default()
+        let region = self.topology().region_of()[e.index()];
+        self.setup.remanence.get(region.index()).copied().unwrap_or_default()
     }
 
     /// Conductors replaced by impedance surfaces.
     pub fn conductors(&self) -> &[Conductor] {
-        &self.conductors
+        &self.setup.impedance_surfaces
     }
 
     /// The coils.
     pub fn coils(&self) -> &[Coil] {
-        &self.coils
+        &self.setup.coils
     }
 
     /// Elements that a coil meets: these must not move.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.sources.fixed_elements()
+        self.shared.sources.fixed_elements()
     }
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
     pub fn is_unexcited(&self) -> bool {
-        self.sources.is_empty() && self.unknowns.prescribed_nodes().next().is_none()
+        self.shared.sources.is_empty() && self.unknowns().prescribed_nodes().next().is_none()
     }
 
-    /// Bytes of the matrix and the factor that one solution needs.
-    pub fn memory_estimate(&self) -> usize {
-        let entries = self.pattern.structure().columns.len();
-        entries * (size_of::<c64>() + size_of::<f64>() + size_of::<u32>()) + self.analysis.factor_bytes()
+    /// How the linear systems are solved, and what that takes.
+    pub fn linear_solver(&self) -> &SystemAnalysis {
+        &self.shared.analysis
     }
 
     /// `ν`, `(p − 1)ν` and `jωσ` of an element.
+    #[inline]
     pub fn coefficients_of(&self, e: ElementId) -> &Coefficients {
-        &self.coefficients[self.topology.region_of()[e.index()].index()]
+        self.weak_form.coefficients_of(e)
     }
 
     pub(crate) fn surface(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
-        self.surfaces.iter()
+        self.weak_form.surface()
     }
 
     pub(crate) fn sources(&self) -> &Sources {
-        &self.sources
+        &self.shared.sources
     }
-}
-
-/// The pattern of the system, and its elements and triangles bound to it.
-fn pattern(
-    space: &Space,
-    unknowns: &Unknowns,
-    couplings: Vec<Coupling>,
-    surfaces: &Surfaces,
-) -> (BlockPattern<4>, Groups) {
-    let surface_couplings = vec![Coupling::full(3); surfaces.triangles.len()];
-    let count = space.node_count();
-    match (space.linear_tets(), space.quadratic_tets()) {
-        (Some(tets), _) => {
-            let volumes = ElementGroup::new(count, tets.to_vec(), couplings);
-            let faces = ElementGroup::new(count, surfaces.triangles.clone(), surface_couplings);
-            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
-            let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
-            (pattern, groups)
-        }
-        (None, tets) => {
-            let volumes = ElementGroup::new(count, tets.unwrap_or_default().to_vec(), couplings);
-            let triangles = surfaces.triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
-            let faces = ElementGroup::new(count, triangles, surface_couplings);
-            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
-            let groups = Groups::Quadratic { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
-            (pattern, groups)
-        }
-    }
-}
-
-/// Elements and surface triangles with a node whose `A` is prescribed, ascending.
-fn lifted(
-    topology: &Topology,
-    space: &Space,
-    unknowns: &Unknowns,
-    surfaces: &Surfaces,
-) -> (Vec<ElementId>, Vec<usize>) {
-    let mut prescribed = vec![false; space.node_count()];
-    for n in unknowns.prescribed_nodes() {
-        prescribed[n.index()] = true;
-    }
-    let touches = |nodes: &[NodeId]| nodes.iter().any(|n| prescribed[n.index()]);
-    let elements = topology.elements().filter(|&e| touches(space.nodes_of(e))).collect();
-    let triangles =
-        (0..surfaces.triangles.len()).filter(|&t| touches(&space.triangle(surfaces.triangles[t]))).collect();
-    (elements, triangles)
 }
 
 /// Refuses coils that meet the outside of the mesh where their source would be wrong.
@@ -435,11 +286,6 @@ fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError
         surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
     }
     planes::check(mesh, &setup.coils, &surfaces)
-}
-
-/// ψ with itself and with every component of `A`.
-fn with_psi() -> Coupling {
-    (0..4).fold(Coupling::NONE, |set, i| set.with(i, PSI).with(PSI, i))
 }
 
 fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {

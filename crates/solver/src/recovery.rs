@@ -10,7 +10,8 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4, dot, sub};
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::tet4::{Point, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
@@ -19,27 +20,6 @@ use crate::element::volume::curl;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-
-/// How far outside a tet, in barycentric coordinates, a point still counts as inside: rounding of a shared face.
-const INSIDE_TOLERANCE: f64 = -1e-9;
-
-/// The element that holds a point, and the point's barycentric coordinates in it; the first of several.
-pub fn locate(mesh: &Mesh, point: Point) -> Option<(ElementId, [f64; 4])> {
-    let elements = mesh.topology().tets().len();
-    let coordinates = |e: ElementId| {
-        let vertices = mesh.vertices(e);
-        let tet = Tet4::new(vertices);
-        let offset = sub(point, vertices[0]);
-        let mut bary = tet.gradients.map(|g| dot(g, offset));
-        bary[0] += 1.0;
-        bary
-    };
-    (0..elements)
-        .into_par_iter()
-        .map(ElementId::new)
-        .find_first(|&e| coordinates(e).iter().all(|&b| b >= INSIDE_TOLERANCE))
-        .map(|e| (e, coordinates(e)))
-}
 
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
@@ -177,16 +157,18 @@ pub fn probe(
     name: &str,
     points: &[Point],
 ) -> Result<Vec<Complex3>, SolverError> {
-    points
-        .iter()
-        .map(|&point| {
-            let (e, _) = locate(mesh, point).ok_or_else(|| {
-                let [lower, upper] = mesh.bounding_box();
-                SolverError::ProbeOutside { probe: name.to_owned(), point, lower, upper }
-            })?;
-            Ok(recovered_flux_density(solution, model, mesh, e, point))
-        })
-        .collect()
+    let outside = |point: Point| {
+        let [lower, upper] = mesh.bounding_box();
+        SolverError::ProbeOutside { probe: name.to_owned(), point, lower, upper }
+    };
+    let located = locate(mesh, points).into_iter().zip(points);
+    let elements = located
+        .map(|(found, &point)| found.map(|(e, _)| (e, point)).ok_or_else(|| outside(point)))
+        .collect::<Result<Vec<(ElementId, Point)>, _>>()?;
+    Ok(elements
+        .into_par_iter()
+        .map(|(e, point)| recovered_flux_density(solution, model, mesh, e, point))
+        .collect())
 }
 
 #[cfg(test)]

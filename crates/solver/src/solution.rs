@@ -1,13 +1,13 @@
 //! The solved field: potentials at nodes; B, J and loss in elements.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::Tet4;
+use fluxmorph_geometry::tet4::{Tet4, volume};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
 use crate::element::lagrange::Lagrange;
 use crate::element::point::PointField;
-use crate::element::quadrature::{self, Node};
+use crate::element::tabulated::{Rule, Tabulated};
 use crate::element::volume::NodalField;
 use crate::element::{Complex3, impedance};
 use crate::linear::LinearSolverReport;
@@ -100,8 +100,22 @@ impl FieldSolution {
     /// The mean of `B = curl A` [T] over an element; of linear elements, the constant.
     #[inline]
     pub fn flux_density(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> Complex3 {
+        self.at_centroid(model, mesh, e).flux_density()
+    }
+
+    #[inline]
+    fn at_centroid(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> PointField {
         let tet = Tet4::new(mesh.vertices(e));
-        self.at(model, &model.space().basis(e, &tet, &[0.25; 4])).flux_density()
+        match model.space().order() {
+            Order::Linear => {
+                let table = &Lagrange::<4, 4>::tet().at(Rule::Centroid)[0];
+                PointField::tabulated(table, &tet, &self.element_field(model, e))
+            }
+            Order::Quadratic => {
+                let table = &Lagrange::<10, 4>::tet().at(Rule::Centroid)[0];
+                PointField::tabulated(table, &tet, &self.element_field(model, e))
+            }
+        }
     }
 
     /// `B` [T] in every element, shape `(n_tets, 3)`.
@@ -120,9 +134,7 @@ impl FieldSolution {
                 if eddy == c64::default() {
                     return [c64::default(); 3];
                 }
-                let tet = Tet4::new(mesh.vertices(e));
-                let field = self.at(model, &model.space().basis(e, &tet, &[0.25; 4]));
-                field.electric_potential().map(|v| -eddy * v)
+                self.at_centroid(model, mesh, e).electric_potential().map(|v| -eddy * v)
             })
             .collect()
     }
@@ -139,17 +151,14 @@ impl FieldSolution {
             return 0.0;
         }
         let tet = Tet4::new(mesh.vertices(e));
-        let rule: &[Node] = match model.space().order() {
-            Order::Linear => quadrature::degree_2(),
-            Order::Quadratic => quadrature::degree_5(),
+        let mean_square = match model.space().order() {
+            Order::Linear => {
+                mean_square(Lagrange::<4, 4>::tet().at(Rule::Degree2), &tet, &self.element_field(model, e))
+            }
+            Order::Quadratic => {
+                mean_square(Lagrange::<10, 4>::tet().at(Rule::Degree5), &tet, &self.element_field(model, e))
+            }
         };
-        let mean_square: f64 = rule
-            .iter()
-            .map(|(lambda, share)| {
-                let field = self.at(model, &model.space().basis(e, &tet, lambda));
-                share * field.electric_potential().iter().map(|c| c.norm_sqr()).sum::<f64>()
-            })
-            .sum();
         0.5 * model.angular_frequency() * eddy.im * mean_square
     }
 
@@ -157,11 +166,10 @@ impl FieldSolution {
     pub fn losses(&self, model: &FieldModel, mesh: &Mesh) -> Vec<(String, f64)> {
         let topology = model.topology();
         let mut by_region = vec![0.0; topology.region_names().len()];
-        for e in topology.elements() {
-            let density = self.loss_density(model, mesh, e);
+        // Computed in parallel, added in the order of the elements.
+        for (e, density) in topology.elements().zip(self.loss_densities(model, mesh)) {
             if density != 0.0 {
-                by_region[topology.region_of()[e.index()].index()] +=
-                    density * Tet4::new(mesh.vertices(e)).volume;
+                by_region[topology.region_of()[e.index()].index()] += density * volume(mesh.vertices(e));
             }
         }
         let mut losses: Vec<(String, f64)> = (0..by_region.len())
@@ -195,4 +203,13 @@ impl FieldSolution {
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));
         losses
     }
+}
+
+/// The mean of `|A + ∇ψ|²` over an element [T² m²] by a rule.
+fn mean_square<const N: usize>(table: &[Tabulated<N>], tet: &Tet4, nodal: &NodalField<N>) -> f64 {
+    let square = |at: &Tabulated<N>| {
+        let potential = PointField::tabulated(at, tet, nodal).electric_potential();
+        at.share * potential.iter().map(|c| c.norm_sqr()).sum::<f64>()
+    };
+    table.iter().map(square).sum()
 }

@@ -4,16 +4,36 @@
 //! Elements on a border between tasks are computed twice; nothing is locked, and every entry is summed in ascending
 //! element order: the bits do not depend on the tasks or the threads.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use crate::fem::pattern::{BlockPattern, BoundGroup};
+use crate::fem::pattern::{BlockPattern, BoundGroup, RowStarts};
 use crate::fem::scalar::Scalar;
 use crate::ids::ElementId;
 
-/// The matrix of one element with `N` nodes and `C` components a node, given block by block.
+/// The symmetric matrix of one element with `N` nodes and `C` components a node, given block by block.
 pub trait LocalMatrix<T, const N: usize, const C: usize> {
-    /// Entries of local node `a` (rows) against local node `b` (columns).
+    /// Entries of local node `a` (rows) against local node `b` (columns); `block(b, a)` is its transpose.
     fn block(&self, a: usize, b: usize) -> [[T; C]; C];
+
+    /// The matrix as one real number a pair of nodes, shape `(N, N)`, where that is all there is to it: every block is
+    /// the number times the identity on the first three components, and zero elsewhere. The upper triangle suffices.
+    ///
+    /// Most elements of a field problem are of this kind (a Laplacian for each component), and much faster so.
+    #[inline]
+    fn scalars(&self) -> Option<[[f64; N]; N]> {
+        None
+    }
+}
+
+/// One assembly task: the nodes it owns, and their part of the values.
+struct Task<'a, T> {
+    nodes: &'a Range<usize>,
+    elements: &'a [ElementId],
+    /// Entries of the rows of `nodes`; the first of them is entry `first` of the matrix.
+    values: &'a mut [T],
+    first: usize,
 }
 
 impl<const C: usize> BlockPattern<C> {
@@ -35,24 +55,56 @@ impl<const C: usize> BlockPattern<C> {
         let mut tasks = Vec::with_capacity(self.tasks.len());
         for (nodes, elements) in self.tasks.iter().zip(&group.elements) {
             let entries = self.entries_of(nodes);
-            let (own, others) = rest.split_at_mut(entries.len());
+            let (values, others) = rest.split_at_mut(entries.len());
             rest = others;
-            tasks.push((nodes, elements, own, entries.start));
+            tasks.push(Task { nodes, elements, values, first: entries.start });
         }
-        tasks.into_par_iter().for_each(|(nodes, elements, own, first)| {
-            for &e in elements {
-                let local = element_matrix(e);
-                let connectivity = &group.connectivity[e.index()];
-                for (a, &node) in connectivity.iter().enumerate() {
-                    if !nodes.contains(&node.index()) {
-                        continue;
+        tasks.into_par_iter().for_each(|mut task| {
+            for &e in task.elements {
+                self.add_element(group, e, &element_matrix(e), &mut task);
+            }
+        });
+    }
+
+    /// Adds the rows of one element matrix that a task owns.
+    #[inline]
+    fn add_element<T: Scalar, const N: usize>(
+        &self,
+        group: &BoundGroup<N>,
+        e: ElementId,
+        local: &impl LocalMatrix<T, N, C>,
+        task: &mut Task<'_, T>,
+    ) {
+        let nodes = &group.connectivity[e.index()];
+        let positions = &group.blocks[e.index()];
+        let owned = nodes.map(|n| task.nodes.contains(&n.index()));
+        let rows: [RowStarts; N] = std::array::from_fn(|a| {
+            if owned[a] { self.row_starts_of(nodes[a], task.first) } else { RowStarts::default() }
+        });
+        let scalars = local.scalars();
+        for a in 0..N {
+            for b in a..N {
+                let stored = |a: usize, b: usize| {
+                    if owned[a] { self.block(nodes[a], positions[a][b]) } else { None }
+                };
+                let (upper, lower) = (stored(a, b), if a == b { None } else { stored(b, a) });
+                if let Some(scalars) = &scalars {
+                    for (block, row) in [(upper, a), (lower, b)] {
+                        if let Some(block) = block {
+                            block.add_scalar(&rows[row], task.values, scalars[a][b]);
+                        }
                     }
-                    for (b, &position) in group.blocks[e.index()][a].iter().enumerate() {
-                        self.add_block(node, position, &local.block(a, b), own, first);
+                } else if upper.is_some() || lower.is_some() {
+                    let values = local.block(a, b);
+                    if let Some(block) = upper {
+                        block.add(&rows[a], task.values, |i, j| values[i][j]);
+                    }
+                    if let Some(block) = lower {
+                        block.add(&rows[b], task.values, |i, j| values[j][i]);
                     }
                 }
             }
-        });
+        }
     }
 }
 
@@ -66,16 +118,35 @@ mod tests {
     use crate::fem::pattern::{Coupling, ElementGroup};
     use crate::ids::NodeId;
 
-    /// Block entries that depend on element, nodes and components, so that every mix-up shows.
+    /// Symmetric block entries that depend on element, nodes and components, so that every mix-up shows.
     struct Marked(usize);
+
+    impl Marked {
+        /// Every fifth element is a multiple of the identity, pair by pair.
+        fn is_scalar(&self) -> bool {
+            self.0.is_multiple_of(5)
+        }
+
+        fn scalar(&self, a: usize, b: usize) -> f64 {
+            (1 + self.0) as f64 + 0.1 * (a + 4 * b).max(b + 4 * a) as f64
+        }
+    }
 
     impl LocalMatrix<f64, 4, 3> for Marked {
         fn block(&self, a: usize, b: usize) -> [[f64; 3]; 3] {
             std::array::from_fn(|i| {
-                std::array::from_fn(|j| {
-                    (1 + self.0) as f64 + 0.1 * (a + 4 * b) as f64 + 7.0 * (i + 3 * j) as f64
+                std::array::from_fn(|j| match (self.is_scalar(), (a, i) <= (b, j)) {
+                    (true, _) if i == j => self.scalar(a, b),
+                    (true, _) => 0.0,
+                    (false, true) => self.scalar(a, b) + 7.0 * (i + 3 * j) as f64,
+                    (false, false) => self.scalar(a, b) + 7.0 * (j + 3 * i) as f64,
                 })
             })
+        }
+
+        fn scalars(&self) -> Option<[[f64; 4]; 4]> {
+            let scalar = |a: usize, b: usize| self.scalar(a, b);
+            self.is_scalar().then(|| std::array::from_fn(|a| std::array::from_fn(|b| scalar(a, b))))
         }
     }
 
@@ -118,5 +189,27 @@ mod tests {
             let entry = matrix.entry(row, column).expect("a triplet's entry is stored");
             assert!((entry - value).abs() <= 1e-12 * value.abs());
         }
+    }
+
+    #[test]
+    fn the_bits_do_not_depend_on_the_threads_or_their_tasks() {
+        let node_count = 9000;
+        let connectivity: Vec<[NodeId; 4]> =
+            (0..9000).map(|e| [e, (e + 1) % 9000, (e + 90) % 9000, (e + 2000) % 9000].map(NodeId)).collect();
+        let couplings = vec![Coupling::full(3); connectivity.len()];
+        let group = ElementGroup::new(node_count, connectivity, couplings);
+        let dofs = DofMap::<3>::new(node_count, |node, c| (node.index() + c) % 5 != 0);
+        let with_threads = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| {
+                let pattern = BlockPattern::rectangular(&dofs, &dofs, &group);
+                let bound = pattern.bind(&group);
+                let mut matrix = CsrMatrix::zeros(pattern.structure());
+                pattern.assemble(&bound, &mut matrix.values, |e| Marked(e.index()));
+                matrix.values.iter().map(|v: &f64| v.to_bits()).collect::<Vec<_>>()
+            })
+        };
+        let one = with_threads(1);
+        assert!(one == with_threads(2) && one == with_threads(4));
     }
 }

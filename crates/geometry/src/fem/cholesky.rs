@@ -19,6 +19,7 @@ use faer::{Conj, Par, Side};
 
 use crate::error::MeshError;
 use crate::fem::csr::{CsrMatrix, CsrStructure};
+use crate::fem::dofs::DofMap;
 use crate::fem::ordering;
 
 /// The parallel degree of the dense kernels. Bits depend on this number and not on the threads there are, so it is a
@@ -41,6 +42,19 @@ impl CholeskyAnalysis {
     /// [`MeshError::Factorisation`] when the factor does not fit the index type or the memory.
     pub fn new(structure: &Arc<CsrStructure>) -> Result<Arc<Self>, MeshError> {
         Self::with_order(structure, ordering::nested_dissection(structure))
+    }
+
+    /// As [`CholeskyAnalysis::new`] for a pattern in which all components of neighbouring nodes are coupled: the graph of the
+    /// nodes is a ninth of the matrix' and is dissected as well.
+    ///
+    /// # Errors
+    /// As [`CholeskyAnalysis::new`].
+    pub fn of_nodes<const C: usize>(
+        structure: &Arc<CsrStructure>,
+        dofs: &DofMap<C>,
+    ) -> Result<Arc<Self>, MeshError> {
+        let order = ordering::nested_dissection_of_nodes(structure, dofs);
+        Self::with_order(structure, order.map(|order| ordering::postordered(structure, order)))
     }
 
     /// Analyses a structurally symmetric pattern in a given postordered elimination order, `order[new] = old`; by minimum

@@ -47,7 +47,7 @@ impl ComponentAnalysis {
     /// # Errors
     /// [`MeshError::Factorisation`] when a factor does not fit the index type or the memory.
     pub fn new<const C: usize>(dofs: &DofMap<C>, structure: &CsrStructure) -> Result<Arc<Self>, MeshError> {
-        let order = node_order(dofs, structure);
+        let order = ordering::node_dissection(dofs, structure);
         let mut component = vec![0u8; dofs.count()];
         // Number of every equation in its own block.
         let mut local = vec![0u32; dofs.count()];
@@ -132,36 +132,6 @@ impl ComponentAnalysis {
         }
         mean
     }
-}
-
-/// Nested dissection of the nodes that have an unknown: made once for all components, which differ by the nodes of a few
-/// surfaces. `None` where there is no dissection.
-fn node_order<const C: usize>(dofs: &DofMap<C>, structure: &CsrStructure) -> Option<Vec<NodeId>> {
-    let mut nodes: Vec<NodeId> = Vec::new();
-    // Place in `nodes` of every equation's node.
-    let mut place = vec![0u32; dofs.count()];
-    for node in (0..dofs.node_count()).map(NodeId::new) {
-        let own = (0..C).filter_map(|c| dofs.equation(node, c));
-        if own.map(|equation| place[equation] = nodes.len() as u32).count() > 0 {
-            nodes.push(node);
-        }
-    }
-    let mut row_starts = vec![0u32];
-    let mut columns = Vec::new();
-    let mut row: Vec<u32> = Vec::new();
-    for &node in &nodes {
-        row.clear();
-        for equation in (0..C).filter_map(|c| dofs.equation(node, c)) {
-            row.extend(structure.columns[structure.row(equation)].iter().map(|&c| place[c as usize]));
-        }
-        row.sort_unstable();
-        row.dedup();
-        columns.extend_from_slice(&row);
-        row_starts.push(columns.len() as u32);
-    }
-    let graph = CsrStructure { column_count: nodes.len(), row_starts, columns };
-    let order = ordering::dissection(&graph)?;
-    Some(order.into_iter().map(|position| nodes[position as usize]).collect())
 }
 
 /// A factor in the precision that it takes.

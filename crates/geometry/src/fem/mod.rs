@@ -1,10 +1,11 @@
 //! The nodal finite-element kernel shared by the elastic and the electromagnetic problem.
 //!
 //! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
-//! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`])
-//! the sparse Cholesky factor ([`cholesky`]) and, for systems too large for one, conjugate gradients
-//! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here: any weak form, any material, any boundary
-//! condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
+//! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`]),
+//! the sparse Cholesky factor ([`cholesky`]), the factor of complex symmetric systems ([`ldlt`]), the one without fill
+//! ([`incomplete`]) and, for elastic systems too large for a factor, conjugate gradients
+//! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here:
+//! any weak form, any material, any boundary condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
 //! further nodes on their edges and use the same code with longer connectivity rows.
 
 pub mod assemble;
@@ -13,6 +14,8 @@ pub mod components;
 pub mod conjugate_gradients;
 pub mod csr;
 pub mod dofs;
+pub mod incomplete;
+pub mod ldlt;
 pub mod ordering;
 pub mod pattern;
 pub mod scalar;
@@ -23,5 +26,7 @@ pub use components::{ComponentAnalysis, ComponentPreconditioner};
 pub use conjugate_gradients::{IterationReport, IterationStatus, conjugate_gradients};
 pub use csr::CsrMatrix;
 pub use dofs::DofMap;
+pub use incomplete::{Incomplete, IncompleteAnalysis};
+pub use ldlt::{FactorScalar, Ldlt, LdltAnalysis};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
-pub use scalar::{Scalar, c64, dot, norm};
+pub use scalar::{Scalar, advance, axpy, c32, c64, dot, norm, scale_add};

@@ -6,9 +6,11 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::sparse::SymbolicSparseColMatRef;
-use faer::sparse::linalg::{cholesky::simplicial, qr};
+use faer::sparse::linalg::{amd, cholesky::simplicial, qr};
 
 use crate::fem::csr::CsrStructure;
+use crate::fem::dofs::DofMap;
+use crate::ids::NodeId;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
@@ -17,8 +19,67 @@ pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
 }
 
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
-#[cfg(feature = "metis")]
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
+    weighted_dissection(structure, None)
+}
+
+/// Nested dissection of the *nodes*, expanded to their unknowns; not postordered, `forward[new] = old`.
+///
+/// A node counts as many unknowns as it has. The graph has a third of the vertices of the matrix graph, and costs METIS less
+/// than a third of the time for about the same fill. Components without a coupling are eliminated side by side: a postorder
+/// makes the columns of each contiguous again.
+pub fn nested_dissection_of_nodes<const C: usize>(
+    structure: &CsrStructure,
+    dofs: &DofMap<C>,
+) -> Option<Vec<u32>> {
+    let (nodes, graph) = node_graph(structure, dofs);
+    let unknowns = |node: NodeId| (0..C).filter_map(move |c| dofs.equation(node, c));
+    let weights: Vec<i32> = nodes.iter().map(|&node| unknowns(node).count() as i32).collect();
+    let order = weighted_dissection(&graph, Some(weights))?;
+    Some(order.iter().flat_map(|&i| unknowns(nodes[i as usize])).map(|equation| equation as u32).collect())
+}
+
+/// Nested dissection of the nodes that have an unknown, every node counting the same. `None` where there is no dissection.
+pub(super) fn node_dissection<const C: usize>(
+    dofs: &DofMap<C>,
+    structure: &CsrStructure,
+) -> Option<Vec<NodeId>> {
+    let (nodes, graph) = node_graph(structure, dofs);
+    let order = dissection(&graph)?;
+    Some(order.into_iter().map(|position| nodes[position as usize]).collect())
+}
+
+/// The nodes that have an unknown, and which of them the matrix couples.
+fn node_graph<const C: usize>(structure: &CsrStructure, dofs: &DofMap<C>) -> (Vec<NodeId>, CsrStructure) {
+    let mut nodes: Vec<NodeId> = Vec::new();
+    // Place in `nodes` of every equation's node.
+    let mut place = vec![0u32; dofs.count()];
+    for node in (0..dofs.node_count()).map(NodeId::new) {
+        let own = (0..C).filter_map(|c| dofs.equation(node, c));
+        if own.map(|equation| place[equation] = nodes.len() as u32).count() > 0 {
+            nodes.push(node);
+        }
+    }
+    let mut row_starts = vec![0u32];
+    let mut columns = Vec::new();
+    let mut row: Vec<u32> = Vec::new();
+    for &node in &nodes {
+        row.clear();
+        for equation in (0..C).filter_map(|c| dofs.equation(node, c)) {
+            row.extend(structure.columns[structure.row(equation)].iter().map(|&c| place[c as usize]));
+        }
+        row.sort_unstable();
+        row.dedup();
+        columns.extend_from_slice(&row);
+        row_starts.push(columns.len() as u32);
+    }
+    let graph = CsrStructure { column_count: nodes.len(), row_starts, columns };
+    (nodes, graph)
+}
+
+/// METIS's nested dissection of a graph, vertices counting by their weights or all the same.
+#[cfg(feature = "metis")]
+fn weighted_dissection(structure: &CsrStructure, weights: Option<Vec<i32>>) -> Option<Vec<u32>> {
     use std::sync::Mutex;
 
     /// METIS draws from a random generator of the process: one caller at a time gets the same numbers every time.
@@ -42,16 +103,19 @@ pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
     let mut inverse = vec![0i32; n];
     let mut options = [-1i32; metis_sys::METIS_NOPTIONS as usize];
     options[metis_sys::moptions_et_METIS_OPTION_SEED as usize] = 1;
+    let mut weights = weights;
+    assert!(weights.as_ref().is_none_or(|weights| weights.len() == n), "one weight a vertex");
     let guard = METIS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     // SAFETY: all arrays outlive the call and have the lengths METIS_NodeND documents: n + 1 row starts, as many
-    // neighbours as the last of them says, n entries in each permutation, METIS_NOPTIONS options; no vertex weights.
+    // neighbours as the last of them says, n entries in each permutation, METIS_NOPTIONS options; a null pointer or n vertex
+    // weights, as asserted above.
     #[allow(unsafe_code)]
     let status = unsafe {
         metis_sys::METIS_NodeND(
             &mut count,
             starts.as_mut_ptr(),
             neighbours.as_mut_ptr(),
-            std::ptr::null_mut(),
+            weights.as_mut().map_or(std::ptr::null_mut(), |weights| weights.as_mut_ptr()),
             options.as_mut_ptr(),
             forward.as_mut_ptr(),
             inverse.as_mut_ptr(),
@@ -63,7 +127,7 @@ pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
 
 /// Without METIS there is no dissection, and the factorisation falls back to minimum degree.
 #[cfg(not(feature = "metis"))]
-pub fn dissection(_: &CsrStructure) -> Option<Vec<u32>> {
+fn weighted_dissection(_: &CsrStructure, _: Option<Vec<i32>>) -> Option<Vec<u32>> {
     None
 }
 
@@ -76,12 +140,27 @@ pub fn inverted(forward: &[u32]) -> Vec<u32> {
     inverse
 }
 
-/// An ordering with the same fill whose elimination tree is postordered.
-pub fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
-    let n = forward.len();
-    let inverse = inverted(&forward);
+/// Minimum degree; `None` where there is no memory for it. Not postordered.
+pub(super) fn minimum_degree(structure: &CsrStructure) -> Option<Vec<u32>> {
+    let n = structure.row_count();
+    let natural: Vec<u32> = (0..n as u32).collect();
+    let (starts, rows) = upper_triangle(structure, &natural, &natural);
+    let upper = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
+    let mut memory = MemBuffer::try_new(amd::order_maybe_unsorted_scratch::<u32>(n, rows.len())).ok()?;
+    let (mut forward, mut inverse) = (vec![0u32; n], vec![0u32; n]);
+    let stack = MemStack::new(&mut memory);
+    amd::order_maybe_unsorted(&mut forward, &mut inverse, upper, amd::Control::default(), stack).ok()?;
+    Some(forward)
+}
+
+/// The upper triangle of the permuted pattern by columns: starts `(n + 1)` and ascending rows.
+pub(super) fn upper_triangle(
+    structure: &CsrStructure,
+    forward: &[u32],
+    inverse: &[u32],
+) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0u32];
-    let mut rows = Vec::with_capacity(structure.columns.len() / 2 + n);
+    let mut rows = Vec::with_capacity(structure.columns.len() / 2 + forward.len());
     for (new, &old) in forward.iter().enumerate() {
         let first = rows.len();
         let above = structure.columns[structure.row(old as usize)].iter().map(|&c| inverse[c as usize]);
@@ -89,6 +168,14 @@ pub fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
         rows[first..].sort_unstable();
         starts.push(rows.len() as u32);
     }
+    (starts, rows)
+}
+
+/// An ordering with the same fill whose elimination tree is postordered.
+pub fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
+    let n = forward.len();
+    let inverse = inverted(&forward);
+    let (starts, rows) = upper_triangle(structure, &forward, &inverse);
     let upper = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
     let mut tree = vec![0i32; n];
     let mut counts = vec![0u32; n];
@@ -124,5 +211,37 @@ mod tests {
         assert_eq!(order, nested_dissection(&structure).expect("METIS orders a ring"), "repeatable");
         order.sort_unstable();
         assert_eq!(order, (0..n).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_order_of_the_nodes_takes_the_unknowns_of_a_node_together() {
+        // A ring of 60 nodes; the first component is known at every third of them, and the components are not coupled.
+        let n = 60;
+        let dofs = DofMap::<2>::new(n, |node, c| c == 1 || node.index() % 3 > 0);
+        let (mut row_starts, mut columns) = (vec![0u32], Vec::new());
+        for (node, c) in (0..n).flat_map(|node| [(node, 0), (node, 1)]) {
+            if dofs.equation(NodeId::new(node), c).is_some() {
+                let around = [(node + n - 1) % n, node, (node + 1) % n];
+                let mut row: Vec<u32> = around
+                    .into_iter()
+                    .filter_map(|other| dofs.equation(NodeId::new(other), c))
+                    .map(|equation| equation as u32)
+                    .collect();
+                row.sort_unstable();
+                columns.extend(row);
+                row_starts.push(columns.len() as u32);
+            }
+        }
+        let structure = CsrStructure { column_count: dofs.count(), row_starts, columns };
+        let order = nested_dissection_of_nodes(&structure, &dofs).expect("METIS orders a ring");
+        let inverse = inverted(&order);
+        for node in (0..n).map(NodeId::new) {
+            if let (Some(first), Some(second)) = (dofs.equation(node, 0), dofs.equation(node, 1)) {
+                assert_eq!(inverse[first] + 1, inverse[second]);
+            }
+        }
+        let mut sorted = order;
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..dofs.count() as u32).collect::<Vec<_>>());
     }
 }

@@ -10,12 +10,15 @@ use rayon::prelude::*;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
+use crate::fem::scalar::Scalar;
 use crate::ids::{ElementId, NodeId};
 use crate::incidence::Incidence;
 
-/// Nodes of one assembly task: few enough tasks that elements on their borders, computed twice, stay rare.
+/// Nodes of one assembly task at least: a smaller one is not worth the elements on its border, which are computed twice.
 const NODES_PER_TASK: usize = 2048;
-const MAX_TASKS: usize = 64;
+/// Tasks a thread: enough to even out their cost. The bits do not depend on the tasks, so the number of threads may
+/// decide.
+const TASKS_PER_THREAD: usize = 4;
 
 /// A set of component pairs `(row i, column j)` of a block with up to four components a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -122,7 +125,15 @@ pub(super) struct Block {
     coupling: Coupling,
     /// Entries of each row that come before this block.
     before: [u16; 4],
+    /// Entries of each row that come before the one of the same component, or [`NO_ENTRY`].
+    diagonal: [u16; 3],
 }
+
+/// An entry that is not stored.
+const NO_ENTRY: u16 = u16::MAX;
+
+/// Where the rows of a node start, counted from the first entry of a task; meaningless for what is not an unknown.
+pub(super) type RowStarts = [usize; 4];
 
 /// Sparsity pattern of a system with `C ≤ 4` components a node.
 #[derive(Debug)]
@@ -187,7 +198,8 @@ impl<const C: usize> BlockPattern<C> {
         }
         let structure =
             Arc::new(CsrStructure { column_count: columns.count(), row_starts, columns: column_indices });
-        let task_count = (node_count / NODES_PER_TASK).clamp(1, MAX_TASKS);
+        let most = TASKS_PER_THREAD * rayon::current_num_threads();
+        let task_count = (node_count / NODES_PER_TASK).clamp(1, most);
         let tasks =
             (0..task_count).map(|t| t * node_count / task_count..(t + 1) * node_count / task_count).collect();
         Self { rows: rows.clone(), structure, block_starts, blocks, tasks }
@@ -236,34 +248,25 @@ impl<const C: usize> BlockPattern<C> {
         &self.blocks[self.block_starts[i] as usize..self.block_starts[i + 1] as usize]
     }
 
-    /// Adds a local block into the entries of node `a`; `values` starts at entry `first`.
+    /// Where the rows of a node start, counted from the entry `first`.
     #[inline]
-    pub(super) fn add_block<T: Copy + std::ops::AddAssign>(
-        &self,
-        a: NodeId,
-        position: u16,
-        local: &[[T; C]; C],
-        values: &mut [T],
-        first: usize,
-    ) {
+    pub(super) fn row_starts_of(&self, node: NodeId, first: usize) -> RowStarts {
+        let mut starts = [0; 4];
+        for (i, start) in starts.iter_mut().enumerate().take(C) {
+            if let Some(equation) = self.rows.equation(node, i) {
+                *start = self.structure.row_starts[equation] as usize - first;
+            }
+        }
+        starts
+    }
+
+    /// The block at a position among those of a node.
+    #[inline]
+    pub(super) fn block(&self, node: NodeId, position: u16) -> Option<&Block> {
         if position == NO_BLOCK {
-            return;
+            return None;
         }
-        let block = self.blocks_at(a)[position as usize];
-        for i in 0..C {
-            let mut coupled = block.coupling.row(i);
-            if coupled == 0 {
-                continue;
-            }
-            let equation = self.rows.equation(a, i).expect("only unknown rows are coupled");
-            let mut slot = self.structure.row_starts[equation] as usize + block.before[i] as usize - first;
-            while coupled != 0 {
-                let j = coupled.trailing_zeros() as usize;
-                values[slot] += local[i][j];
-                slot += 1;
-                coupled &= coupled - 1;
-            }
-        }
+        self.blocks.get(self.block_starts[node.index()] as usize + position as usize)
     }
 
     /// Range of the stored entries of the rows of a range of nodes.
@@ -277,6 +280,40 @@ impl<const C: usize> BlockPattern<C> {
         let start = self.structure.row_starts[first_equation_from(nodes.start)] as usize;
         let end = self.structure.row_starts[first_equation_from(nodes.end)] as usize;
         start..end
+    }
+}
+
+impl Block {
+    /// Adds `entry(i, j)` to every stored entry; `values` are those of a task, `rows` the starts in them.
+    #[inline]
+    pub(super) fn add<T: Scalar>(
+        &self,
+        rows: &RowStarts,
+        values: &mut [T],
+        entry: impl Fn(usize, usize) -> T,
+    ) {
+        for i in 0..4 {
+            let mut coupled = self.coupling.row(i);
+            if coupled == 0 {
+                continue;
+            }
+            let mut slot = rows[i] + self.before[i] as usize;
+            while coupled != 0 {
+                values[slot] += entry(i, coupled.trailing_zeros() as usize);
+                slot += 1;
+                coupled &= coupled - 1;
+            }
+        }
+    }
+
+    /// Adds a real number to the entries of the first three components against themselves.
+    #[inline]
+    pub(super) fn add_scalar<T: Scalar>(&self, rows: &RowStarts, values: &mut [T], scalar: f64) {
+        for (row, &before) in rows.iter().zip(&self.diagonal) {
+            if before != NO_ENTRY {
+                values[row + before as usize].add_real(scalar);
+            }
+        }
     }
 }
 
@@ -328,10 +365,17 @@ fn blocks_of<const C: usize>(
         if coupling == Coupling::NONE {
             continue;
         }
-        blocks.push(Block { node, coupling, before });
+        let diagonal = std::array::from_fn(|i| {
+            let row = coupling.row(i);
+            let lower = row & ((1 << i) - 1);
+            if row >> i & 1 == 1 { before[i] + lower.count_ones() as u16 } else { NO_ENTRY }
+        });
+        blocks.push(Block { node, coupling, before, diagonal });
         for (i, before) in before.iter_mut().enumerate() {
             *before += coupling.row(i).count_ones() as u16;
         }
+        // Four more entries would have to be counted after the last block.
+        assert!(before.iter().all(|&b| b < NO_ENTRY - 4), "fewer than 65531 entries a row");
     }
     assert!(blocks.len() < NO_BLOCK as usize, "fewer than 65535 neighbours a node");
     blocks

@@ -45,6 +45,8 @@ struct Summary {
     quality: QualitySummary,
     skin: Vec<SkinSummary>,
     motions: Vec<MotionSummary>,
+    /// The method of each state's linear solver.
+    linear_solvers: Vec<&'static str>,
     memory_estimate_bytes: usize,
     warnings: Vec<String>,
 }
@@ -187,6 +189,7 @@ fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
         },
         skin,
         motions,
+        linear_solvers: problem.states.iter().map(|model| model.linear_solver().method().name()).collect(),
         memory_estimate_bytes: problem.memory_estimate(),
         warnings: setup.warnings,
     })
@@ -225,6 +228,9 @@ fn table(summary: &Summary) -> String {
             q.from_0_6 * 100.0
         ),
     );
+    if !summary.linear_solvers.is_empty() {
+        row("linear solver", summary.linear_solvers.join(", "));
+    }
     row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
     text += &format!("\n{:<18}{:>10}{:>14}  {:<16}{}\n", "region", "tets", "volume cm³", "material", "model");
     for r in &summary.regions {

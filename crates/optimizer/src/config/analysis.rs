@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::Dimension;
+use super::linear_solver::LinearSolver;
 use super::range::Range;
 use super::section::Section;
 
@@ -49,20 +50,6 @@ pub enum Frequencies {
     /// Several, each once.
     #[serde(rename = "frequencies")]
     Several(Vec<f64>),
-}
-
-/// Options of the linear solver.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LinearSolver {
-    /// Largest relative residual of a solution. Default 1e-11: a hundred times below the 1e-9 that every solution is
-    /// audited against, so that the gradient is limited by the mesh and not by the solver.
-    pub tolerance: f64,
-}
-
-impl Default for LinearSolver {
-    fn default() -> Self {
-        Self { tolerance: 1e-11 }
-    }
 }
 
 /// What a motion of the mesh alone is read with: magnetostatic.
@@ -129,15 +116,5 @@ impl Frequencies {
             return Self::Several(several);
         }
         Self::One(section.need("frequency", one, "\"60 Hz\""))
-    }
-}
-
-impl LinearSolver {
-    fn read(section: Section<'_>) -> Self {
-        let default = Self::default();
-        // Below 1e-14 rounding alone is larger; above 1e-9 a solution would fail its audit.
-        let tolerance = section.number("tolerance", Range::closed(1e-14, 1e-9)).unwrap_or(default.tolerance);
-        section.finish();
-        Self { tolerance }
     }
 }

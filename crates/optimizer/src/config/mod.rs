@@ -13,6 +13,7 @@ mod design;
 mod fault;
 mod functional;
 mod initial;
+mod linear_solver;
 mod material;
 mod mesh;
 mod morph;
@@ -34,7 +35,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use analysis::{Analysis, ElementOrder, Frequencies, LinearSolver};
+pub use analysis::{Analysis, ElementOrder, Frequencies};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
     Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,
@@ -45,6 +46,7 @@ pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlan
 pub use fault::{Fault, Place, nearest};
 pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use initial::InitialDesign;
+pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use material::{Material, Region, RegionModel};
 pub use mesh::{
     BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,

@@ -10,6 +10,7 @@ use crate::algorithm::{CONSTRAINT_TOLERANCE, Sample};
 use crate::config::Optimizer;
 use crate::constraint::Bound;
 use crate::error::Error;
+use crate::memory::Memory;
 use crate::objective::Goal;
 use crate::observer::{Evaluation, Observer, column};
 use crate::output::{RunStatus, StopReason};
@@ -29,6 +30,8 @@ pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
     goal: Goal,
     settings: &'a Optimizer,
+    /// What the linear solvers remember of the design before.
+    memory: Memory,
     pub(super) observer: &'a mut dyn Observer,
     recorder: &'a mut dyn Recorder,
     interrupted: &'a dyn Fn() -> bool,
@@ -61,6 +64,7 @@ impl<'a> Run<'a> {
             problem,
             goal,
             settings,
+            memory: Memory::default(),
             observer,
             recorder,
             interrupted,
@@ -137,7 +141,7 @@ impl<'a> Run<'a> {
         let clock = Instant::now();
         let moved = self.mesh(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.problem.analyse(p, moved, Want::Gradient)?;
+        let mut analysis = self.problem.analyse_with(&mut self.memory, p, moved, Want::Gradient)?;
         analysis.timings.remesh += remesh;
         let value = analysis.objective.expect("an optimisation has an objective");
         let initial = match &self.initial {
@@ -271,6 +275,9 @@ impl<'a> Run<'a> {
         self.last = p.to_vec();
         self.worst_residual = self.worst_residual.max(analysis.worst_residual);
         self.timings += analysis.timings;
+        for event in &analysis.solver_events {
+            self.observer.notice(&event.to_string());
+        }
         self.recorder.record(&row, &analysis, self.problem, improved)?;
         self.observer.evaluation(&row);
         if improved {

@@ -244,6 +244,9 @@ pub struct ProbeResult {
 /// The linear systems of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinearSolverResult {
+    /// The method that each state's solutions begin with.
+    #[serde(default)]
+    pub methods: Vec<String>,
     /// Largest relative residual of any accepted solution.
     pub worst_residual: f64,
 }
@@ -336,7 +339,10 @@ pub(crate) mod tests {
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
             states: vec![],
-            linear_solver: LinearSolverResult { worst_residual: 1e-11 },
+            linear_solver: LinearSolverResult {
+                methods: vec!["direct_single".to_owned()],
+                worst_residual: 1e-11,
+            },
             timings_s: [("total".to_owned(), 12.0)].into(),
             peak_memory_bytes: 1 << 20,
         }

@@ -2,10 +2,10 @@
 
 use fluxmorph_geometry::{Mesh, Topology};
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
-use fluxmorph_solver::linear::LinearSolverSettings;
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, Reuse};
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, UniformField};
 
-use crate::config::{self, Config, Fault, RegionModel, Source};
+use crate::config::{self, Config, FactorReuse, Fault, RegionModel, SolverMethod, Source};
 use crate::error::Error;
 
 /// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
@@ -74,8 +74,15 @@ pub(super) fn field_models(
     mesh: &Mesh,
     impedance_surfaces: &[Conductor],
 ) -> Result<Vec<FieldModel>, Error> {
-    let at = |&frequency: &f64| field_model(config, mesh, frequency, impedance_surfaces.to_vec());
-    config.analysis.frequencies().iter().map(at).collect()
+    let mut models: Vec<FieldModel> = Vec::new();
+    for &frequency in config.analysis.frequencies() {
+        // A model above 0 Hz shares all but its numbers with another.
+        models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
+            Some(model) => model.at_frequency(mesh, frequency)?,
+            None => field_model(config, mesh, frequency, impedance_surfaces.to_vec())?,
+        });
+    }
+    Ok(models)
 }
 
 fn field_model(
@@ -95,10 +102,7 @@ fn field_model(
         let applied = UniformField { flux_density: field.b, centre: field.center };
         boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
     }
-    let linear_solver = LinearSolverSettings {
-        tolerance: config.analysis.linear_solver.tolerance,
-        ..LinearSolverSettings::default()
-    };
+    let linear_solver = linear_solver(&config.analysis.linear_solver);
     let setup = FieldModelSetup {
         frequency,
         penalty: config.analysis.penalty,
@@ -112,6 +116,33 @@ fn field_model(
     };
     Ok(FieldModel::new(mesh, setup)?)
 }
+
+/// How the linear systems are solved.
+fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
+    let method = match options.method {
+        SolverMethod::Automatic => LinearSolver::Automatic,
+        SolverMethod::Direct => LinearSolver::Fixed(Method::Direct),
+        SolverMethod::DirectSingle => LinearSolver::Fixed(Method::DirectSingle),
+        SolverMethod::RealFactor => LinearSolver::Fixed(Method::RealFactor),
+        SolverMethod::RealFactorSingle => LinearSolver::Fixed(Method::RealFactorSingle),
+        SolverMethod::Incomplete => LinearSolver::Fixed(Method::Incomplete),
+        SolverMethod::TwoLevel => LinearSolver::Fixed(Method::TwoLevel),
+    };
+    let reuse = match options.reuse {
+        FactorReuse::WhileItPays => Reuse::WhileItPays,
+        FactorReuse::Never => Reuse::Never,
+    };
+    LinearSolverSettings {
+        method,
+        reuse,
+        tolerance: options.tolerance,
+        factor_bytes: (options.factor_gib * GIB) as usize,
+        ..LinearSolverSettings::default()
+    }
+}
+
+/// Bytes of a GiB.
+const GIB: f64 = (1u64 << 30) as f64;
 
 /// The order of the elements.
 pub(super) fn order(config: &Config) -> Order {

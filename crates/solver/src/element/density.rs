@@ -10,8 +10,8 @@ use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::impedance::{self, ImpedanceTriangle};
 use super::lagrange::Lagrange;
-use super::point::{self, PointField};
-use super::quadrature::{self, Node};
+use super::point::PointField;
+use super::tabulated::Rule;
 use super::volume::NodalField;
 use super::{Complex3, cross3, dot3};
 
@@ -34,7 +34,7 @@ pub fn flux_energy<const N: usize>(
     remanence: Point,
     field: &NodalField<N>,
 ) -> ElementIntegral<N, 4> {
-    let rule: &[Node] = if N == 4 { &[([0.25; 4], 1.0)] } else { quadrature::degree_2() };
+    let rule = if N == 4 { Rule::Centroid } else { Rule::Degree2 };
     integrate(shape, tet, rule, field, |at| {
         let b = at.flux_density();
         let conjugate: Complex3 = std::array::from_fn(|d| (b[d] - remanence[d]).conj());
@@ -57,7 +57,7 @@ pub fn eddy_loss<const N: usize>(
     factor: f64,
     field: &NodalField<N>,
 ) -> ElementIntegral<N, 4> {
-    let rule: &[Node] = if N == 4 { quadrature::degree_2() } else { quadrature::degree_5() };
+    let rule = if N == 4 { Rule::Degree2 } else { Rule::Degree5 };
     integrate(shape, tet, rule, field, |at| {
         let conjugate = at.electric_potential().map(|c| c.conj());
         let square: f64 = conjugate.iter().map(|c| c.norm_sqr()).sum();
@@ -85,24 +85,31 @@ struct Density {
 fn integrate<const N: usize>(
     shape: &Lagrange<N, 4>,
     tet: &Tet4,
-    rule: &[Node],
+    rule: Rule,
     field: &NodalField<N>,
     density: impl Fn(&PointField) -> Density,
 ) -> ElementIntegral<N, 4> {
     let mut integral =
         ElementIntegral { value: 0.0, potentials: [[c64::default(); 4]; N], positions: [[0.0; 3]; 4] };
     let mut tensor = [[0.0; 3]; 3];
-    for (lambda, share) in rule {
-        let at = density(&PointField::new(shape, tet, lambda, field));
+    for point in shape.at(rule) {
+        let (share, at) = (point.share, density(&PointField::tabulated(point, tet, field)));
         let weight = share * tet.volume;
         integral.value += weight * at.value;
-        for (a, derivative) in integral.potentials.iter_mut().enumerate() {
-            let (n, g) = (shape.value(a, lambda), point::gradient(shape, tet, lambda, a));
-            // by_curl·(∇N × A) = (by_curl × ∇N)·A.
+        // by_curl·(∇N × A) = (by_curl × ∇N)·A, and ∇N is a sum of ∇λ: the products with these are the same for all N.
+        let along = tet.gradients.map(|g| {
             let turned = cross3(at.by_curl, g.map(c64::from));
+            [turned[0], turned[1], turned[2], dot3(at.by_drive, g.map(c64::from))].map(|c| weight * c)
+        });
+        for (a, derivative) in integral.potentials.iter_mut().enumerate() {
+            for k in 0..if a < 4 { 1 } else { 2 } {
+                let (m, slope) = (point.along[a][k], point.slopes[a][k]);
+                for (sum, term) in derivative.iter_mut().zip(&along[m]) {
+                    *sum += slope * term;
+                }
+            }
             for d in 0..3 {
-                derivative[d] += weight * (turned[d] + n * at.by_drive[d]);
-                derivative[3] += weight * g[d] * at.by_drive[d];
+                derivative[d] += weight * point.values[a] * at.by_drive[d];
             }
         }
         for d in 0..3 {

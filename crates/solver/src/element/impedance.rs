@@ -60,11 +60,16 @@ fn moment<const N: usize>(
 ) -> [Complex3; 3] {
     let mut moment = [[c64::default(); 3]; 3];
     for (l, row) in adjoint.iter().zip(&shape.mass) {
+        // Σ_b ⟨N_a N_b⟩ u_b first: one outer product a node.
+        let mut weighted = [c64::default(); 3];
         for (u, mass) in state.iter().zip(row) {
             for i in 0..3 {
-                for j in 0..3 {
-                    moment[i][j] += u[i] * l[j] * *mass;
-                }
+                weighted[i] += u[i] * *mass;
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                moment[i][j] += weighted[i] * l[j];
             }
         }
     }

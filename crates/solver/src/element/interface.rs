@@ -70,18 +70,21 @@ pub fn shape_derivative<const N: usize>(
     adjoint: &[Complex3; N],
     state: &[Complex3; N],
 ) -> [Complex3; 3] {
-    let mut derivative = [[c64::default(); 3]; 3];
-    for m in 0..3 {
-        // λᵀMu = Σ_m W_m·e_m with W_m = −jump Σ_ab weight_abm λ_a × u_b.
-        let mut factor = [c64::default(); 3];
-        for a in 0..N {
-            for b in 0..N {
-                let product = cross3(adjoint[a], state[b]);
+    // λᵀMu = Σ_m W_m·e_m with W_m = −jump Σ_ab weight_abm λ_a × u_b.
+    let mut factors = [[c64::default(); 3]; 3];
+    for a in 0..N {
+        for b in (0..N).filter(|&b| b != a) {
+            let product = cross3(adjoint[a], state[b]);
+            for (m, factor) in factors.iter_mut().enumerate() {
+                let weight = jump * weight(shape, a, b, m);
                 for d in 0..3 {
-                    factor[d] -= jump * weight(shape, a, b, m) * product[d];
+                    factor[d] -= weight * product[d];
                 }
             }
         }
+    }
+    let mut derivative = [[c64::default(); 3]; 3];
+    for (m, factor) in factors.iter().enumerate() {
         for d in 0..3 {
             derivative[(m + 2) % 3][d] += factor[d];
             derivative[(m + 1) % 3][d] -= factor[d];

@@ -13,6 +13,9 @@ use std::sync::LazyLock;
 
 use fluxmorph_geometry::tet4::EDGES;
 
+use super::quadrature::Node;
+use super::tabulated::{Rule, Tabulated};
+
 /// Local vertices of the edges of a triangle.
 pub const TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
@@ -28,11 +31,18 @@ pub struct Lagrange<const N: usize, const M: usize> {
     pub advection: [[[f64; M]; N]; N],
     /// `⟨∂N_a/∂λ_m ∂N_b/∂λ_n⟩`, index `[a][b][m][n]`.
     pub stiffness: [[[[f64; M]; M]; N]; N],
+    /// `∫∇N_a·∇N_b = Σ_e laplace[a][b][e] V g_m·g_n` over the edges `e = (m, n)` of a tetrahedron, in the order of
+    /// [`EDGES`]: with `g_m·g_m = −Σ_{n≠m} g_m·g_n`, the factor is `S_mn + S_nm − S_mm − S_nn` of the `stiffness` `S`.
+    /// Zero for triangles.
+    pub laplace: [[[f64; 6]; N]; N],
+    /// At the points of every rule; empty for triangles.
+    tables: Vec<Vec<Tabulated<N>>>,
 }
 
-static LINEAR_TET: LazyLock<Lagrange<4, 4>> = LazyLock::new(|| Lagrange::new(1.0, linear()));
+static LINEAR_TET: LazyLock<Lagrange<4, 4>> = LazyLock::new(|| Lagrange::new(1.0, linear()).tabulated());
 static LINEAR_TRIANGLE: LazyLock<Lagrange<3, 3>> = LazyLock::new(|| Lagrange::new(1.0, linear()));
-static QUADRATIC_TET: LazyLock<Lagrange<10, 4>> = LazyLock::new(|| Lagrange::new(2.0, quadratic(&EDGES)));
+static QUADRATIC_TET: LazyLock<Lagrange<10, 4>> =
+    LazyLock::new(|| Lagrange::new(2.0, quadratic(&EDGES)).tabulated());
 static QUADRATIC_TRIANGLE: LazyLock<Lagrange<6, 3>> =
     LazyLock::new(|| Lagrange::new(2.0, quadratic(&TRIANGLE_EDGES)));
 
@@ -126,6 +136,8 @@ impl<const N: usize, const M: usize> Lagrange<N, M> {
                     std::array::from_fn(|m| std::array::from_fn(|n| stiffness(a, b, m, n)))
                 })
             }),
+            laplace: [[[0.0; 6]; N]; N],
+            tables: Vec::new(),
         }
     }
 
@@ -145,6 +157,36 @@ impl<const N: usize, const M: usize> Lagrange<N, M> {
     #[inline]
     pub fn slope_coefficient(&self, a: usize, m: usize, b: usize) -> f64 {
         self.slope[a][m][b]
+    }
+}
+
+impl<const N: usize> Lagrange<N, 4> {
+    /// The functions at the points of a rule.
+    #[inline]
+    pub fn at(&self, rule: Rule) -> &[Tabulated<N>] {
+        &self.tables[rule as usize]
+    }
+
+    fn tabulated(mut self) -> Self {
+        let along: [[usize; 2]; N] =
+            std::array::from_fn(|a| a.checked_sub(4).map_or([a, a], |edge| EDGES[edge]));
+        let at = |&(lambda, share): &Node| Tabulated {
+            share,
+            values: std::array::from_fn(|a| self.value(a, &lambda)),
+            along,
+            slopes: std::array::from_fn(|a| {
+                // A vertex's function has one and the same derivative along all other vertices, which is taken off.
+                let common = if a < 4 { self.slope(a, (a + 1) % 4, &lambda) } else { 0.0 };
+                let [m, n] = along[a];
+                let second = if m == n { 0.0 } else { self.slope(a, n, &lambda) };
+                [self.slope(a, m, &lambda) - common, second]
+            }),
+        };
+        let tables = Rule::ALL.map(|rule| rule.nodes().iter().map(at).collect()).into();
+        self.tables = tables;
+        self.laplace =
+            self.stiffness.map(|row| row.map(|s| EDGES.map(|[m, n]| s[m][n] + s[n][m] - s[m][m] - s[n][n])));
+        self
     }
 }
 

@@ -1,11 +1,11 @@
 //! The A–ψ tetrahedron of any Lagrange order, by the exact means of its shape functions' products.
 //!
 //! The weak form is that of [`super::volume`], whose closed form serves linear elements faster; here
-//! `∫∇N_a·∇N_b = V Σ_mn ⟨∂_m N_a ∂_n N_b⟩ g_m·g_n` and so on, with the tables of [`super::lagrange`] and the constant
+//! `∫∇N_a·∇N_b = V Σ_mn ⟨∂_m N_a ∂_n N_b⟩ g_m·g_n` (a sum over the edges once `Σ_m g_m = 0` is used) and so on, with the tables of [`super::lagrange`] and the constant
 //! gradients `g_m = ∇λ_m` of a straight-sided element.
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
-use fluxmorph_geometry::tet4::{Tet4, dot};
+use fluxmorph_geometry::tet4::{EDGES, Tet4, dot};
 
 use super::lagrange::Lagrange;
 use super::volume::Coefficients;
@@ -16,8 +16,8 @@ pub struct LagrangeTet<const N: usize> {
     shape: &'static Lagrange<N, 4>,
     tet: Tet4,
     coefficients: Coefficients,
-    /// `V g_m·g_n`.
-    metric: [[f64; 4]; 4],
+    /// `V g_m·g_n` of the edges `(m, n)`: the others follow from `Σ_m g_m = 0`.
+    metric: [f64; 6],
 }
 
 impl<const N: usize> LagrangeTet<N> {
@@ -25,8 +25,14 @@ impl<const N: usize> LagrangeTet<N> {
     #[inline]
     pub fn new(shape: &'static Lagrange<N, 4>, tet: Tet4, coefficients: Coefficients) -> Self {
         let g = &tet.gradients;
-        let metric = std::array::from_fn(|m| std::array::from_fn(|n| tet.volume * dot(g[m], g[n])));
+        let metric = EDGES.map(|[m, n]| tet.volume * dot(g[m], g[n]));
         Self { shape, tet, coefficients, metric }
+    }
+
+    /// `∫∇N_a·∇N_b`.
+    #[inline]
+    fn laplace(&self, a: usize, b: usize) -> f64 {
+        self.shape.laplace[a][b].iter().zip(&self.metric).map(|(s, m)| s * m).sum()
     }
 }
 
@@ -36,12 +42,7 @@ impl<const N: usize> LocalMatrix<c64, N, 4> for LagrangeTet<N> {
         let Coefficients { reluctivity, extra_penalty, eddy } = self.coefficients;
         let (volume, g) = (self.tet.volume, &self.tet.gradients);
         let stiffness = &self.shape.stiffness[a][b];
-        let mut laplace = 0.0;
-        for m in 0..4 {
-            for n in 0..4 {
-                laplace += stiffness[m][n] * self.metric[m][n];
-            }
-        }
+        let laplace = self.laplace(a, b);
         let mass = volume * self.shape.mass[a][b];
         let mut block = [[c64::default(); 4]; 4];
         for i in 0..3 {
@@ -73,6 +74,21 @@ impl<const N: usize> LocalMatrix<c64, N, 4> for LagrangeTet<N> {
             }
         }
         block
+    }
+
+    #[inline]
+    fn scalars(&self) -> Option<[[f64; N]; N]> {
+        let Coefficients { reluctivity, extra_penalty, eddy } = self.coefficients;
+        if extra_penalty != 0.0 || eddy != c64::default() {
+            return None;
+        }
+        let mut scalars = [[0.0; N]; N];
+        for a in 0..N {
+            for b in a..N {
+                scalars[a][b] = reluctivity * self.laplace(a, b);
+            }
+        }
+        Some(scalars)
     }
 }
 
@@ -168,6 +184,20 @@ mod tests {
                 };
                 let difference = (at(h) - at(-h)) / (2.0 * h);
                 assert!((difference - exact[k][d]).norm() < 1e-8 * (1.0 + difference.norm()));
+            }
+        }
+    }
+
+    #[test]
+    fn a_quadratic_element_of_air_is_given_by_its_scalars() {
+        let law = Coefficients { reluctivity: 1.7, extra_penalty: 0.0, eddy: c64::default() };
+        let matrix = LagrangeTet::new(Lagrange::<10, 4>::tet(), Tet4::new(SKEW), law);
+        let scalars = matrix.scalars().expect("nothing couples components");
+        for (a, b) in (0..10).flat_map(|a| (a..10).map(move |b| (a, b))) {
+            let block = matrix.block(a, b);
+            for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
+                let expected = if i == j && i < 3 { scalars[a][b] } else { 0.0 };
+                assert!((block[i][j] - expected).norm() < 1e-15);
             }
         }
     }

@@ -38,6 +38,7 @@ pub struct AphiTet {
 
 impl AphiTet {
     /// The element matrix for given geometry and coefficients.
+    #[inline]
     pub fn new(tet: Tet4, coefficients: Coefficients) -> Self {
         Self { tet, coefficients }
     }
@@ -66,6 +67,22 @@ impl LocalMatrix<c64, 4, 4> for AphiTet {
         }
         block[3][3] = eddy * laplace;
         block
+    }
+
+    #[inline]
+    fn scalars(&self) -> Option<[[f64; 4]; 4]> {
+        let Coefficients { reluctivity, extra_penalty, eddy } = self.coefficients;
+        if extra_penalty != 0.0 || eddy != c64::default() {
+            return None;
+        }
+        let (factor, g) = (reluctivity * self.tet.volume, &self.tet.gradients);
+        let mut scalars = [[0.0; 4]; 4];
+        for a in 0..4 {
+            for b in a..4 {
+                scalars[a][b] = factor * dot(g[a], g[b]);
+            }
+        }
+        Some(scalars)
     }
 }
 
@@ -123,6 +140,25 @@ pub(crate) mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn an_element_of_air_is_given_by_its_scalars() {
+        let law = Coefficients { reluctivity: 1.7, extra_penalty: 0.0, eddy: c64::default() };
+        let matrix = AphiTet::new(Tet4::new(SKEW), law);
+        let scalars = matrix.scalars().expect("nothing couples components");
+        for (a, b) in (0..4).flat_map(|a| (a..4).map(move |b| (a, b))) {
+            let block = matrix.block(a, b);
+            for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
+                let expected = if i == j && i < 3 { scalars[a][b] } else { 0.0 };
+                assert!((block[i][j] - expected).norm() < 1e-15);
+            }
+        }
+        let conducting = Coefficients { eddy: LAW.eddy, ..law };
+        assert!(AphiTet::new(Tet4::new(SKEW), conducting).scalars().is_none());
+        assert!(
+            AphiTet::new(Tet4::new(SKEW), Coefficients { extra_penalty: 0.1, ..law }).scalars().is_none()
+        );
     }
 
     #[test]

@@ -1,7 +1,10 @@
 //! Conjugate orthogonal conjugate gradients for complex symmetric systems (van der Vorst and Melissen, IEEE Trans.
 //! Magn. 26 (1990) 706): conjugate gradients with the bilinear product `xᵀy` in place of the inner product.
+//!
+//! The direction update is the flexible one, `β = zᵀ(r⁺ − r) / ρ = −α zᵀq / ρ`: a preconditioner in single precision is
+//! symmetric only up to its rounding, and the usual `zᵀr⁺ / ρ` would let that rounding grow.
 
-use fluxmorph_geometry::fem::{CsrMatrix, c64, dot, norm};
+use fluxmorph_geometry::fem::{CsrMatrix, advance, c64, dot, norm, scale_add};
 
 /// How an iteration ended; the caller checks the true residual.
 #[derive(Clone, Copy, Debug)]
@@ -12,8 +15,8 @@ pub struct Outcome {
 
 /// Improves `x` until the recurrence's residual norm is at most `target`.
 ///
-/// `precondition(r, z)` overwrites `z` with an approximation of `K⁻¹ r`; it must be complex symmetric and fixed. Stops
-/// early where a bilinear product vanishes (breakdown).
+/// `precondition(r, z)` overwrites `z` with an approximation of `K⁻¹ r`; it must be fixed, and complex symmetric up to
+/// rounding. Stops early where a bilinear product vanishes (breakdown), and where `stop(iterations, residual norm)` says so.
 pub fn solve(
     matrix: &CsrMatrix<c64>,
     right_side: &[c64],
@@ -21,6 +24,7 @@ pub fn solve(
     precondition: impl Fn(&[c64], &mut [c64]),
     target: f64,
     max_iterations: usize,
+    mut stop: impl FnMut(usize, f64) -> bool,
 ) -> Outcome {
     let n = x.len();
     let mut residual = vec![c64::default(); n];
@@ -31,26 +35,24 @@ pub fn solve(
     let mut direction = vec![c64::default(); n];
     let mut preconditioned = vec![c64::default(); n];
     let mut image = vec![c64::default(); n];
+    let mut alpha = c64::default();
     let mut rho = c64::new(1.0, 0.0);
+    let mut size = norm(&residual);
     let mut iterations = 0;
-    while iterations < max_iterations && norm(&residual) > target {
+    while iterations < max_iterations && size > target && !(iterations > 0 && stop(iterations, size)) {
         precondition(&residual, &mut preconditioned);
-        let rho_new = dot(&residual, &preconditioned);
-        let beta = if iterations == 0 { c64::default() } else { rho_new / rho };
-        rho = rho_new;
-        for (p, &z) in direction.iter_mut().zip(&preconditioned) {
-            *p = z + beta * *p;
-        }
+        let (zr, zq) = (dot(&preconditioned, &residual), dot(&preconditioned, &image));
+        let beta = -alpha * zq / rho;
+        rho = zr;
+        scale_add(beta, &mut direction, &preconditioned);
         matrix.mul(&direction, &mut image);
         let curvature = dot(&direction, &image);
-        if curvature.norm() == 0.0 || rho.norm() == 0.0 || !curvature.is_finite() || !rho.is_finite() {
+        alpha = rho / curvature;
+        let vanished = curvature.norm() == 0.0 || rho.norm() == 0.0;
+        if vanished || !curvature.is_finite() || !rho.is_finite() || !alpha.is_finite() {
             break;
         }
-        let alpha = rho / curvature;
-        for ((x, r), (&p, &q)) in x.iter_mut().zip(residual.iter_mut()).zip(direction.iter().zip(&image)) {
-            *x += alpha * p;
-            *r -= alpha * q;
-        }
+        size = advance(alpha, (&mut *x, &direction), (&mut residual, &image));
         iterations += 1;
     }
     Outcome { iterations }
@@ -82,7 +84,7 @@ mod tests {
         let mut b = vec![c64::default(); n];
         a.mul(&exact, &mut b);
         let mut x = vec![c64::default(); n];
-        let outcome = solve(&a, &b, &mut x, |r, z| z.copy_from_slice(r), 1e-13, n);
+        let outcome = solve(&a, &b, &mut x, |r, z| z.copy_from_slice(r), 1e-13, n, |_, _| false);
         assert!(outcome.iterations < n);
         assert!(x.iter().zip(&exact).all(|(x, e)| (x - e).norm() < 1e-12));
     }

@@ -1,0 +1,109 @@
+//! Triangular solves with an incomplete factor: slabs at once, separators at once, and back.
+//!
+//! Forward, a row gathers what was solved before it; backward, it scatters to the rows before it, so that one copy of the
+//! triangle serves both. A separator's rows reach into the two slabs beside it: backward, each slab takes its own share.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::{Incomplete, Number};
+
+/// Rows per parallel task of a permutation.
+const ROWS: usize = 4096;
+
+impl<T: Number> Incomplete<T> {
+    /// Solves with the factor in place, in the order of the matrix.
+    ///
+    /// # Panics
+    /// If the length of `x` is not the number of unknowns.
+    pub fn solve_in_place(&self, x: &mut [T]) {
+        let mut y = vec![T::default(); x.len()];
+        self.solve_gathered(&mut y, |old| x[old]);
+        self.spread(&y, x);
+    }
+
+    /// Writes the solution for the right side `value(old)` to `y`, in the order of elimination.
+    fn solve_gathered(&self, y: &mut [T], value: impl Fn(usize) -> T + Sync) {
+        let analysis = &*self.analysis;
+        let (interior, border) = y.split_at_mut(analysis.interior());
+        let forward = |rows: &Range<usize>, y: &mut [T], interior: &[T]| {
+            for i in rows.clone() {
+                let own = i - rows.start;
+                let mut sum = value(analysis.order[i] as usize) * self.scales[i];
+                let range = self.analysis.entries(&(i..i + 1));
+                let split = match i.checked_sub(analysis.interior()) {
+                    None => range.start,
+                    Some(s) => analysis.splits[s][1] as usize,
+                };
+                for k in range.start..split {
+                    sum -= self.lower[k] * interior[analysis.columns[k] as usize];
+                }
+                for k in split..range.end {
+                    sum -= self.lower[k] * y[analysis.columns[k] as usize - rows.start];
+                }
+                y[own] = sum;
+            }
+        };
+        // y ← D⁻¹ y and y ← L⁻ᵀ y within one part.
+        let backward = |rows: &Range<usize>, y: &mut [T]| {
+            for i in rows.clone().rev() {
+                let own = i - rows.start;
+                let x = y[own];
+                let range = self.analysis.entries(&(i..i + 1));
+                let split = match i.checked_sub(analysis.interior()) {
+                    None => range.start,
+                    Some(s) => analysis.splits[s][1] as usize,
+                };
+                for k in split..range.end {
+                    y[analysis.columns[k] as usize - rows.start] -= self.lower[k] * x;
+                }
+            }
+        };
+        let slabs = pieces(&analysis.slabs, interior);
+        slabs.into_par_iter().for_each(|(_, rows, y)| forward(rows, y, &[]));
+        let separators = pieces(&analysis.separators, border);
+        separators.into_par_iter().for_each(|(_, rows, y)| {
+            forward(rows, y, interior);
+            y.iter_mut().zip(&self.inverse_pivots[rows.clone()]).for_each(|(y, &d)| *y = *y * d);
+            backward(rows, y);
+        });
+        let slabs = pieces(&analysis.slabs, interior);
+        slabs.into_par_iter().for_each(|(s, rows, y)| {
+            y.iter_mut().zip(&self.inverse_pivots[rows.clone()]).for_each(|(y, &d)| *y = *y * d);
+            // The separator before the slab has it as its second one, the separator behind as its first.
+            for t in [s.checked_sub(1), Some(s)].into_iter().flatten() {
+                for i in analysis.separators.get(t).cloned().unwrap_or_default() {
+                    let x = border[i - analysis.interior()];
+                    let [second, own] = analysis.splits[i - analysis.interior()].map(|k| k as usize);
+                    let range = if t == s { analysis.row_starts[i] as usize..second } else { second..own };
+                    for k in range {
+                        y[analysis.columns[k] as usize - rows.start] -= self.lower[k] * x;
+                    }
+                }
+            }
+            backward(rows, y);
+        });
+    }
+
+    /// Writes a solution in the order of elimination to that of the matrix.
+    fn spread(&self, y: &[T], x: &mut [T]) {
+        x.par_iter_mut().zip(&self.analysis.inverse).with_min_len(ROWS).for_each(|(x, &new)| {
+            *x = y[new as usize] * self.scales[new as usize];
+        });
+    }
+}
+
+/// Number, rows and values of every part.
+fn pieces<'a, T>(
+    ranges: &'a [Range<usize>],
+    mut y: &'a mut [T],
+) -> Vec<(usize, &'a Range<usize>, &'a mut [T])> {
+    let mut pieces = Vec::with_capacity(ranges.len());
+    for (t, rows) in ranges.iter().enumerate() {
+        let (own, rest) = std::mem::take(&mut y).split_at_mut(rows.len());
+        y = rest;
+        pieces.push((t, rows, own));
+    }
+    pieces
+}

@@ -1,0 +1,362 @@
+//! The numeric factorisation: every panel gathers what the panels before it change, then is factored.
+//!
+//! Panel `s` with the columns `J` and rows `R ⊇ J`, from its descendants `d`:
+//! `A[R, J] − Σ_d L_d[R, :] D_d L_d[J, :]ᵀ`, in ascending order of `d`; then `L_s D_s L_sᵀ` of the square on top and
+//! `X ← X L_s⁻ᵀ D_s⁻¹` of the rows below. The rows are cut into tiles of fixed size that gather without each other.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use faer::mat::{MatMut, MatRef};
+use faer::prelude::{Reborrow, ReborrowMut};
+use rayon::prelude::*;
+
+use super::analysis::LdltAnalysis;
+use super::dense;
+use super::multiply::{Packing, Shape, Store, multiply};
+use super::panels::Update;
+use super::scalar::{Entry, FactorScalar};
+use super::schedule::{Branch, Task};
+use crate::error::MeshError;
+
+/// Rows of a tile. Every tile reads the columns' rows of an update again, each from another page of memory: tiles of half the
+/// size cost up to a fifth of the time, larger ones leave too few of them to work on at the same time.
+const TILE_ROWS: usize = 512;
+
+/// A numeric factor `P A Pᵀ = L D Lᵀ`.
+#[derive(Debug)]
+pub struct Ldlt<T> {
+    pub(super) analysis: Arc<LdltAnalysis>,
+    /// The rectangle of every panel, column-major.
+    pub(super) panels: Vec<Vec<T>>,
+    /// `1 / D`.
+    pub(super) inverse_pivots: Vec<T>,
+}
+
+impl<T: FactorScalar> Ldlt<T> {
+    /// Factors a matrix whose pattern was analysed. `entry(row, k)` is the value of the stored entry `k` of the structure,
+    /// which lies in `row`; it is called once or twice for every entry, from any thread.
+    ///
+    /// # Errors
+    /// [`MeshError::Factorisation`] when a pivot is zero or not finite, or the factor does not fit the memory.
+    pub fn new(
+        analysis: &Arc<LdltAnalysis>,
+        entry: impl Fn(usize, usize) -> T + Sync,
+    ) -> Result<Self, MeshError> {
+        T::factored(analysis, &entry)
+    }
+
+    /// Number of unknowns.
+    pub fn size(&self) -> usize {
+        self.analysis.size()
+    }
+
+    /// Memory of the factor [bytes], without the analysis.
+    pub fn bytes(&self) -> usize {
+        let entries: usize = self.panels.iter().map(Vec::capacity).sum();
+        (entries + self.inverse_pivots.capacity()) * size_of::<T>()
+            + self.panels.capacity() * size_of::<Vec<T>>()
+    }
+}
+
+/// The work of [`Ldlt::new`].
+pub(super) fn factored<T: FactorScalar>(
+    analysis: &Arc<LdltAnalysis>,
+    entry: &Entry<'_, T>,
+) -> Result<Ldlt<T>, MeshError> {
+    let count = analysis.panels.len();
+    let factorisation = Factorisation {
+        analysis,
+        entry,
+        panels: (0..count).map(|_| OnceLock::new()).collect(),
+        workspaces: Mutex::new(Vec::new()),
+    };
+    factorisation.branch(&analysis.tasks)?;
+    let mut panels = Vec::with_capacity(count);
+    let mut inverse_pivots = Vec::with_capacity(analysis.size());
+    for panel in factorisation.panels {
+        let panel = panel.into_inner().expect("every panel belongs to a task");
+        inverse_pivots.extend(panel.inverse_pivots);
+        panels.push(panel.entries);
+    }
+    Ok(Ldlt { analysis: Arc::clone(analysis), panels, inverse_pivots })
+}
+
+/// A finished panel.
+struct FactoredPanel<T> {
+    entries: Vec<T>,
+    /// `D` once more: on the diagonal of the entries every pivot is a cache line of its own.
+    pivots: Vec<T>,
+    inverse_pivots: Vec<T>,
+}
+
+/// Scratch memory of one thread.
+struct Workspace<T: FactorScalar> {
+    /// Position in the panel at work of every row of the matrix that it has; other entries are left from other panels.
+    position: Vec<u32>,
+    tile: TileScratch<T>,
+}
+
+struct TileScratch<T: FactorScalar> {
+    /// Where the rows of an update go.
+    pieces: Vec<Piece>,
+    /// `L_d[J, :] D_d`.
+    scaled: Vec<T>,
+    product: Vec<T>,
+    packing: Packing<T>,
+}
+
+struct Factorisation<'a, T: FactorScalar> {
+    analysis: &'a LdltAnalysis,
+    entry: &'a Entry<'a, T>,
+    panels: Vec<OnceLock<FactoredPanel<T>>>,
+    workspaces: Mutex<Vec<Workspace<T>>>,
+}
+
+/// How the tiles of a panel are gathered.
+#[derive(Clone, Copy)]
+enum Tiles {
+    InOrder,
+    InParallel,
+}
+
+impl<T: FactorScalar> Factorisation<'_, T> {
+    /// The error of the first task that fails, whatever finishes first.
+    fn branch(&self, branch: &Branch) -> Result<(), MeshError> {
+        let done: Vec<Result<(), MeshError>> =
+            branch.tasks.par_iter().with_max_len(1).map(|task| self.task(task)).collect();
+        done.into_iter().collect::<Result<(), _>>()?;
+        branch
+            .chain
+            .iter()
+            .try_for_each(|&p| self.with_workspace(|workspace| self.panel(p, Tiles::InParallel, workspace)))
+    }
+
+    fn task(&self, task: &Task) -> Result<(), MeshError> {
+        match task {
+            Task::Branch(branch) => self.branch(branch),
+            Task::Run(panels) => self.with_workspace(|workspace| {
+                panels.clone().try_for_each(|p| self.panel(p, Tiles::InOrder, workspace))
+            }),
+        }
+    }
+
+    /// Lends a workspace that no one uses.
+    fn with_workspace<R>(&self, work: impl FnOnce(&mut Workspace<T>) -> R) -> R {
+        let lock = || self.workspaces.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = lock().pop();
+        let mut workspace = idle.unwrap_or_else(|| Workspace {
+            position: vec![0; self.analysis.size()],
+            tile: TileScratch {
+                pieces: Vec::new(),
+                scaled: Vec::new(),
+                product: Vec::new(),
+                packing: Packing::new(),
+            },
+        });
+        let result = work(&mut workspace);
+        lock().push(workspace);
+        result
+    }
+
+    fn failed(&self, cause: String) -> MeshError {
+        MeshError::Factorisation { unknowns: self.analysis.size(), cause }
+    }
+
+    fn panel(&self, p: usize, tiles: Tiles, workspace: &mut Workspace<T>) -> Result<(), MeshError> {
+        let panel = self.analysis.panels.get(p);
+        let rows = self.analysis.panels.rows(p);
+        let (height, width) = (panel.height(), panel.width);
+        let mut entries = Vec::new();
+        entries
+            .try_reserve_exact(height * width)
+            .map_err(|_| self.failed("out of memory for the factor".to_owned()))?;
+        entries.resize(height * width, T::default());
+        for (i, &row) in rows.iter().enumerate() {
+            workspace.position[row as usize] = i as u32;
+        }
+        self.assemble(p, &workspace.position, &mut entries);
+
+        let mut block = MatMut::from_column_major_slice_mut(&mut entries, height, width);
+        let position = &workspace.position;
+        match tiles {
+            Tiles::InParallel if height > TILE_ROWS => {
+                tiles_of(block.rb_mut(), 0).into_par_iter().with_max_len(1).for_each(|(first, tile)| {
+                    self.with_workspace(|own| self.gather(p, first, tile, position, &mut own.tile));
+                });
+            }
+            _ => {
+                for (first, tile) in tiles_of(block.rb_mut(), 0) {
+                    self.gather(p, first, tile, position, &mut workspace.tile);
+                }
+            }
+        }
+
+        let (mut diagonal, below) = block.split_at_row_mut(width);
+        let lost = |column: usize, pivot: T| {
+            let unknown = self.analysis.order[panel.start + column];
+            self.failed(format!("the pivot of unknown {unknown} is {pivot:?}: the matrix is singular"))
+        };
+        let TileScratch { product, packing, .. } = &mut workspace.tile;
+        dense::factor_diagonal(diagonal.rb_mut(), product, packing)
+            .map_err(|column| lost(column, diagonal[(column, column)]))?;
+        let diagonal = diagonal.rb();
+        let inverse_pivots = (0..width)
+            .map(|j| diagonal[(j, j)].inverse().ok_or_else(|| lost(j, diagonal[(j, j)])))
+            .collect::<Result<Vec<T>, _>>()?;
+        let pivots = (0..width).map(|j| diagonal[(j, j)]).collect();
+        let divide = |tile: MatMut<'_, T>, packing: &mut Packing<T>| {
+            dense::divide_by_diagonal_block(diagonal, &inverse_pivots, tile, packing);
+        };
+        match tiles {
+            Tiles::InParallel if height > TILE_ROWS => {
+                tiles_of(below, width).into_par_iter().with_max_len(1).for_each(|(_, tile)| {
+                    self.with_workspace(|own| divide(tile, &mut own.tile.packing));
+                });
+            }
+            _ => tiles_of(below, width).into_iter().for_each(|(_, tile)| divide(tile, packing)),
+        }
+        let finished = self.panels[p].set(FactoredPanel { entries, pivots, inverse_pivots });
+        assert!(finished.is_ok(), "a panel belongs to one task");
+        Ok(())
+    }
+
+    /// Adds the entries of the matrix on and below the diagonal.
+    fn assemble(&self, p: usize, position: &[u32], entries: &mut [T]) {
+        let LdltAnalysis { structure, order, inverse, panels, .. } = self.analysis;
+        let panel = panels.get(p);
+        for (j, values) in entries.chunks_exact_mut(panel.height()).enumerate() {
+            let column = panel.start + j;
+            let old = order[column] as usize;
+            for k in structure.row(old) {
+                let row = inverse[structure.columns[k] as usize] as usize;
+                if row >= column {
+                    values[position[row] as usize] += (self.entry)(old, k);
+                }
+            }
+        }
+    }
+
+    /// Subtracts all updates from one tile, the rows of panel `p` from position `first` on.
+    fn gather(
+        &self,
+        p: usize,
+        first: usize,
+        mut tile: MatMut<'_, T>,
+        position: &[u32],
+        scratch: &mut TileScratch<T>,
+    ) {
+        let rows = &self.analysis.panels.rows(p)[first..first + tile.nrows()];
+        let (Some(&lowest), Some(&highest)) = (rows.first(), rows.last()) else { return };
+        let whole = tile.nrows() == self.analysis.panels.get(p).height();
+        for update in self.analysis.panels.updates(p) {
+            let source_rows = self.analysis.panels.rows(update.source as usize);
+            let from = update.first as usize;
+            let range = if whole {
+                from..source_rows.len()
+            } else {
+                from + source_rows[from..].partition_point(|&r| r < lowest)
+                    ..from + source_rows[from..].partition_point(|&r| r <= highest)
+            };
+            if !range.is_empty() {
+                let target = Target { column: self.analysis.panels.get(p).start, row: first, position };
+                self.subtract(*update, range, &target, tile.rb_mut(), scratch);
+            }
+        }
+    }
+
+    /// Subtracts one update from a tile; `range` are the rows of the source that the tile has.
+    fn subtract(
+        &self,
+        update: Update,
+        range: std::ops::Range<usize>,
+        target: &Target<'_>,
+        mut tile: MatMut<'_, T>,
+        scratch: &mut TileScratch<T>,
+    ) {
+        let source = update.source as usize;
+        let panel = self.analysis.panels.get(source);
+        let source_rows = self.analysis.panels.rows(source);
+        let FactoredPanel { entries, pivots, .. } =
+            self.panels[source].get().expect("descendants are factored first");
+        let block = MatRef::from_column_major_slice(entries, panel.height(), panel.width);
+
+        let (from, to) = (update.first as usize, update.last as usize);
+        let columns = to - from;
+        scratch.scaled.clear();
+        for (&pivot, values) in pivots.iter().zip(entries.chunks_exact(panel.height())) {
+            scratch.scaled.extend(values[from..to].iter().map(|&value| value * pivot));
+        }
+        let scaled = MatRef::from_column_major_slice(&scratch.scaled, columns, panel.width);
+        let factor_rows = block.subrows(range.start, range.len());
+        let shape = if range.start == from && range.end >= to { Shape::LowerTrapezoid } else { Shape::Full };
+
+        let place = |i: usize| target.position[source_rows[i] as usize] as usize - target.row;
+        let first_column = source_rows[from] as usize - target.column;
+        let (first_row, last_row) = (place(range.start), place(range.end - 1));
+        let adjacent = source_rows[to - 1] - source_rows[from] == (columns - 1) as u32
+            && last_row - first_row == range.len() - 1;
+        if adjacent {
+            let tile = tile.submatrix_mut(first_row, first_column, range.len(), columns);
+            multiply(tile, Store::Subtract, shape, factor_rows, scaled, &mut scratch.packing);
+            return;
+        }
+        let height = range.len();
+        scratch.pieces.clear();
+        for (i, row) in range.clone().map(place).enumerate() {
+            match scratch.pieces.last_mut() {
+                Some(piece) if row == piece.row + i - piece.from => piece.to = i + 1,
+                _ => scratch.pieces.push(Piece { row, from: i, to: i + 1 }),
+            }
+        }
+        if scratch.product.len() < height * columns {
+            scratch.product.resize(height * columns, T::default());
+        }
+        let product = &mut scratch.product[..height * columns];
+        let product_block = MatMut::from_column_major_slice_mut(product, height, columns);
+        multiply(product_block, Store::Overwrite, shape, factor_rows, scaled, &mut scratch.packing);
+        for (j, values) in product.chunks_exact(height).enumerate() {
+            let own = dense::column_mut(&mut tile, source_rows[from + j] as usize - target.column);
+            let start = if shape == Shape::LowerTrapezoid { j } else { 0 };
+            for piece in scratch.pieces.iter().filter(|piece| piece.to > start) {
+                let begin = piece.from.max(start);
+                let own = &mut own[piece.row + begin - piece.from..];
+                for (own, &value) in own.iter_mut().zip(&values[begin..piece.to]) {
+                    *own -= value;
+                }
+            }
+        }
+    }
+}
+
+/// Rows of a product that lie next to each other in the tile.
+struct Piece {
+    /// First row in the tile.
+    row: usize,
+    /// Rows of the product.
+    from: usize,
+    to: usize,
+}
+
+/// Where a tile lies.
+struct Target<'a> {
+    /// First column of the panel.
+    column: usize,
+    /// First row of the tile within the panel.
+    row: usize,
+    /// Of the rows of the matrix within the panel.
+    position: &'a [u32],
+}
+
+/// Cuts the rows of a block that starts at row `first` of its panel where the panel's tiles end; each with its first row.
+fn tiles_of<T>(block: MatMut<'_, T>, first: usize) -> Vec<(usize, MatMut<'_, T>)> {
+    let mut tiles = Vec::new();
+    let (mut rest, mut row) = (block, first);
+    while rest.nrows() > 0 {
+        let height = rest.nrows().min(TILE_ROWS - row % TILE_ROWS);
+        let (tile, next) = rest.split_at_row_mut(height);
+        tiles.push((row, tile));
+        row += height;
+        rest = next;
+    }
+    tiles
+}

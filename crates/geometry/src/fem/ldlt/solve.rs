@@ -1,0 +1,360 @@
+//! Solves with a factor: `L` forwards, `D`, `Lᵀ` backwards, over the tasks of the elimination tree.
+//!
+//! A task owns the unknowns of its columns. Forwards, what it subtracts from unknowns outside is collected apart, handed to
+//! the branch above and added there in the order of the tasks; backwards, it reads those unknowns and changes its own only.
+//! Right sides are interleaved, `x[unknown · count + side]`, and set apart for the work on a panel
+//! ([`panel_solve`](super::panel_solve)).
+
+use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
+
+use super::factor::Ldlt;
+use super::panel_solve::{Backward, Block, Forward, Subtract, SubtractTransposed, by_pairs};
+use super::panels::Panel;
+use super::scalar::FactorScalar;
+use super::schedule::{Branch, Task};
+
+/// Entries above which the parts of a panel of a chain are parallel tasks: some 50 µs of memory traffic.
+const LARGE_PANEL: usize = 1 << 16;
+
+/// Rows, respectively columns, of the parts of a large panel.
+const PART_ROWS: usize = 256;
+const PART_COLUMNS: usize = 32;
+
+impl<T: FactorScalar> Ldlt<T> {
+    /// Solves `A X = B` in place; `columns` holds the right sides one after the other.
+    ///
+    /// # Panics
+    /// If the length of `columns` is not a multiple of the size.
+    pub fn solve_in_place(&self, columns: &mut [T]) {
+        T::solve(self, columns);
+    }
+}
+
+/// The work of [`Ldlt::solve_in_place`].
+pub(super) fn solve_in_place<T: FactorScalar>(factor: &Ldlt<T>, columns: &mut [T]) {
+    let n = factor.size();
+    if n == 0 {
+        return;
+    }
+    assert_eq!(columns.len() % n, 0, "whole columns");
+    let count = columns.len() / n;
+    let order = &factor.analysis.order;
+    let mut x = Vec::with_capacity(n * count);
+    x.extend(order.iter().flat_map(|&old| columns.iter().skip(old as usize).step_by(n)).copied());
+    let sweep = Sweep { factor, count, workspaces: Mutex::new(Vec::new()) };
+    sweep.forward_branch(&factor.analysis.tasks, &mut x);
+    for (x, &inverse) in x.chunks_exact_mut(count).zip(&factor.inverse_pivots) {
+        x.iter_mut().for_each(|x| *x *= inverse);
+    }
+    sweep.backward_branch(&factor.analysis.tasks, &mut x, &[]);
+    for (x, &old) in x.chunks_exact(count).zip(order) {
+        columns.iter_mut().skip(old as usize).step_by(n).zip(x).for_each(|(column, &x)| *column = x);
+    }
+}
+
+/// Scratch memory of one thread.
+struct Workspace<T> {
+    /// By unknown and side: what is subtracted from, or known of, unknowns outside the task. Zero between forward tasks.
+    outside: Vec<T>,
+    /// The unknowns of a panel, one side after the other.
+    sides: Vec<T>,
+}
+
+struct Sweep<'a, T> {
+    factor: &'a Ldlt<T>,
+    count: usize,
+    workspaces: Mutex<Vec<Workspace<T>>>,
+}
+
+/// Whether a large panel is taken in parts, as the panels of chains are, whatever the number of threads.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Parts {
+    Whole,
+    InParallel,
+}
+
+impl<T: FactorScalar> Sweep<'_, T> {
+    fn panel(&self, p: usize) -> &Panel {
+        self.factor.analysis.panels.get(p)
+    }
+
+    fn rows(&self, p: usize) -> &[u32] {
+        self.factor.analysis.panels.rows(p)
+    }
+
+    /// The unknowns of contiguous panels.
+    fn unknowns(&self, panels: &Range<usize>) -> Range<usize> {
+        let start = |p: usize| {
+            if p < self.factor.panels.len() { self.panel(p).start } else { self.factor.size() }
+        };
+        start(panels.start)..start(panels.end)
+    }
+
+    /// The unknowns outside that panels with their subtrees have to do with, some of them repeatedly: the rows of the roots.
+    fn outer_rows(&self, panels: Range<usize>) -> impl Iterator<Item = usize> {
+        let end = self.unknowns(&panels).end;
+        let below = panels.map(|p| &self.rows(p)[self.panel(p).width..]);
+        let roots = below.filter(move |rows| rows.first().is_some_and(|&row| row as usize >= end));
+        roots.flatten().map(|&row| row as usize)
+    }
+
+    /// Each task with its part of the unknowns `x` of the branch.
+    fn shares<'t, 'x>(&self, branch: &'t Branch, x: &'x mut [T]) -> Vec<(&'t Task, &'x mut [T])> {
+        let mut rest = x;
+        let mut next = self.unknowns(&branch.panels).start;
+        let share = |task: &'t Task| {
+            let unknowns = self.unknowns(&task.panels());
+            let (_, from) = std::mem::take(&mut rest).split_at_mut((unknowns.start - next) * self.count);
+            let (own, after) = from.split_at_mut(unknowns.len() * self.count);
+            rest = after;
+            next = unknowns.end;
+            (task, own)
+        };
+        branch.tasks.iter().map(share).collect()
+    }
+
+    fn with_workspace<R>(&self, work: impl FnOnce(&mut Workspace<T>) -> R) -> R {
+        let lock = || self.workspaces.lock().unwrap_or_else(PoisonError::into_inner);
+        let idle = lock().pop();
+        let mut workspace = idle.unwrap_or_else(|| Workspace {
+            outside: vec![T::default(); self.factor.size() * self.count],
+            sides: Vec::new(),
+        });
+        let result = work(&mut workspace);
+        lock().push(workspace);
+        result
+    }
+
+    /// Forward through a task; returns what it adds to its outer rows, in their order.
+    fn forward(&self, task: &Task, x: &mut [T]) -> Vec<T> {
+        match task {
+            Task::Branch(branch) => self.forward_branch(branch, x),
+            Task::Run(panels) => self.with_workspace(|workspace| {
+                let own = self.unknowns(panels);
+                for p in panels.clone() {
+                    self.forward_panel(p, Parts::Whole, x, &own, workspace);
+                }
+                self.taken(panels, workspace)
+            }),
+        }
+    }
+
+    fn forward_branch(&self, branch: &Branch, x: &mut [T]) -> Vec<T> {
+        let shares = self.shares(branch, x);
+        let contributions: Vec<Vec<T>> =
+            shares.into_par_iter().with_max_len(1).map(|(task, x)| self.forward(task, x)).collect();
+        let own = self.unknowns(&branch.panels);
+        self.with_workspace(|workspace| {
+            for (task, contribution) in branch.tasks.iter().zip(contributions) {
+                let rows = self.outer_rows(task.panels());
+                for (row, values) in rows.zip(contribution.chunks_exact(self.count)) {
+                    let target = self.at_mut(row, x, &own, &mut workspace.outside);
+                    target.iter_mut().zip(values).for_each(|(target, &value)| *target += value);
+                }
+            }
+            for &p in &branch.chain {
+                self.forward_panel(p, Parts::InParallel, x, &own, workspace);
+            }
+            self.taken(&branch.panels, workspace)
+        })
+    }
+
+    /// The values at the outer rows, which become zero again: a row that comes twice is taken once.
+    fn taken(&self, panels: &Range<usize>, workspace: &mut Workspace<T>) -> Vec<T> {
+        let mut values = Vec::new();
+        for row in self.outer_rows(panels.clone()) {
+            let at_row = &mut workspace.outside[row * self.count..(row + 1) * self.count];
+            values.extend_from_slice(at_row);
+            at_row.fill(T::default());
+        }
+        values
+    }
+
+    /// Backward through a task; `outer` are the solutions at its outer rows.
+    fn backward(&self, task: &Task, x: &mut [T], outer: &[T]) {
+        match task {
+            Task::Branch(branch) => self.backward_branch(branch, x, outer),
+            Task::Run(panels) => self.with_workspace(|workspace| {
+                let own = self.unknowns(panels);
+                self.put(panels, outer, workspace);
+                for p in panels.clone().rev() {
+                    self.backward_panel(p, Parts::Whole, x, &own, workspace);
+                }
+            }),
+        }
+    }
+
+    fn backward_branch(&self, branch: &Branch, x: &mut [T], outer: &[T]) {
+        let own = self.unknowns(&branch.panels);
+        let known: Vec<Vec<T>> = self.with_workspace(|workspace| {
+            self.put(&branch.panels, outer, workspace);
+            for &p in branch.chain.iter().rev() {
+                self.backward_panel(p, Parts::InParallel, x, &own, workspace);
+            }
+            let at = |row| self.at(row, x, &own, &workspace.outside).iter().copied();
+            branch.tasks.iter().map(|task| self.outer_rows(task.panels()).flat_map(at).collect()).collect()
+        });
+        let shares = self.shares(branch, x).into_par_iter().with_max_len(1);
+        shares.zip(known).for_each(|((task, x), known)| self.backward(task, x, &known));
+    }
+
+    fn put(&self, panels: &Range<usize>, outer: &[T], workspace: &mut Workspace<T>) {
+        for (row, values) in self.outer_rows(panels.clone()).zip(outer.chunks_exact(self.count)) {
+            workspace.outside[row * self.count..][..self.count].copy_from_slice(values);
+        }
+    }
+
+    /// All sides at an unknown, be it one of the task's `own` or outside.
+    fn at<'v>(&self, row: usize, x: &'v [T], own: &Range<usize>, outside: &'v [T]) -> &'v [T] {
+        if row < own.end {
+            &x[(row - own.start) * self.count..][..self.count]
+        } else {
+            &outside[row * self.count..][..self.count]
+        }
+    }
+
+    fn at_mut<'v>(
+        &self,
+        row: usize,
+        x: &'v mut [T],
+        own: &Range<usize>,
+        outside: &'v mut [T],
+    ) -> &'v mut [T] {
+        if row < own.end {
+            &mut x[(row - own.start) * self.count..][..self.count]
+        } else {
+            &mut outside[row * self.count..][..self.count]
+        }
+    }
+
+    /// `x_J ← L_J⁻¹ x_J`, then `x_R −= L_R x_J`.
+    fn forward_panel(
+        &self,
+        p: usize,
+        parts: Parts,
+        x: &mut [T],
+        own: &Range<usize>,
+        workspace: &mut Workspace<T>,
+    ) {
+        let panel = self.panel(p);
+        let entries = self.factor.panels[p].as_slice();
+        let (width, height, count) = (panel.width, panel.height(), self.count);
+        let columns = &mut x[(panel.start - own.start) * count..][..width * count];
+        let Workspace { outside, sides } = workspace;
+        sides.clear();
+        sides.resize(height * count, T::default());
+        for (side, values) in sides.chunks_exact_mut(height).enumerate() {
+            let own = columns.iter().skip(side).step_by(count);
+            values.iter_mut().zip(own).for_each(|(value, &x)| *value = x);
+        }
+        let cut = parts == Parts::InParallel && entries.len() > LARGE_PANEL;
+        let block = Block { entries, height, first_row: 0, rows: if cut { width } else { height } };
+        let arch = pulp::Arch::new();
+        by_pairs(
+            sides,
+            height,
+            |x| arch.dispatch(Forward { block, x: x.map(|x| &mut x[..block.rows]) }),
+            |x| arch.dispatch(Forward { block, x: x.map(|x| &mut x[..block.rows]) }),
+        );
+        if cut {
+            for values in sides.chunks_mut(2 * height) {
+                match values.len() / height {
+                    2 => {
+                        let (one, other) = values.split_at_mut(height);
+                        let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+                        let (x, parts) = ([&*x0, &*x1], y0.par_chunks_mut(PART_ROWS));
+                        let parts = parts.zip(y1.par_chunks_mut(PART_ROWS)).enumerate();
+                        parts.for_each(|(part, (y0, y1))| {
+                            let block = below(block, width + part * PART_ROWS, y0.len());
+                            arch.dispatch(Subtract { block, x, y: [y0, y1] });
+                        });
+                    }
+                    _ => {
+                        let (x, y) = values.split_at_mut(width);
+                        let (x, parts) = ([&*x], y.par_chunks_mut(PART_ROWS).enumerate());
+                        parts.for_each(|(part, y)| {
+                            let block = below(block, width + part * PART_ROWS, y.len());
+                            arch.dispatch(Subtract { block, x, y: [y] });
+                        });
+                    }
+                }
+            }
+        }
+        for (side, values) in sides.chunks_exact(height).enumerate() {
+            let (solved, changes) = values.split_at(width);
+            let own_unknowns = x[(panel.start - own.start) * count..].iter_mut().skip(side).step_by(count);
+            own_unknowns.zip(solved).for_each(|(x, &solved)| *x = solved);
+            for (&row, &change) in self.rows(p)[width..].iter().zip(changes) {
+                self.at_mut(row as usize, x, own, outside)[side] += change;
+            }
+        }
+    }
+
+    /// `x_J −= L_Rᵀ x_R`, then `x_J ← L_J⁻ᵀ x_J`.
+    fn backward_panel(
+        &self,
+        p: usize,
+        parts: Parts,
+        x: &mut [T],
+        own: &Range<usize>,
+        workspace: &mut Workspace<T>,
+    ) {
+        let panel = self.panel(p);
+        let entries = self.factor.panels[p].as_slice();
+        let (width, height, count) = (panel.width, panel.height(), self.count);
+        let Workspace { outside, sides } = workspace;
+        sides.clear();
+        for side in 0..count {
+            let own_unknowns = x[(panel.start - own.start) * count..].iter().skip(side).step_by(count);
+            sides.extend(own_unknowns.take(width));
+            let rows = self.rows(p)[width..].iter();
+            sides.extend(rows.map(|&row| self.at(row as usize, x, own, outside)[side]));
+        }
+        let cut = parts == Parts::InParallel && entries.len() > LARGE_PANEL;
+        let block = Block { entries, height, first_row: 0, rows: if cut { width } else { height } };
+        let arch = pulp::Arch::new();
+        if cut {
+            let outer = below(block, width, height - width);
+            for values in sides.chunks_mut(2 * height) {
+                match values.len() / height {
+                    2 => {
+                        let (one, other) = values.split_at_mut(height);
+                        let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+                        let (y, parts) = ([&*y0, &*y1], x0.par_chunks_mut(PART_COLUMNS));
+                        let parts = parts.zip(x1.par_chunks_mut(PART_COLUMNS)).enumerate();
+                        parts.for_each(|(part, (x0, x1))| {
+                            let first = part * PART_COLUMNS;
+                            arch.dispatch(SubtractTransposed { block: outer, first, x: [x0, x1], y });
+                        });
+                    }
+                    _ => {
+                        let (x, y) = values.split_at_mut(width);
+                        let (y, parts) = ([&*y], x.par_chunks_mut(PART_COLUMNS).enumerate());
+                        parts.for_each(|(part, x)| {
+                            let first = part * PART_COLUMNS;
+                            arch.dispatch(SubtractTransposed { block: outer, first, x: [x], y });
+                        });
+                    }
+                }
+            }
+        }
+        by_pairs(
+            sides,
+            height,
+            |x| arch.dispatch(Backward { block, x: x.map(|x| &mut x[..block.rows]) }),
+            |x| arch.dispatch(Backward { block, x: x.map(|x| &mut x[..block.rows]) }),
+        );
+        for (side, values) in sides.chunks_exact(height).enumerate() {
+            let own_unknowns = x[(panel.start - own.start) * count..].iter_mut().skip(side).step_by(count);
+            own_unknowns.zip(&values[..width]).for_each(|(x, &solved)| *x = solved);
+        }
+    }
+}
+
+/// Other rows of the same columns.
+fn below<T>(block: Block<'_, T>, first_row: usize, rows: usize) -> Block<'_, T> {
+    Block { first_row, rows, ..block }
+}

@@ -1,0 +1,226 @@
+//! The matrix of the field problem in one finite-element space: equation numbers, pattern, assembly.
+//!
+//! All of it follows from topology, conditions and from where ψ is defined, and is made once; the values come from a
+//! [`WeakForm`] of any frequency above zero, or of statics.
+
+use fluxmorph_geometry::fem::{
+    BlockPattern, BoundGroup, Coupling, CsrMatrix, ElementGroup, LocalMatrix, c64,
+};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+
+use crate::boundary::Boundary;
+use crate::element::lagrange::Lagrange;
+use crate::error::SolverError;
+use crate::framed::Framed;
+use crate::linear::aggregation;
+use crate::prolongation::{ScalarSpace, prolongation};
+use crate::space::{Order, Space};
+use crate::unknowns::{PSI, Unknowns};
+use crate::weak_form::WeakForm;
+
+/// A finite-element space with its unknowns and the pattern of their matrix.
+#[derive(Debug)]
+pub(crate) struct Discretisation {
+    pub(crate) space: Space,
+    pub(crate) unknowns: Unknowns,
+    pub(crate) pattern: BlockPattern<4>,
+    groups: Groups,
+    /// Elements and surface triangles with a node whose `A` is prescribed.
+    lifted: (Vec<ElementId>, Vec<usize>),
+}
+
+/// Elements and surface triangles bound to the pattern, by order.
+#[derive(Debug)]
+enum Groups {
+    Linear { tets: BoundGroup<4>, triangles: BoundGroup<3> },
+    Quadratic { tets: BoundGroup<10>, triangles: BoundGroup<6> },
+}
+
+impl Discretisation {
+    /// Numbers the unknowns of the given order and finds their couplings.
+    ///
+    /// # Errors
+    /// As [`Unknowns::new`].
+    pub(crate) fn new(
+        mesh: &Mesh,
+        order: Order,
+        weak_form: &WeakForm,
+        boundaries: &[(String, Boundary)],
+    ) -> Result<Self, SolverError> {
+        let topology = mesh.topology();
+        let space = Space::new(topology, order);
+        let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), boundaries)?;
+        let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
+        let couplings = topology
+            .elements()
+            .map(|e| {
+                let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
+                let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
+                if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
+            })
+            .collect();
+        let (pattern, groups) = pattern(&space, &unknowns, couplings, weak_form.triangles());
+        let lifted = lifted(mesh, &space, &unknowns, weak_form.triangles());
+        Ok(Self { space, unknowns, pattern, groups, lifted })
+    }
+
+    /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones conductors in full and
+    /// aggregates elsewhere, by the couplings of `matrix`.
+    ///
+    /// # Errors
+    /// As [`Unknowns::new`].
+    pub(crate) fn prolongation(
+        &self,
+        mesh: &Mesh,
+        weak_form: &WeakForm,
+        boundaries: &[(String, Boundary)],
+        matrix: &CsrMatrix<c64>,
+    ) -> Result<CsrMatrix<f64>, SolverError> {
+        let conductor = conductor(weak_form);
+        if self.space.order() == Order::Quadratic {
+            let vertices = Space::new(mesh.topology(), Order::Linear);
+            let coarse = Unknowns::new(mesh, &vertices, &conductor, boundaries)?;
+            return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
+        }
+        let mut conducts = vec![false; self.space.node_count()];
+        for node in conductor.iter().flat_map(|&e| self.space.nodes_of(e)) {
+            conducts[node.index()] = true;
+        }
+        let kept = |node: NodeId| conducts[node.index()];
+        Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
+    }
+
+    /// Assembles the matrix on a mesh with this topology.
+    pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
+        let mut matrix = CsrMatrix::zeros(self.pattern.structure());
+        let values = &mut matrix.values;
+        match &self.groups {
+            Groups::Linear { tets, triangles } => {
+                self.add_group(tets, values, |e| weak_form.linear_tet(mesh, e));
+                self.add_group(triangles, values, |t| {
+                    weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, t.index())
+                });
+            }
+            Groups::Quadratic { tets, triangles } => {
+                self.add_group(tets, values, |e| weak_form.quadratic_tet(mesh, e));
+                self.add_group(triangles, values, |t| {
+                    weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, t.index())
+                });
+            }
+        }
+        matrix
+    }
+
+    /// Assembles one group, turned into the frames of the nodes where some have their own.
+    fn add_group<const N: usize, L: LocalMatrix<c64, N, 4>>(
+        &self,
+        group: &BoundGroup<N>,
+        values: &mut [c64],
+        matrix: impl Fn(ElementId) -> L + Sync,
+    ) {
+        if self.unknowns.has_frames() {
+            self.pattern.assemble(group, values, |e| {
+                Framed::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
+            });
+        } else {
+            self.pattern.assemble(group, values, matrix);
+        }
+    }
+
+    /// `f −= K A_prescribed`: what the prescribed part of `A` does to the load.
+    pub(crate) fn lift(&self, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
+        let (elements, triangles) = &self.lifted;
+        match &self.groups {
+            Groups::Linear { triangles: bound, .. } => {
+                for &e in elements {
+                    self.subtract_lift(self.space.nodes_of(e), &weak_form.linear_tet(mesh, e), load);
+                }
+                for &t in triangles {
+                    let matrix = weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, t);
+                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, load);
+                }
+            }
+            Groups::Quadratic { triangles: bound, .. } => {
+                for &e in elements {
+                    self.subtract_lift(self.space.nodes_of(e), &weak_form.quadratic_tet(mesh, e), load);
+                }
+                for &t in triangles {
+                    let matrix = weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, t);
+                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, load);
+                }
+            }
+        }
+    }
+
+    /// `f −= K A_prescribed` for one element.
+    fn subtract_lift<const N: usize>(
+        &self,
+        nodes: &[NodeId],
+        matrix: &impl LocalMatrix<c64, N, 4>,
+        load: &mut [c64],
+    ) {
+        for (b, &from) in nodes.iter().enumerate() {
+            let Some(potential) = self.unknowns.prescribed_at(from) else { continue };
+            for (a, &to) in nodes.iter().enumerate() {
+                let block = matrix.block(a, b);
+                let row = |i: usize| -> c64 { (0..3).map(|j| -block[i][j] * potential[j]).sum() };
+                self.unknowns.scatter_add(load, to, [row(0), row(1), row(2), row(PSI)]);
+            }
+        }
+    }
+}
+
+/// Elements in which eddy currents flow, ascending.
+fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
+    weak_form.topology().elements().filter(|&e| weak_form.conducts(e)).collect()
+}
+
+/// The pattern of the system, and its elements and triangles bound to it.
+fn pattern(
+    space: &Space,
+    unknowns: &Unknowns,
+    couplings: Vec<Coupling>,
+    triangles: &[[NodeId; 3]],
+) -> (BlockPattern<4>, Groups) {
+    let surface_couplings = vec![Coupling::full(3); triangles.len()];
+    let count = space.node_count();
+    match (space.linear_tets(), space.quadratic_tets()) {
+        (Some(tets), _) => {
+            let volumes = ElementGroup::new(count, tets.to_vec(), couplings);
+            let faces = ElementGroup::new(count, triangles.to_vec(), surface_couplings);
+            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
+            (pattern, groups)
+        }
+        (None, tets) => {
+            let volumes = ElementGroup::new(count, tets.unwrap_or_default().to_vec(), couplings);
+            let triangles = triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
+            let faces = ElementGroup::new(count, triangles, surface_couplings);
+            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let groups = Groups::Quadratic { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
+            (pattern, groups)
+        }
+    }
+}
+
+/// Elements and surface triangles with a node whose `A` is prescribed, ascending.
+fn lifted(
+    mesh: &Mesh,
+    space: &Space,
+    unknowns: &Unknowns,
+    triangles: &[[NodeId; 3]],
+) -> (Vec<ElementId>, Vec<usize>) {
+    let mut prescribed = vec![false; space.node_count()];
+    for n in unknowns.prescribed_nodes() {
+        prescribed[n.index()] = true;
+    }
+    let touches = |nodes: &[NodeId]| nodes.iter().any(|n| prescribed[n.index()]);
+    let elements = mesh.topology().elements().filter(|&e| touches(space.nodes_of(e))).collect();
+    let triangles = (0..triangles.len()).filter(|&t| touches(&space.triangle(triangles[t]))).collect();
+    (elements, triangles)
+}
+
+/// ψ with itself and with every component of `A`.
+fn with_psi() -> Coupling {
+    (0..4).fold(Coupling::NONE, |set, i| set.with(i, PSI).with(PSI, i))
+}

@@ -1,0 +1,216 @@
+//! What the methods need of the pattern alone: orderings and symbolic factors, made when first asked for; and the choice of
+//! the method by size.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fluxmorph_geometry::MeshError;
+use fluxmorph_geometry::fem::csr::CsrStructure;
+use fluxmorph_geometry::fem::{IncompleteAnalysis, LdltAnalysis, ordering};
+
+use super::SystemPattern;
+use super::cost::{Costs, Service, Sizes, typical_iterations};
+use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method};
+use super::two_level::{self, TwoLevelAnalysis};
+use crate::error::SolverError;
+use crate::space::Order;
+
+/// Orderings and symbolic factors of one pattern, and the method for it.
+#[derive(Debug)]
+pub struct SystemAnalysis {
+    pub(super) settings: LinearSolverSettings,
+    field: FieldKind,
+    order: Order,
+    structure: Arc<CsrStructure>,
+    method: Method,
+    /// Once made; the cause where it cannot be.
+    complete: Mutex<Option<Result<Arc<LdltAnalysis>, String>>>,
+    /// Where it is the method.
+    incomplete: Option<Arc<IncompleteAnalysis>>,
+    /// Where it is the method.
+    two_level: Option<Arc<TwoLevelAnalysis>>,
+}
+
+impl SystemAnalysis {
+    /// Chooses the method for a pattern, which takes a symbolic factor.
+    ///
+    /// # Errors
+    /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
+    pub(crate) fn new(
+        pattern: SystemPattern<'_>,
+        (field, order): (FieldKind, Order),
+        settings: LinearSolverSettings,
+    ) -> Result<Self, SolverError> {
+        let mut analysis = Self {
+            settings,
+            field,
+            order,
+            structure: Arc::clone(pattern.structure),
+            method: Method::Incomplete,
+            complete: Mutex::default(),
+            incomplete: None,
+            two_level: None,
+        };
+        analysis.method = match settings.method {
+            LinearSolver::Fixed(method) => method,
+            LinearSolver::Automatic => {
+                let factor = analysis.cheapest_factor()?;
+                let unknowns = pattern.structure.row_count();
+                match factor {
+                    Some((method, _)) if unknowns < TWO_LEVELS_FROM => method,
+                    factor => analysis.two_levels_or(factor, &pattern)?,
+                }
+            }
+        };
+        let reference = || (pattern.reference)();
+        match analysis.method {
+            Method::Incomplete => analysis.incomplete = Some(two_level::incomplete_analysis(&reference())),
+            Method::TwoLevel if analysis.two_level.is_none() => {
+                analysis.two_level = Some(two_levels(&pattern)?);
+            }
+            _ => {}
+        }
+        if !analysis.method.is_complete() {
+            // What was made to compare with may be as large as the matrix.
+            analysis.complete = Mutex::default();
+        }
+        Ok(analysis)
+    }
+
+    /// Two levels where they are cheaper than the cheapest factor, and fit; without either, the incomplete factor.
+    fn two_levels_or(
+        &mut self,
+        factor: Option<(Method, f64)>,
+        pattern: &SystemPattern<'_>,
+    ) -> Result<Method, SolverError> {
+        // A coarse level that cannot be made is none.
+        self.two_level = two_levels(pattern).ok();
+        let fits = self.two_level.is_some() && self.fits(Method::TwoLevel);
+        let cost = if fits { self.cost_of_design(Method::TwoLevel)? } else { f64::INFINITY };
+        match factor {
+            Some((method, least)) if least <= cost => {
+                self.two_level = None;
+                Ok(method)
+            }
+            _ if fits => Ok(Method::TwoLevel),
+            _ => {
+                self.two_level = None;
+                Ok(Method::Incomplete)
+            }
+        }
+    }
+
+    /// The method that solutions begin with.
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Bytes that a solution needs: the matrix and the preconditioner.
+    ///
+    /// # Errors
+    /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
+    pub fn memory_estimate(&self) -> Result<usize, SolverError> {
+        let matrix = self.structure.columns.len() * MATRIX_ENTRY_BYTES;
+        Ok(matrix + self.preconditioner_bytes(self.method)?)
+    }
+
+    /// The cheapest factor that fits, and its cost.
+    fn cheapest_factor(&self) -> Result<Option<(Method, f64)>, MeshError> {
+        let factors: &[Method] = match self.field {
+            FieldKind::Static => &[Method::RealFactorSingle],
+            FieldKind::Harmonic => &[Method::DirectSingle, Method::RealFactorSingle],
+        };
+        let mut best: Option<(Method, f64)> = None;
+        for &method in factors.iter().filter(|&&method| self.fits(method)) {
+            let cost = self.cost_of_design(method)?;
+            if best.is_none_or(|(_, least)| cost < least) {
+                best = Some((method, cost));
+            }
+        }
+        Ok(best)
+    }
+
+    fn cost_of_design(&self, method: Method) -> Result<f64, MeshError> {
+        let service =
+            Service::typical(method, self.settings.reuse, self.typical_iterations(method), self.field);
+        Ok(self.costs(method)?.of_design(service))
+    }
+
+    /// Whether the preconditioner of a method stays within the settings' bytes; not where it cannot be made at all.
+    pub(super) fn fits(&self, method: Method) -> bool {
+        self.preconditioner_bytes(method).is_ok_and(|bytes| bytes <= self.settings.factor_bytes)
+    }
+
+    fn preconditioner_bytes(&self, method: Method) -> Result<usize, MeshError> {
+        let entries = |bytes: usize| Ok(self.complete()?.factor_entries() * bytes);
+        match method {
+            Method::Direct => entries(16),
+            Method::DirectSingle | Method::RealFactor => entries(8),
+            Method::RealFactorSingle => entries(4),
+            // Half of the matrix, a single-precision value and a column each.
+            Method::Incomplete => Ok(self.structure.columns.len() / 2 * 12),
+            Method::TwoLevel => Ok(self.two_level.as_ref().map_or(0, |levels| levels.bytes())),
+        }
+    }
+
+    /// Costs of a method on this pattern.
+    pub(super) fn costs(&self, method: Method) -> Result<Costs, MeshError> {
+        let mut sizes = Sizes { matrix_entries: self.structure.columns.len(), ..Sizes::default() };
+        match (method, &self.two_level) {
+            (Method::Incomplete, _) => Ok(Costs::incomplete(&sizes)),
+            (Method::TwoLevel, levels) => {
+                let coarse = levels.as_ref().map_or(Sizes::default(), |levels| levels.coarse_sizes());
+                Ok(Costs::two_level(&sizes, Costs::complete(Method::DirectSingle, &coarse)))
+            }
+            _ => {
+                let complete = self.complete()?;
+                sizes.factor_entries = complete.factor_entries();
+                sizes.multiplications = complete.multiplications();
+                Ok(Costs::complete(method, &sizes))
+            }
+        }
+    }
+
+    /// Iterations to expect of a method with a factor of the matrix itself.
+    pub(super) fn typical_iterations(&self, method: Method) -> usize {
+        typical_iterations(method, self.field, self.order, self.structure.row_count())
+    }
+
+    /// Ordering and symbolic factor.
+    ///
+    /// # Errors
+    /// [`MeshError::Factorisation`] when it does not fit.
+    pub(super) fn complete(&self) -> Result<Arc<LdltAnalysis>, MeshError> {
+        let mut held = self.complete.lock().unwrap_or_else(PoisonError::into_inner);
+        let analysis = held.get_or_insert_with(|| {
+            // On the graph of the matrix, not of the mesh: components that do not couple are graphs of their own.
+            let order = ordering::dissection(&self.structure);
+            LdltAnalysis::new(&self.structure, order).map_err(|error| error.to_string())
+        });
+        analysis
+            .clone()
+            .map_err(|cause| MeshError::Factorisation { unknowns: self.structure.row_count(), cause })
+    }
+
+    /// Order and parts of the incomplete factor, where that is the method.
+    pub(super) fn incomplete(&self) -> Option<&Arc<IncompleteAnalysis>> {
+        self.incomplete.as_ref()
+    }
+
+    /// Both levels, where that is the method.
+    pub(super) fn two_level(&self) -> Option<&Arc<TwoLevelAnalysis>> {
+        self.two_level.as_ref()
+    }
+}
+
+/// Analyses both levels of the matrix on the reference mesh.
+fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, SolverError> {
+    let matrix = (pattern.reference)();
+    let prolongation = (pattern.prolongation)(&matrix)?;
+    Ok(TwoLevelAnalysis::new(&matrix, prolongation)?)
+}
+
+/// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper.
+const TWO_LEVELS_FROM: usize = 60_000;
+
+/// A complex value and its column.
+const MATRIX_ENTRY_BYTES: usize = 20;

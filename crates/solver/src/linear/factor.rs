@@ -1,0 +1,153 @@
+//! A factor as a preconditioner: symmetric diagonal scaling, and the conversion of residuals to the factor's numbers.
+//!
+//! The scaled matrix `S K S` has diagonal entries of modulus one, so that single precision has room at both ends. A complex
+//! factor takes a residual as one column, a real one (of `Re K + Im K`) its real and imaginary parts as two.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::MeshError;
+use fluxmorph_geometry::fem::{CsrMatrix, FactorScalar, Incomplete, Ldlt, LdltAnalysis, c32, c64, norm};
+use rayon::prelude::*;
+
+/// A preconditioner: `z = M⁻¹ r` with complex symmetric `M`.
+pub(super) trait Precondition: std::fmt::Debug + Send + Sync {
+    /// Overwrites `z` with `M⁻¹ r`.
+    fn apply(&self, r: &[c64], z: &mut [c64]);
+
+    /// Bytes held.
+    fn bytes(&self) -> usize;
+}
+
+/// How a complex system is represented in the numbers of a factor.
+pub(super) trait Representation: FactorScalar + 'static {
+    /// The entry of the factored matrix for an entry of `K`.
+    fn of_entry(entry: c64) -> Self;
+
+    /// Columns of right sides for `factor · s_i r_i`.
+    fn columns(r: &[c64], scale: &[f64], factor: f64) -> Vec<Self>;
+
+    /// `z_i = s_i x_i / factor` of the solved columns.
+    fn read(columns: &[Self], scale: &[f64], factor: f64, z: &mut [c64]);
+}
+
+macro_rules! complex_representation {
+    ($complex:ty, $real:ty) => {
+        impl Representation for $complex {
+            fn of_entry(entry: c64) -> Self {
+                Self::new(entry.re as $real, entry.im as $real)
+            }
+
+            fn columns(r: &[c64], scale: &[f64], factor: f64) -> Vec<Self> {
+                r.iter().zip(scale).map(|(&r, s)| Self::of_entry(r * (s * factor))).collect()
+            }
+
+            fn read(columns: &[Self], scale: &[f64], factor: f64, z: &mut [c64]) {
+                for ((z, x), s) in z.iter_mut().zip(columns).zip(scale) {
+                    *z = c64::new(f64::from(x.re), f64::from(x.im)) * (s / factor);
+                }
+            }
+        }
+    };
+}
+
+macro_rules! real_representation {
+    ($real:ty) => {
+        impl Representation for $real {
+            fn of_entry(entry: c64) -> Self {
+                (entry.re + entry.im) as $real
+            }
+
+            fn columns(r: &[c64], scale: &[f64], factor: f64) -> Vec<Self> {
+                let mut columns = Vec::with_capacity(2 * r.len());
+                columns.extend(r.iter().zip(scale).map(|(r, s)| (r.re * (s * factor)) as $real));
+                columns.extend(r.iter().zip(scale).map(|(r, s)| (r.im * (s * factor)) as $real));
+                columns
+            }
+
+            fn read(columns: &[Self], scale: &[f64], factor: f64, z: &mut [c64]) {
+                let (re, im) = columns.split_at(z.len());
+                for (((z, &re), &im), s) in z.iter_mut().zip(re).zip(im).zip(scale) {
+                    *z = c64::new(f64::from(re), f64::from(im)) * (s / factor);
+                }
+            }
+        }
+    };
+}
+
+complex_representation!(c64, f64);
+complex_representation!(c32, f32);
+real_representation!(f64);
+real_representation!(f32);
+
+/// A factor of the scaled matrix.
+#[derive(Debug)]
+pub(super) struct Scaled<T> {
+    scale: Vec<f64>,
+    factor: Ldlt<T>,
+}
+
+impl<T: Representation> Scaled<T> {
+    /// The complete factor.
+    pub(super) fn complete(analysis: &Arc<LdltAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
+        let scale = scaling(matrix)?;
+        let factor = Ldlt::new(analysis, |row, k| scaled_entry(matrix, &scale, row, k))?;
+        Ok(Self { scale, factor })
+    }
+}
+
+impl<T: Representation> Precondition for Scaled<T> {
+    fn apply(&self, r: &[c64], z: &mut [c64]) {
+        let factor = magnification(r);
+        let mut columns = T::columns(r, &self.scale, factor);
+        self.factor.solve_in_place(&mut columns);
+        T::read(&columns, &self.scale, factor, z);
+    }
+
+    fn bytes(&self) -> usize {
+        self.factor.bytes() + size_of_val(self.scale.as_slice())
+    }
+}
+
+/// An incomplete factor: it scales the matrix itself.
+#[derive(Debug)]
+pub(super) struct Unscaled(pub(super) Incomplete<c32>);
+
+impl Precondition for Unscaled {
+    fn apply(&self, r: &[c64], z: &mut [c64]) {
+        let factor = magnification(r);
+        let mut column: Vec<c32> = r.par_iter().map(|r| c32::of_entry(r * factor)).collect();
+        self.0.solve_in_place(&mut column);
+        z.par_iter_mut().zip(&column).for_each(|(z, x)| {
+            *z = c64::new(f64::from(x.re), f64::from(x.im)) / factor;
+        });
+    }
+
+    fn bytes(&self) -> usize {
+        self.0.bytes()
+    }
+}
+
+/// What brings a residual to norm one: at the end of an iteration it is far below what single precision can hold.
+fn magnification(r: &[c64]) -> f64 {
+    let size = norm(r);
+    if size > 0.0 && size.is_finite() { 1.0 / size } else { 1.0 }
+}
+
+fn scaled_entry<T: Representation>(matrix: &CsrMatrix<c64>, scale: &[f64], row: usize, k: usize) -> T {
+    T::of_entry(matrix.values[k] * (scale[row] * scale[matrix.structure.columns[k] as usize]))
+}
+
+/// `1/√(Re k_ii + Im k_ii)`.
+fn scaling(matrix: &CsrMatrix<c64>) -> Result<Vec<f64>, MeshError> {
+    let n = matrix.structure.row_count();
+    let failed = |row: usize, value: f64| MeshError::Factorisation {
+        unknowns: n,
+        cause: format!("the diagonal entry of unknown {row} is {value}, not positive"),
+    };
+    let of = |row: usize| {
+        let diagonal = matrix.entry(row, row).unwrap_or_default();
+        let sum = diagonal.re + diagonal.im;
+        if sum > 0.0 && sum.is_finite() { Ok(1.0 / sum.sqrt()) } else { Err(failed(row, sum)) }
+    };
+    (0..n).map(of).collect()
+}

@@ -1,0 +1,334 @@
+//! One matrix with its preconditioner: solutions, and what is done when one does not come.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::{CsrMatrix, c64, norm};
+
+use super::analysis::SystemAnalysis;
+use super::cost::Ledger;
+use super::memory::{Held, SolverMemory};
+use super::method::{Method, Reuse};
+use super::preconditioner::Preconditioner;
+use super::{LinearSolverReport, cocg};
+use crate::error::SolverError;
+
+/// Iterations after which the speed of an iteration can be judged.
+const TRIAL: usize = 3;
+
+/// Solutions of a design of which nothing is known: state and adjoint.
+const USUAL_SOLUTIONS: usize = 2;
+
+/// Something that the solver did beside solving.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SolverEvent {
+    /// A method failed and a more robust one took its place.
+    FellBack {
+        /// The method that failed.
+        from: Method,
+        /// The one taken.
+        to: Method,
+        /// What happened.
+        cause: String,
+    },
+}
+
+impl std::fmt::Display for SolverEvent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self::FellBack { from, to, cause } = self;
+        write!(f, "linear solver: `{}` failed ({cause}); `{}` is taken", from.name(), to.name())
+    }
+}
+
+/// Whose factor the preconditioner is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Origin {
+    /// This matrix's.
+    Own,
+    /// That of an earlier mesh or another frequency.
+    Earlier,
+}
+
+/// A matrix ready to be solved with, for any number of right sides.
+#[derive(Debug)]
+pub struct PreparedSystem {
+    analysis: Arc<SystemAnalysis>,
+    matrix: CsrMatrix<c64>,
+    /// None only while another is made: two at a time would take twice the memory.
+    preconditioner: Option<Arc<Preconditioner>>,
+    origin: Origin,
+    ledger: Ledger,
+    /// Iterations and solutions with this preconditioner alone.
+    served: (usize, usize),
+    /// Solutions of the design before, and of this one.
+    before: Vec<Vec<c64>>,
+    solutions: Vec<Vec<c64>>,
+    events: Vec<SolverEvent>,
+}
+
+/// How one run of iterations ended.
+enum Attempt {
+    /// With the true relative residual.
+    Ended(f64),
+    /// A factor of this matrix is cheaper.
+    TooSlow,
+}
+
+impl PreparedSystem {
+    /// Prepares the method for a matrix with the analysed pattern, and takes from `memory` what pays.
+    ///
+    /// # Errors
+    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular (see its message).
+    pub(crate) fn new(
+        analysis: &Arc<SystemAnalysis>,
+        matrix: CsrMatrix<c64>,
+        memory: &mut SolverMemory,
+    ) -> Result<Self, SolverError> {
+        let SolverMemory { held, method, solutions: before } = std::mem::take(memory);
+        let reuse = analysis.settings.reuse == Reuse::WhileItPays;
+        let pays = |held: &Held| {
+            let may = reuse && held.preconditioner.method.is_complete();
+            may && Arc::ptr_eq(&held.analysis, analysis) && held.ledger.pays()
+        };
+        let mut events = Vec::new();
+        let (preconditioner, origin, ledger) = match held.filter(pays) {
+            Some(Held { preconditioner, ledger, .. }) => (preconditioner, Origin::Earlier, ledger),
+            None => {
+                let first = method.unwrap_or(analysis.method());
+                let (own, ledger) = factored(analysis, &matrix, first, &mut events)?;
+                (own, Origin::Own, ledger)
+            }
+        };
+        Ok(Self {
+            analysis: Arc::clone(analysis),
+            matrix,
+            preconditioner: Some(preconditioner),
+            origin,
+            ledger,
+            served: (0, 0),
+            before: if reuse { before } else { Vec::new() },
+            solutions: Vec::new(),
+            events,
+        })
+    }
+
+    /// The matrix.
+    pub fn matrix(&self) -> &CsrMatrix<c64> {
+        &self.matrix
+    }
+
+    /// The method in use.
+    pub fn method(&self) -> Method {
+        self.preconditioner().method
+    }
+
+    /// Bytes of the preconditioner.
+    pub fn preconditioner_bytes(&self) -> usize {
+        self.preconditioner().bytes()
+    }
+
+    fn preconditioner(&self) -> &Preconditioner {
+        self.preconditioner.as_ref().expect("a system that failed to be refreshed is not used again")
+    }
+
+    /// What the solver did beside solving.
+    pub fn events(&self) -> &[SolverEvent] {
+        &self.events
+    }
+
+    /// What the next design may start from.
+    pub fn into_memory(mut self) -> SolverMemory {
+        let method = self.preconditioner.as_ref().map(|p| p.method).filter(|&m| m != self.analysis.method());
+        if self.analysis.settings.reuse == Reuse::Never {
+            return SolverMemory { method, ..SolverMemory::default() };
+        }
+        let (iterations, solutions) = self.served;
+        self.ledger.enter(iterations, solutions);
+        let held = |preconditioner| Held { analysis: self.analysis, preconditioner, ledger: self.ledger };
+        // The others are made for one matrix, and cheap beside their iterations.
+        let kept = self.preconditioner.filter(|preconditioner| preconditioner.method.is_complete());
+        SolverMemory { held: kept.map(held), method, solutions: self.solutions }
+    }
+
+    /// Solves `K x = b`.
+    ///
+    /// # Errors
+    /// [`SolverError::NotConverged`] when the true residual stays above the required one with every method that there is
+    /// memory for, [`SolverError::NotFinite`] for a right side with a value that is not finite.
+    pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let scale = norm(right_side);
+        if !scale.is_finite() {
+            return Err(SolverError::NotFinite { what: "norm of the right side", value: scale });
+        }
+        if scale == 0.0 {
+            let x = vec![c64::default(); right_side.len()];
+            self.solutions.push(x.clone());
+            return Ok((x, LinearSolverReport { iterations: 0, residual: 0.0 }));
+        }
+        let mut x = self.start(right_side, scale);
+        let mut report = LinearSolverReport { iterations: 0, residual: f64::INFINITY };
+        loop {
+            let before = report.iterations;
+            let ended = self.attempt(right_side, scale, &mut x, &mut report.iterations);
+            if let Attempt::Ended(residual) = ended
+                && residual <= self.analysis.settings.required
+            {
+                report.residual = residual;
+                self.served.0 += report.iterations - before;
+                self.served.1 += 1;
+                break;
+            }
+            match ended {
+                _ if self.origin == Origin::Earlier => self.refresh(self.method())?,
+                Attempt::Ended(residual) => {
+                    report.residual = residual;
+                    self.fall_back(&report)?;
+                }
+                Attempt::TooSlow => unreachable!("an own factor is never too slow"),
+            }
+            // What a failed iteration leaves may be farther from the solution than zero, or no number.
+            let left = self.residual(right_side, &x);
+            if left.is_nan() || left >= scale {
+                x.fill(c64::default());
+            }
+        }
+        self.solutions.push(x.clone());
+        Ok((x, report))
+    }
+
+    /// The solution of the design before where it is nearer than zero.
+    fn start(&mut self, right_side: &[c64], scale: f64) -> Vec<c64> {
+        let position = self.solutions.len();
+        match self.before.get_mut(position).map(std::mem::take) {
+            Some(x) if x.len() == right_side.len() && self.residual(right_side, &x) < scale => x,
+            _ => vec![c64::default(); right_side.len()],
+        }
+    }
+
+    /// Iterates until the tolerance, or until there is nothing more to be had.
+    fn attempt(&self, right_side: &[c64], scale: f64, x: &mut [c64], iterations: &mut usize) -> Attempt {
+        let settings = &self.analysis.settings;
+        let method = self.method();
+        let most = settings.max_iterations.unwrap_or(10 * self.analysis.typical_iterations(method).max(30));
+        let target = settings.tolerance * scale;
+        let (mut done, mut residual) = (0, f64::INFINITY);
+        let (mut least, mut is_slow) = (f64::INFINITY, false);
+        // The residual of the recurrence drifts from the true one: restart from the true one where they part.
+        while done < most {
+            self.preconditioner().start(&self.matrix, right_side, x);
+            let start = self.residual(right_side, x);
+            let outcome = cocg::solve(
+                &self.matrix,
+                right_side,
+                x,
+                |r, z| self.preconditioner().apply(&self.matrix, r, z),
+                target,
+                most - done,
+                |count, now| {
+                    // Residuals of this iteration do not fall steadily.
+                    least = now.min(least);
+                    is_slow = self.is_too_slow(done + count, count, start, least, target);
+                    is_slow
+                },
+            );
+            done += outcome.iterations;
+            *iterations += outcome.iterations;
+            if is_slow {
+                return Attempt::TooSlow;
+            }
+            let before = residual;
+            residual = self.residual(right_side, x) / scale;
+            let settled = residual <= settings.required || outcome.iterations == 0;
+            if settled || !residual.is_finite() || residual > 0.1 * before {
+                break;
+            }
+        }
+        Attempt::Ended(residual)
+    }
+
+    /// Whether an earlier factor costs more than one of this matrix would, judged by the speed so far.
+    fn is_too_slow(&self, done: usize, count: usize, start: f64, now: f64, target: f64) -> bool {
+        if self.origin == Origin::Own || count < TRIAL || now <= target {
+            return false;
+        }
+        let digits = (start / now).ln();
+        if digits <= 0.0 && count < 3 * TRIAL {
+            return false;
+        }
+        // Without any progress by then the projection is without end.
+        let total = if digits > 0.0 { (start / target).ln() / digits * count as f64 } else { f64::INFINITY };
+        let of_this = (done - count) as f64 + total;
+        let solutions = self.before.len().max(USUAL_SOLUTIONS).max(self.solutions.len() + 1);
+        let rest = solutions - self.served.1;
+        self.ledger.is_exceeded_by(self.served.0 as f64 + of_this * rest as f64, solutions)
+    }
+
+    /// Takes a factor of this matrix.
+    fn refresh(&mut self, method: Method) -> Result<(), SolverError> {
+        self.preconditioner = None;
+        let (own, ledger) = factored(&self.analysis, &self.matrix, method, &mut self.events)?;
+        self.preconditioner = Some(own);
+        self.ledger = ledger;
+        self.served = (0, 0);
+        self.origin = Origin::Own;
+        Ok(())
+    }
+
+    /// Takes the next more robust method, if there is one and it fits.
+    fn fall_back(&mut self, report: &LinearSolverReport) -> Result<(), SolverError> {
+        let LinearSolverReport { residual, iterations } = *report;
+        let settings = &self.analysis.settings;
+        let from = self.method();
+        let Some(to) = next(&self.analysis, from) else {
+            let cause = if residual.is_finite() {
+                "the mesh may hold nearly flat elements, or the material data span too many orders of magnitude; more \
+                 memory for a factor may help (analysis.linear_solver.factor_gib)"
+            } else {
+                "the iteration broke down; a coefficient or coordinate is not finite"
+            };
+            let required = settings.required;
+            return Err(SolverError::NotConverged { residual, required, iterations, cause });
+        };
+        let cause = format!("relative residual {residual:.1e} after {iterations} iterations");
+        self.events.push(SolverEvent::FellBack { from, to, cause });
+        self.refresh(to)
+    }
+
+    /// `|b − K x|`.
+    fn residual(&self, right_side: &[c64], x: &[c64]) -> f64 {
+        let mut r = vec![c64::default(); x.len()];
+        self.matrix.mul(x, &mut r);
+        for (r, b) in r.iter_mut().zip(right_side) {
+            *r = b - *r;
+        }
+        norm(&r)
+    }
+}
+
+/// The preconditioner of a method, or of the first more robust one that can be made.
+fn factored(
+    analysis: &SystemAnalysis,
+    matrix: &CsrMatrix<c64>,
+    method: Method,
+    events: &mut Vec<SolverEvent>,
+) -> Result<(Arc<Preconditioner>, Ledger), SolverError> {
+    let mut method = method;
+    loop {
+        match Preconditioner::new(analysis, matrix, method) {
+            Ok(own) => {
+                let ledger = Ledger::new(own.costs, analysis.typical_iterations(method));
+                return Ok((Arc::new(own), ledger));
+            }
+            Err(error) => {
+                let Some(to) = next(analysis, method) else { return Err(error.into()) };
+                events.push(SolverEvent::FellBack { from: method, to, cause: error.to_string() });
+                method = to;
+            }
+        }
+    }
+}
+
+/// The next more robust method that fits.
+fn next(analysis: &SystemAnalysis, method: Method) -> Option<Method> {
+    std::iter::successors(method.more_robust(), |method| method.more_robust())
+        .find(|&method| analysis.fits(method))
+}

@@ -1,0 +1,182 @@
+//! A transfer between two levels: prolongation, restriction, and the Galerkin product `Pᵀ K P`.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::csr::CsrStructure;
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use rayon::prelude::*;
+
+/// Rows per parallel task.
+const ROWS: usize = 1024;
+
+/// A prolongation `P`, shape `(n_fine, n_coarse)`, and its transpose.
+#[derive(Debug)]
+pub(crate) struct Transfer {
+    prolongation: CsrMatrix<f64>,
+    restriction: CsrMatrix<f64>,
+}
+
+impl Transfer {
+    /// The transfer of a prolongation.
+    pub(crate) fn new(prolongation: CsrMatrix<f64>) -> Self {
+        let restriction = transposed(&prolongation);
+        Self { prolongation, restriction }
+    }
+
+    /// Unknowns of the coarse level.
+    pub(crate) fn coarse_count(&self) -> usize {
+        self.prolongation.structure.column_count
+    }
+
+    /// Memory held [bytes].
+    pub(crate) fn bytes(&self) -> usize {
+        let of = |m: &CsrMatrix<f64>| m.values.len() * 12 + m.structure.row_starts.len() * 4;
+        of(&self.prolongation) + of(&self.restriction)
+    }
+
+    /// `Pᵀ r`.
+    pub(crate) fn restricted(&self, r: &[c64]) -> Vec<c64> {
+        let mut coarse = vec![c64::default(); self.coarse_count()];
+        self.restriction.mul(r, &mut coarse);
+        coarse
+    }
+
+    /// `z += P x`.
+    pub(crate) fn add_prolonged(&self, x: &[c64], z: &mut [c64]) {
+        let CsrMatrix { structure, values } = &self.prolongation;
+        z.par_chunks_mut(ROWS).enumerate().for_each(|(task, rows)| {
+            for (i, z) in rows.iter_mut().enumerate() {
+                let range = structure.row(task * ROWS + i);
+                let columns = &structure.columns[range.clone()];
+                for (&weight, &c) in values[range].iter().zip(columns) {
+                    *z += x[c as usize] * weight;
+                }
+            }
+        });
+    }
+
+    /// The structure of `Pᵀ K P` for a matrix with the structure `fine`.
+    pub(crate) fn coarse_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
+        let (p, r) = (&self.prolongation.structure, &self.restriction.structure);
+        let columns_of = |seen: &mut Vec<u32>, row: usize| {
+            let mut found = Vec::new();
+            for &f in &r.columns[r.row(row)] {
+                for &g in &fine.columns[fine.row(f as usize)] {
+                    for &c in &p.columns[p.row(g as usize)] {
+                        if seen[c as usize] != row as u32 {
+                            seen[c as usize] = row as u32;
+                            found.push(c);
+                        }
+                    }
+                }
+            }
+            found.sort_unstable();
+            found
+        };
+        let count = r.row_count();
+        let rows: Vec<Vec<u32>> = (0..count)
+            .into_par_iter()
+            .with_min_len(ROWS)
+            .map_init(|| vec![u32::MAX; count], columns_of)
+            .collect();
+        let mut row_starts = vec![0u32];
+        let mut columns = Vec::with_capacity(rows.iter().map(Vec::len).sum());
+        for row in rows {
+            columns.extend(row);
+            row_starts.push(columns.len() as u32);
+        }
+        Arc::new(CsrStructure { column_count: count, row_starts, columns })
+    }
+
+    /// `Pᵀ K P`, with the structure of [`Self::coarse_structure`]; every entry is summed in the order of the fine rows.
+    pub(crate) fn coarse_matrix(
+        &self,
+        structure: &Arc<CsrStructure>,
+        fine: &CsrMatrix<c64>,
+    ) -> CsrMatrix<c64> {
+        let (p, r) = (&self.prolongation, &self.restriction);
+        let mut coarse = CsrMatrix::zeros(structure);
+        let mut rest = coarse.values.as_mut_slice();
+        let mut rows = Vec::with_capacity(structure.row_count());
+        for row in 0..structure.row_count() {
+            let (own, others) = rest.split_at_mut(structure.row(row).len());
+            rest = others;
+            rows.push(own);
+        }
+        let add_row = |place: &mut Vec<u32>, (row, values): (usize, &mut [c64])| {
+            for (k, &c) in structure.columns[structure.row(row)].iter().enumerate() {
+                place[c as usize] = k as u32;
+            }
+            let terms = r.structure.row(row);
+            for (&weight, &f) in r.values[terms.clone()].iter().zip(&r.structure.columns[terms]) {
+                for k in fine.structure.row(f as usize) {
+                    let value = fine.values[k] * weight;
+                    let parents = p.structure.row(fine.structure.columns[k] as usize);
+                    for (&w, &c) in p.values[parents.clone()].iter().zip(&p.structure.columns[parents]) {
+                        values[place[c as usize] as usize] += value * w;
+                    }
+                }
+            }
+        };
+        rows.into_par_iter()
+            .enumerate()
+            .with_min_len(ROWS)
+            .for_each_init(|| vec![0u32; structure.row_count()], add_row);
+        coarse
+    }
+}
+
+fn transposed(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {
+    let structure = &matrix.structure;
+    let mut row_starts = vec![0u32; structure.column_count + 1];
+    for &c in &structure.columns {
+        row_starts[c as usize + 1] += 1;
+    }
+    for c in 0..structure.column_count {
+        row_starts[c + 1] += row_starts[c];
+    }
+    let mut next = row_starts.clone();
+    let mut columns = vec![0u32; structure.columns.len()];
+    let mut values = vec![0.0; structure.columns.len()];
+    for row in 0..structure.row_count() {
+        for k in structure.row(row) {
+            let place = &mut next[structure.columns[k] as usize];
+            columns[*place as usize] = row as u32;
+            values[*place as usize] = matrix.values[k];
+            *place += 1;
+        }
+    }
+    let structure = CsrStructure { column_count: structure.row_count(), row_starts, columns };
+    CsrMatrix { structure: Arc::new(structure), values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `P` joins the unknowns 0, 1 and 2, 3 of a tridiagonal matrix `(−1, 2 + j, −1)`, the second of each with weight 1/2.
+    #[test]
+    fn the_galerkin_product_is_that_of_dense_matrices() {
+        let structure = Arc::new(CsrStructure {
+            column_count: 4,
+            row_starts: vec![0, 2, 5, 8, 10],
+            columns: vec![0, 1, 0, 1, 2, 1, 2, 3, 2, 3],
+        });
+        let diagonal = |k: usize| [0, 3, 6, 9].contains(&k);
+        let entry = |k| if diagonal(k) { c64::new(2.0, 1.0) } else { c64::new(-1.0, 0.0) };
+        let fine = CsrMatrix { structure, values: (0..10).map(entry).collect() };
+        let p = CsrStructure { column_count: 2, row_starts: (0..5).collect(), columns: vec![0, 0, 1, 1] };
+        let transfer = Transfer::new(CsrMatrix { structure: Arc::new(p), values: vec![1.0, 0.5, 1.0, 0.5] });
+        let structure = transfer.coarse_structure(&fine.structure);
+        let coarse = transfer.coarse_matrix(&structure, &fine);
+        // (2 + j)(1 + 1/4) − 2/2, and −1/2 across.
+        assert_eq!(coarse.entry(0, 0), Some(c64::new(1.5, 1.25)));
+        assert_eq!(coarse.entry(1, 1), Some(c64::new(1.5, 1.25)));
+        assert_eq!(coarse.entry(0, 1), Some(c64::new(-0.5, 0.0)));
+        assert_eq!(coarse.entry(1, 0), coarse.entry(0, 1));
+        let mut z = vec![c64::default(); 4];
+        transfer.add_prolonged(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
+        assert_eq!(z[1], c64::new(0.5, 0.0));
+        assert_eq!(transfer.restricted(&z)[1], c64::new(0.0, 2.5));
+    }
+}

@@ -1,0 +1,89 @@
+//! The two-level preconditioner on skin-graded meshes of the shield: its iterations hardly grow, its bits do not depend on the threads.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::{ShieldParameters, shield};
+use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
+use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, Order};
+
+/// The shipped shield, coarser.
+fn mesh(refinement: f64) -> Mesh {
+    let parameters = ShieldParameters {
+        refinement,
+        skin: vec![0.3e-3, 0.8e-3, 1.6e-3, 3e-3, 5e-3],
+        side_skin: vec![0.5e-3, 1.5e-3, 4e-3, 10e-3],
+        side_air: 4e-3,
+        growth: 1.8,
+        ..ShieldParameters::default()
+    };
+    shield(&parameters).expect("a sound shield")
+}
+
+fn model(mesh: &Mesh, order: Order) -> FieldModel {
+    let method = LinearSolver::Fixed(Method::TwoLevel);
+    let steel = Material { relative_permeability: 800.0, conductivity: 7e6 };
+    let names = mesh.topology().region_names();
+    let shape =
+        Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a racetrack");
+    let setup = FieldModelSetup {
+        frequency: 60.0,
+        order,
+        linear_solver: LinearSolverSettings { method, ..LinearSolverSettings::default() },
+        materials: names.iter().map(|name| if name == "plate" { steel } else { Material::AIR }).collect(),
+        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(40e3, 0.0), shape: shape.into() }],
+        boundaries: ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+            .map(|surface| (surface.to_owned(), Boundary::FluxParallel))
+            .to_vec(),
+        ..FieldModelSetup::default()
+    };
+    FieldModel::new(mesh, setup).expect("a sound problem")
+}
+
+/// Iterations and unknowns of the state on one mesh.
+fn solved(mesh: &Mesh, order: Order) -> (usize, usize) {
+    let model = model(mesh, order);
+    let (field, system) = model.solve(mesh).expect("it converges");
+    assert_eq!(system.method(), Method::TwoLevel, "{:?}", system.events());
+    let report = field.report();
+    println!(
+        "{} unknowns: {} iterations, residual {:.1e}",
+        model.unknown_count(),
+        report.iterations,
+        report.residual
+    );
+    // The recurrence ends at 1e-11; the true residual drifts by the rounding of some tens of products.
+    assert!(report.residual < 3e-11, "{:e}", report.residual);
+    (report.iterations, model.unknown_count())
+}
+
+fn hardly_grows(order: Order, refinements: [f64; 3], most: usize) {
+    let counts = refinements.map(|refinement| solved(&mesh(refinement), order).0);
+    assert!(counts.iter().all(|&count| count <= most), "{counts:?}");
+    assert!(counts[2] <= counts[0] + counts[0] / 2, "{counts:?}");
+}
+
+/// The incomplete factor alone needs more than five hundred iterations on the largest of these meshes.
+#[test]
+fn the_iterations_of_linear_elements_hardly_grow_with_the_mesh() {
+    hardly_grows(Order::Linear, [0.25, 0.5, 0.75], 60);
+}
+
+/// Flat elements are hard for the smoother: about 300 iterations, but not more on finer meshes.
+#[test]
+#[ignore = "minutes: just test-long"]
+fn the_iterations_of_quadratic_elements_hardly_grow_with_the_mesh() {
+    hardly_grows(Order::Quadratic, [0.25, 0.4, 0.5], 350);
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_threads() {
+    let mesh = mesh(0.25);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| model(&mesh, Order::Linear).solve(&mesh).expect("it converges").0.values().to_vec())
+    };
+    let one = on(1);
+    assert_eq!(on(2), one);
+    assert_eq!(on(4), one);
+}
