@@ -8,7 +8,7 @@ use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{IncompleteAnalysis, LdltAnalysis, ordering};
 
 use super::SystemPattern;
-use super::cost::{Costs, Service, Sizes, typical_iterations};
+use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method};
 use super::two_level::{self, TwoLevelAnalysis};
 use crate::error::SolverError;
@@ -109,7 +109,7 @@ impl SystemAnalysis {
     /// # Errors
     /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
     pub fn memory_estimate(&self) -> Result<usize, SolverError> {
-        let matrix = self.structure.columns.len() * MATRIX_ENTRY_BYTES;
+        let matrix = self.structure.columns.len() * MATRIX_ENTRY;
         Ok(matrix + self.preconditioner_bytes(self.method)?)
     }
 
@@ -146,8 +146,7 @@ impl SystemAnalysis {
             Method::Direct => entries(16),
             Method::DirectSingle | Method::RealFactor => entries(8),
             Method::RealFactorSingle => entries(4),
-            // Half of the matrix, a single-precision value and a column each.
-            Method::Incomplete => Ok(self.structure.columns.len() / 2 * 12),
+            Method::Incomplete => Ok(self.structure.columns.len() / 2 * SINGLE_ENTRY),
             Method::TwoLevel => Ok(self.two_level.as_ref().map_or(0, |levels| levels.bytes())),
         }
     }
@@ -211,6 +210,3 @@ fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, Solv
 
 /// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper.
 const TWO_LEVELS_FROM: usize = 60_000;
-
-/// A complex value and its column.
-const MATRIX_ENTRY_BYTES: usize = 20;

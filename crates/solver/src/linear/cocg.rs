@@ -16,7 +16,8 @@ pub struct Outcome {
 /// Improves `x` until the recurrence's residual norm is at most `target`.
 ///
 /// `precondition(r, z)` overwrites `z` with an approximation of `K⁻¹ r`; it must be fixed, and complex symmetric up to
-/// rounding. Stops early where a bilinear product vanishes (breakdown), and where `stop(iterations, residual norm)` says so.
+/// rounding. Stops early where a bilinear product vanishes (breakdown), and where `stop(iterations, residual norm)`, asked
+/// before each iteration, says so.
 pub fn solve(
     matrix: &CsrMatrix<c64>,
     right_side: &[c64],
@@ -39,7 +40,7 @@ pub fn solve(
     let mut rho = c64::new(1.0, 0.0);
     let mut size = norm(&residual);
     let mut iterations = 0;
-    while iterations < max_iterations && size > target && !(iterations > 0 && stop(iterations, size)) {
+    while iterations < max_iterations && size > target && !stop(iterations, size) {
         precondition(&residual, &mut preconditioned);
         let (zr, zq) = (dot(&preconditioned, &residual), dot(&preconditioned, &image));
         let beta = -alpha * zq / rho;

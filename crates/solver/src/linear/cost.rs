@@ -10,10 +10,10 @@ use crate::space::Order;
 const BYTE: f64 = 0.15;
 
 /// Bytes that a matrix entry takes: a complex number and its column.
-const MATRIX_ENTRY: f64 = 20.0;
+pub(super) const MATRIX_ENTRY: usize = 20;
 
 /// Bytes of an entry of an incomplete factor: a single-precision complex number and its column.
-const SINGLE_ENTRY: f64 = 12.0;
+pub(super) const SINGLE_ENTRY: usize = 12;
 
 /// Nanoseconds of an incomplete factorisation an entry of its lower half.
 const ELIMINATION: f64 = 100.0;
@@ -32,7 +32,7 @@ pub(crate) struct Sizes {
 impl Sizes {
     /// Cost of a product with the matrix [ns].
     fn product(&self) -> f64 {
-        self.matrix_entries as f64 * MATRIX_ENTRY * BYTE
+        (self.matrix_entries * MATRIX_ENTRY) as f64 * BYTE
     }
 }
 
@@ -66,7 +66,10 @@ impl Costs {
     /// Costs of an incomplete factor: the lower half in single precision, streamed twice.
     pub(crate) fn incomplete(sizes: &Sizes) -> Self {
         let half = 0.5 * sizes.matrix_entries as f64;
-        Self { factor: ELIMINATION * half, iteration: sizes.product() + 2.0 * half * SINGLE_ENTRY * BYTE }
+        Self {
+            factor: ELIMINATION * half,
+            iteration: sizes.product() + 2.0 * half * SINGLE_ENTRY as f64 * BYTE,
+        }
     }
 
     /// Costs of two levels: two products, a sweep of the incomplete factor, a solution with the coarse one.

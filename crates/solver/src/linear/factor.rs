@@ -6,7 +6,9 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::MeshError;
-use fluxmorph_geometry::fem::{CsrMatrix, FactorScalar, Incomplete, Ldlt, LdltAnalysis, c32, c64, norm};
+use fluxmorph_geometry::fem::{
+    CsrMatrix, FactorScalar, Incomplete, IncompleteAnalysis, Ldlt, LdltAnalysis, c32, c64, norm,
+};
 use rayon::prelude::*;
 
 /// A preconditioner: `z = M⁻¹ r` with complex symmetric `M`.
@@ -110,7 +112,22 @@ impl<T: Representation> Precondition for Scaled<T> {
 
 /// An incomplete factor: it scales the matrix itself.
 #[derive(Debug)]
-pub(super) struct Unscaled(pub(super) Incomplete<c32>);
+pub(super) struct Unscaled(Incomplete<c32>);
+
+impl Unscaled {
+    /// The incomplete factor of a matrix whose diagonal is multiplied by `diagonal_factor` first.
+    ///
+    /// # Errors
+    /// As [`Incomplete::new`].
+    pub(super) fn new(
+        analysis: &Arc<IncompleteAnalysis>,
+        matrix: &CsrMatrix<c64>,
+        diagonal_factor: f64,
+    ) -> Result<Self, MeshError> {
+        let entry = |_: usize, k: usize| c32::of_entry(matrix.values[k]);
+        Ok(Self(Incomplete::new(analysis, entry, diagonal_factor)?))
+    }
+}
 
 impl Precondition for Unscaled {
     fn apply(&self, r: &[c64], z: &mut [c64]) {

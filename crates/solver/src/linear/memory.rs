@@ -30,11 +30,6 @@ pub(super) struct Held {
 }
 
 impl SolverMemory {
-    /// Whether nothing is remembered.
-    pub fn is_empty(&self) -> bool {
-        self.held.is_none()
-    }
-
     /// What may serve the same design at another frequency: the preconditioner, as far as the patterns are the same.
     pub fn lent(&self) -> Self {
         Self { held: self.held.clone(), method: self.method, solutions: Vec::new() }

@@ -1,11 +1,11 @@
 //! Making the preconditioner of a method for a matrix.
 
 use fluxmorph_geometry::MeshError;
-use fluxmorph_geometry::fem::{CsrMatrix, Incomplete, c32, c64};
+use fluxmorph_geometry::fem::{CsrMatrix, c32, c64};
 
 use super::analysis::SystemAnalysis;
 use super::cost::Costs;
-use super::factor::{Precondition, Representation, Scaled, Unscaled};
+use super::factor::{Precondition, Scaled, Unscaled};
 use super::method::Method;
 use super::two_level::TwoLevel;
 
@@ -85,8 +85,7 @@ fn factor(
         Method::RealFactorSingle => Box::new(Scaled::<f32>::complete(&analysis.complete()?, fine)?),
         Method::Incomplete | Method::TwoLevel => {
             let parts = analysis.incomplete().ok_or_else(|| missing(fine, method))?;
-            let entry = |_: usize, k: usize| c32::of_entry(fine.values[k]);
-            Box::new(Unscaled(Incomplete::new(parts, entry, DIAGONAL_FACTOR)?))
+            Box::new(Unscaled::new(parts, fine, DIAGONAL_FACTOR)?)
         }
     })
 }

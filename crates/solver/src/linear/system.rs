@@ -215,7 +215,7 @@ impl PreparedSystem {
         // The residual of the recurrence drifts from the true one: restart from the true one where they part.
         while done < most {
             self.preconditioner().start(&self.matrix, right_side, x);
-            let start = self.residual(right_side, x);
+            let mut start = f64::INFINITY;
             let outcome = cocg::solve(
                 &self.matrix,
                 right_side,
@@ -224,6 +224,9 @@ impl PreparedSystem {
                 target,
                 most - done,
                 |count, now| {
+                    if count == 0 {
+                        start = now;
+                    }
                     // Residuals of this iteration do not fall steadily.
                     least = now.min(least);
                     is_slow = self.is_too_slow(done + count, count, start, least, target);

@@ -16,12 +16,11 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{
-    CsrMatrix, Incomplete, IncompleteAnalysis, Ldlt, LdltAnalysis, c32, c64, norm, ordering,
-};
+use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, c32, c64, ordering};
 use rayon::prelude::*;
 
 use super::cost::Sizes;
+use super::factor::{Precondition, Scaled, Unscaled};
 use super::transfer::Transfer;
 
 /// Rows per parallel task.
@@ -85,10 +84,8 @@ pub(super) fn incomplete_analysis(matrix: &CsrMatrix<c64>) -> Arc<IncompleteAnal
 #[derive(Debug)]
 pub(super) struct TwoLevel {
     analysis: Arc<TwoLevelAnalysis>,
-    smoother: Incomplete<c32>,
-    coarse: Ldlt<c32>,
-    /// `1/√|c_ii|` of the coarse matrix.
-    scale: Vec<f64>,
+    smoother: Unscaled,
+    coarse: Scaled<c32>,
 }
 
 impl TwoLevel {
@@ -98,19 +95,14 @@ impl TwoLevel {
     /// [`MeshError::Factorisation`] when a factorisation fails.
     pub(super) fn new(analysis: &Arc<TwoLevelAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
         let coarse = analysis.transfer.coarse_matrix(&analysis.structure, matrix);
-        let scale: Vec<f64> = diagonal(&coarse).into_iter().map(|modulus| 1.0 / modulus.sqrt()).collect();
-        let columns = &analysis.structure.columns;
-        let coarse = Ldlt::new(&analysis.coarse, |row, k| {
-            narrow(coarse.values[k] * (scale[row] * scale[columns[k] as usize]))
-        })?;
-        let entry = |_: usize, k: usize| narrow(matrix.values[k]);
-        let smoother = Incomplete::new(&analysis.incomplete, entry, DIAGONAL_FACTOR)?;
-        Ok(Self { analysis: Arc::clone(analysis), smoother, coarse, scale })
+        let coarse = Scaled::complete(&analysis.coarse, &coarse)?;
+        let smoother = Unscaled::new(&analysis.incomplete, matrix, DIAGONAL_FACTOR)?;
+        Ok(Self { analysis: Arc::clone(analysis), smoother, coarse })
     }
 
     /// Memory of both factors [bytes].
     pub(super) fn bytes(&self) -> usize {
-        self.smoother.bytes() + self.coarse.bytes() + size_of_val(self.scale.as_slice())
+        self.smoother.bytes() + self.coarse.bytes()
     }
 
     /// Moves `x` so that the residual `b − K x` has no coarse part: where a deflated iteration starts.
@@ -123,56 +115,19 @@ impl TwoLevel {
     /// Overwrites `z` with `M⁻¹ r`; `matrix` is the one that is solved with.
     pub(super) fn apply(&self, matrix: &CsrMatrix<c64>, r: &[c64], z: &mut [c64]) {
         let mut rest = vec![c64::default(); r.len()];
-        z.fill(c64::default());
-        self.smooth(r, z);
+        self.smoother.apply(r, z);
         residual(matrix, r, z, &mut rest);
         self.correct(&rest, z);
-    }
-
-    /// `z += S r`.
-    fn smooth(&self, r: &[c64], z: &mut [c64]) {
-        // A residual at the end of an iteration is far below what single precision can hold.
-        let size = size(r);
-        let factor = 1.0 / size;
-        let mut x = vec![c32::default(); r.len()];
-        x.par_chunks_mut(ROWS).zip(r.par_chunks(ROWS)).for_each(|(x, r)| {
-            x.iter_mut().zip(r).for_each(|(x, r)| *x = narrow(r * factor));
-        });
-        self.smoother.solve_in_place(&mut x);
-        z.par_chunks_mut(ROWS).zip(x.par_chunks(ROWS)).for_each(|(z, x)| {
-            z.iter_mut().zip(x).for_each(|(z, x)| *z += wide(*x) * size);
-        });
     }
 
     /// `z += Q r`.
     fn correct(&self, r: &[c64], z: &mut [c64]) {
         let transfer = &self.analysis.transfer;
-        let mut coarse = transfer.restricted(r);
-        let size = size(&coarse);
-        let factor = 1.0 / size;
-        let mut x: Vec<c32> = coarse.iter().zip(&self.scale).map(|(r, s)| narrow(r * (s * factor))).collect();
-        self.coarse.solve_in_place(&mut x);
-        for ((coarse, x), s) in coarse.iter_mut().zip(&x).zip(&self.scale) {
-            *coarse = wide(*x) * (s * size);
-        }
+        let restricted = transfer.restricted(r);
+        let mut coarse = vec![c64::default(); restricted.len()];
+        self.coarse.apply(&restricted, &mut coarse);
         transfer.add_prolonged(&coarse, z);
     }
-}
-
-/// The norm, or one where there is none to divide by.
-fn size(r: &[c64]) -> f64 {
-    let size = norm(r);
-    if size > 0.0 && size.is_finite() { size } else { 1.0 }
-}
-
-#[inline]
-fn narrow(z: c64) -> c32 {
-    c32::new(z.re as f32, z.im as f32)
-}
-
-#[inline]
-fn wide(z: c32) -> c64 {
-    c64::new(f64::from(z.re), f64::from(z.im))
 }
 
 /// Moduli of the diagonal entries.
