@@ -7,8 +7,9 @@ use fluxmorph_geometry::io::read_vtu;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, Source};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::output::{OlderRun, RunResult};
+use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::session::{self, Options};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
@@ -18,8 +19,8 @@ use support::{config, repository, setup};
 struct Rows(Vec<Evaluation>);
 
 impl Recorder for Rows {
-    fn record(&mut self, row: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
-        self.0.push(row.clone());
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.0.push(record.row.clone());
         Ok(())
     }
 }
@@ -192,7 +193,9 @@ fn a_run_at_two_frequencies_writes_both() {
     ];
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     let (config, source) = config("shield_two_frequencies.toml", &overrides);
-    let options = Options { older_run: OlderRun::Keep, threads: 1, interrupted: &|| false };
+    let disk = system_disk();
+    let older_run = OlderRun::Keep;
+    let options = Options { disk: &disk, older_run, threads: 1, interrupted: &|| false };
     let result: RunResult =
         session::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);

@@ -11,6 +11,7 @@ use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::fresh_mesh::{Gain, Shapes};
+use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
@@ -150,8 +151,8 @@ fn one_element_through_the_plate_warns() {
 struct Rows(Vec<Evaluation>);
 
 impl Recorder for Rows {
-    fn record(&mut self, row: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
-        self.0.push(row.clone());
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.0.push(record.row.clone());
         Ok(())
     }
 }

@@ -11,6 +11,7 @@ mod support;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Recorder, optimise};
+use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
@@ -50,8 +51,8 @@ struct End {
 struct Worst(f64);
 
 impl Recorder for Worst {
-    fn record(&mut self, row: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
-        self.0 = self.0.min(row.worst_quality);
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.0 = self.0.min(record.row.worst_quality);
         Ok(())
     }
 }

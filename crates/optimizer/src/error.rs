@@ -1,5 +1,7 @@
 //! What can go wrong in a command, and its exit code.
 
+use std::path::PathBuf;
+
 use fluxmorph_geometry::MeshError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
@@ -8,6 +10,7 @@ use crate::cli::ExitCode;
 use crate::config::ConfigError;
 use crate::design::Apart;
 use crate::geometric::GeometricError;
+use crate::journal::Mismatch;
 use crate::output::{DesignFileError, OutputError};
 
 /// Errors of this crate.
@@ -78,6 +81,33 @@ pub enum Error {
         /// Which of its tests fails.
         cause: String,
     },
+    /// A journal belongs to another run.
+    #[error("the journal `{}` is not that of this run: {cause}", path.display())]
+    OtherRun {
+        /// The journal.
+        path: PathBuf,
+        /// The first difference.
+        cause: Mismatch,
+    },
+    /// The run takes another way than its journal says.
+    #[error(
+        "evaluation {evaluation} of the journal does not answer what the optimisation asks for: {cause}; go on with the \
+         program and on the processor that the run was started with, or start it again"
+    )]
+    Replay {
+        /// The evaluation.
+        evaluation: usize,
+        /// What differs.
+        cause: String,
+    },
+    /// A run directory that there is nothing to go on with in.
+    #[error("`{}` cannot be resumed: {cause}", path.display())]
+    NotResumable {
+        /// The directory.
+        path: PathBuf,
+        /// Why, and what to do.
+        cause: String,
+    },
     /// A pool of threads cannot be made.
     #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
     Threads {
@@ -89,6 +119,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether a run that ends with this error can be gone on with once its cause is mended.
+    pub fn leaves_a_run(&self) -> bool {
+        match self {
+            Self::Output(error) => matches!(error, OutputError::Io { .. }),
+            other => other.exit_code() == ExitCode::Numerical,
+        }
+    }
+
     /// The exit code of a command that fails with this error.
     pub fn exit_code(&self) -> ExitCode {
         match self {
@@ -106,8 +144,11 @@ impl Error {
             Self::Solver(SolverError::NotConverged { .. } | SolverError::NotFinite { .. })
             | Self::Remesh(RemeshError::NotConverged { .. })
             | Self::Optimisation { .. }
+            | Self::Replay { .. }
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
+            | Self::OtherRun { .. }
+            | Self::NotResumable { .. }
             | Self::DesignUnreached { .. }
             | Self::FirstDesign { .. }
             | Self::Apart(_)

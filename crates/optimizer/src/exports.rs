@@ -9,7 +9,7 @@ use fluxmorph_geometry::{Mesh, MeshError};
 use crate::config::{Config, LengthUnit};
 use crate::error::Error;
 use crate::observer::Observer;
-use crate::output::{RunDirectory, surface_files, write_atomic};
+use crate::output::{RunDirectory, surface_files};
 use crate::setup::mesh;
 
 /// Largest mesh written as text, which people can read and compare: about 25 MB. Beyond, bytes are read faster.
@@ -30,7 +30,7 @@ pub(crate) fn write(
     let unit = mesh::unit(config);
     if config.output.mesh {
         match optimum(mesh, unit) {
-            Ok(bytes) => write_atomic(&directory.optimum(), &bytes)?,
+            Ok(bytes) => directory.write(&directory.optimum(), &bytes)?,
             Err(error) => observer.warning(&format!("the mesh of the optimum is not written: {error}")),
         }
     }
@@ -43,7 +43,7 @@ pub(crate) fn write(
             continue;
         }
         match stl_bytes(mesh, triangles, unit.metres()) {
-            Ok(bytes) => write_atomic(&directory.surface(&file), &bytes)?,
+            Ok(bytes) => directory.write(&directory.surface(&file), &bytes)?,
             Err(error) => observer.warning(&format!("the surface `{name}` is not written: {error}")),
         }
     }

@@ -14,6 +14,7 @@ mod exports;
 pub mod fields;
 pub mod fresh_mesh;
 pub mod geometric;
+pub mod journal;
 pub mod memory;
 pub mod morph;
 pub mod objective;

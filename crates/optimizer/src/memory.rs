@@ -1,6 +1,6 @@
 //! What the linear solvers of all states remember from one design to the next.
 
-use fluxmorph_solver::linear::{PreparedSystem, SolverMemory};
+use fluxmorph_solver::linear::{Method, PreparedSystem, SolverMemory};
 
 /// Factors and solutions of the design before, by state.
 ///
@@ -25,6 +25,16 @@ impl Memory {
     /// With it an evaluation is a smooth function of the design, as differences need.
     pub fn lent(&self) -> Self {
         Self { states: self.states.iter().map(SolverMemory::lent).collect() }
+    }
+
+    /// The methods that worked last, by state; `None` where it is the first one of the ladder.
+    pub fn methods(&self) -> Vec<Option<Method>> {
+        self.states.iter().map(SolverMemory::method).collect()
+    }
+
+    /// A memory of nothing but methods, by state.
+    pub fn with_methods(methods: &[Option<Method>]) -> Self {
+        Self { states: methods.iter().map(|&method| SolverMemory::with_method(method)).collect() }
     }
 
     /// Keeps what a solved system leaves.

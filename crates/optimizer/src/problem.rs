@@ -347,14 +347,18 @@ impl Shape {
         self.surface.displacement(p)
     }
 
-    /// The round that begins at an analysed design.
+    /// The round that begins at a design: `reference` is its mesh, `displacement` that of every node from the undeformed
+    /// one [m].
     ///
     /// # Errors
     /// As [`Motion::rebased`].
-    pub fn next_round(&self, p: &[f64], analysis: &Analysis) -> Result<Motion, RemeshError> {
-        let Analysis { mesh, displacement, .. } = analysis;
-        let policy = self.motion.policy();
-        self.motion.rebased(mesh.clone(), displacement.clone(), self.displacement(p), policy)
+    pub fn next_round(
+        &self,
+        p: &[f64],
+        reference: Mesh,
+        displacement: Vec<Point>,
+    ) -> Result<Motion, RemeshError> {
+        self.motion.rebased(reference, displacement, self.displacement(p), self.motion.policy())
     }
 
     /// dF/dp from dF/dx at the nodes, shape `(n_nodes, 3)`.

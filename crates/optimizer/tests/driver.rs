@@ -6,6 +6,7 @@ use std::path::Path;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Algorithm, Config, Optimizer};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Observer, Silent};
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
@@ -23,8 +24,8 @@ fn quick() -> (Problem, Optimizer) {
 struct Rows(Vec<Evaluation>);
 
 impl Recorder for Rows {
-    fn record(&mut self, row: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
-        self.0.push(row.clone());
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.0.push(record.row.clone());
         Ok(())
     }
 }

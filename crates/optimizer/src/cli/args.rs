@@ -24,6 +24,8 @@ pub struct Cli {
 pub enum Command {
     /// Optimise, and write everything into the run directory
     Run(RunArgs),
+    /// Go on with a run that was interrupted or broken off, as if it had not been
+    Resume(ResumeArgs),
     /// One field analysis of the initial design, or of a given one
     Solve(SolveArgs),
     /// Move the mesh as [morph] prescribes, without a field; print the quality before and after
@@ -80,6 +82,34 @@ pub struct RunArgs {
     /// Longest time, such as "10 min" or 90 (seconds)
     #[arg(long, value_name = "DURATION", value_parser = duration)]
     pub max_time: Option<f64>,
+}
+
+/// Options of `resume`.
+#[derive(Debug, Args)]
+pub struct ResumeArgs {
+    /// The run directory
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+
+    /// Most evaluations of the objective, those of before counted in [default: as the run was started]
+    #[arg(long, value_name = "N", value_parser = evaluations)]
+    pub max_evaluations: Option<usize>,
+
+    /// Longest time from now, such as "10 min" or 90 (seconds) [default: as the run was started]
+    #[arg(long, value_name = "DURATION", value_parser = duration)]
+    pub max_time: Option<f64>,
+
+    /// Threads to use [default: all]; the results do not depend on it
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+
+    /// Show errors and warnings only
+    #[arg(long, short)]
+    pub quiet: bool,
+
+    /// Print the result as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Options of `solve`.

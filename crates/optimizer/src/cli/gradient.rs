@@ -3,6 +3,7 @@
 use super::args::GradientArgs;
 use super::exit::ExitCode;
 use super::{observer, stdout, with_threads};
+use crate::config::FactorReuse;
 use crate::error::Error;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up};
@@ -13,7 +14,9 @@ use crate::verify::{Certificate, Settings, certify_all};
 /// # Errors
 /// When the configuration or the numbers fail, and when the certificate does not hold.
 pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
-    let (config, source) = args.common.load()?;
+    let (mut config, source) = args.common.load()?;
+    // The differences are between designs so near to each other that one factor serves them all.
+    config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
     with_threads(args.common.threads, |_| {
         let mut observer = observer(args.common.quiet);
         observer.phase("setting up mesh and matrices");

@@ -1,12 +1,21 @@
-//! Signals: the first asks the run to end after the evaluation in hand, the second ends the process at once.
+//! Signals: the first asks the command to end after the work in hand, the second ends the process at once.
 
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use signal_hook::iterator::Signals;
 
 use super::ExitCode;
+
+/// What is shown at the first signal of a run.
+pub(super) const FINISHES_EVALUATION: &str =
+    "finishing the evaluation in hand, then saving; once more to leave at once";
+
+/// What is shown at the first signal of other commands.
+pub(super) const FINISHES_WORK: &str = "finishing the work in hand; once more to leave at once";
 
 /// Whether and which signal has come.
 pub(super) struct Signal {
@@ -24,8 +33,9 @@ impl Signal {
     }
 }
 
-/// Watches for Ctrl-C and SIGTERM. Where the system refuses a handler, its default (ending at once) stays.
-pub(super) fn watch() -> Signal {
+/// Watches for Ctrl-C and SIGTERM; `message` is shown when the first comes. Where the system refuses a handler, its default
+/// (ending at once) stays.
+pub(super) fn watch(message: &'static str) -> Signal {
     let number = Arc::new(AtomicUsize::new(0));
     let again = Arc::new(AtomicBool::new(false));
     for (signal, code) in [(SIGINT, ExitCode::Interrupted), (SIGTERM, ExitCode::Terminated)] {
@@ -33,6 +43,14 @@ pub(super) fn watch() -> Signal {
         let _ = flag::register_conditional_shutdown(signal, code as i32, Arc::clone(&again))
             .and_then(|_| flag::register_usize(signal, Arc::clone(&number), signal as usize))
             .and_then(|_| flag::register(signal, Arc::clone(&again)));
+    }
+    // A handler must not write; a thread of its own does, while the others compute.
+    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
+        std::thread::spawn(move || {
+            if signals.forever().next().is_some() {
+                let _ = writeln!(std::io::stderr(), "{message}");
+            }
+        });
     }
     Signal { number }
 }

@@ -35,6 +35,7 @@ pub fn main() -> std::process::ExitCode {
     };
     let outcome = match &cli.command {
         Command::Run(args) => run::run(args),
+        Command::Resume(args) => run::resume(args),
         Command::Solve(args) => solve::solve(args),
         Command::Morph(args) => morph::morph(args),
         Command::Check(args) => check::check(args),

@@ -5,7 +5,7 @@ use super::exit::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::morph::{self, Parameters};
-use crate::output::StopReason;
+use crate::output::{StopReason, system_disk};
 use crate::session::Options;
 
 /// Do what the command line says.
@@ -16,9 +16,11 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     let parameters = if args.tune { Parameters::Tuned } else { Parameters::Given };
     with_threads(args.common.threads, |threads| {
-        let signal = interrupt::watch();
+        let signal = interrupt::watch(interrupt::FINISHES_WORK);
         let interrupted = || signal.received().is_some();
-        let options = Options { older_run: args.common.older_run(), threads, interrupted: &interrupted };
+        let disk = system_disk();
+        let older_run = args.common.older_run();
+        let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
         let report = morph::morph(&config, &source, parameters, options, &mut *observer(args.common.quiet))?;
         if args.common.json {
             stdout::print_json(&report)?;

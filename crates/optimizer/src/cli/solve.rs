@@ -4,7 +4,7 @@ use super::args::SolveArgs;
 use super::exit::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
-use crate::output::read_design;
+use crate::output::{read_design, system_disk};
 use crate::session::{self, Options};
 use crate::setup::variable_count;
 
@@ -16,12 +16,14 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     with_threads(args.common.threads, |threads| {
         // A single analysis is finished and saved; then the signal decides the exit code.
-        let signal = interrupt::watch();
+        let signal = interrupt::watch(interrupt::FINISHES_WORK);
         let design = match &args.design {
             Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
             None => None,
         };
-        let options = Options { older_run: args.common.older_run(), threads, interrupted: &|| false };
+        let disk = system_disk();
+        let older_run = args.common.older_run();
+        let options = Options { disk: &disk, older_run, threads, interrupted: &|| false };
         let result = session::solve(&config, &source, design, options, &mut *observer(args.common.quiet))?;
         if args.common.json {
             stdout::print_json(&result)?;

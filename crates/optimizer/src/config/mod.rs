@@ -134,6 +134,21 @@ impl Config {
         read(path.display().to_string(), text, directory, &stem, overrides)
     }
 
+    /// Read again the text of a configuration that a run has saved: `name` stands for the file in messages, paths are
+    /// relative to `directory`, `stem` is the name of the file that it was read from, without extension.
+    ///
+    /// # Errors
+    /// All faults of the text at once.
+    pub fn again(
+        name: String,
+        text: String,
+        directory: PathBuf,
+        stem: &str,
+        overrides: &[String],
+    ) -> Result<(Self, Source), ConfigError> {
+        read(name, text, directory, stem, overrides)
+    }
+
     /// Read a text; `name` stands for the file in messages, and paths stay relative.
     ///
     /// # Errors

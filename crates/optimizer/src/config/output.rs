@@ -43,6 +43,12 @@ choice! {
     }
 }
 
+impl Default for Output {
+    fn default() -> Self {
+        Self::new(Path::new(""), "", &[])
+    }
+}
+
 impl Output {
     /// The defaults for a configuration called `stem` in a folder, with its design surfaces.
     pub(super) fn new(directory: &Path, stem: &str, surfaces: &[String]) -> Self {

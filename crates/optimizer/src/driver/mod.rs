@@ -12,6 +12,9 @@
 //!   the best design, towards the same bounds.
 //! * Where nothing was gained the ladder of [`rescue`](fluxmorph_remesh::rescue) is climbed: a smaller box, another
 //!   stiffness policy, smoothing of the interior. Then the run ends with [`StopReason::MeshLimit`] and the best design.
+//! * A run that was broken off goes on by being told again: the recorder recalls its evaluations, and as long as the method
+//!   asks for the same designs to the last bit, in the same rounds on the same meshes, they are the answers. The method is
+//!   then in the state that it was in. Anything else is an error.
 //! * Limits of evaluations and time are checked before each evaluation but the first, and a signal too: what was
 //!   computed is kept, and there always is a best design.
 
@@ -20,12 +23,13 @@ mod trust;
 
 use fluxmorph_remesh::Rung;
 
-use crate::algorithm::{self, Ending, Minimisation, Outcome, Sample};
+use crate::algorithm::{self, Ending, Minimisation, Outcome};
 use crate::cli::ExitCode;
 use crate::config::Optimizer;
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::observer::{Evaluation, Observer};
+use crate::journal::Record;
+use crate::observer::Observer;
 use crate::output::StopReason;
 use crate::problem::{Analysis, Problem, Timings};
 use crate::rounds::{RoundEvent, RoundKind};
@@ -51,19 +55,18 @@ const CAUTIOUS: usize = 3;
 /// How often an end after the cautious first step is not believed.
 const MAX_RENEWALS: usize = 3;
 
-/// Keeps what is computed.
+/// Keeps what is computed, and gives back what was kept before the run was broken off.
 pub trait Recorder {
-    /// An evaluation is complete; `improved` where it is the best so far.
+    /// The next evaluation kept before, in their order; `None` once all are told.
+    fn recall(&mut self) -> Option<Record> {
+        None
+    }
+
+    /// An evaluation is complete.
     ///
     /// # Errors
     /// When it cannot be kept: the run ends.
-    fn record(
-        &mut self,
-        row: &Evaluation,
-        analysis: &Analysis,
-        problem: &Problem,
-        improved: bool,
-    ) -> Result<(), Error>;
+    fn record(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error>;
 }
 
 /// Keeps nothing.
@@ -71,7 +74,7 @@ pub trait Recorder {
 pub struct Unrecorded;
 
 impl Recorder for Unrecorded {
-    fn record(&mut self, _: &Evaluation, _: &Analysis, _: &Problem, _: bool) -> Result<(), Error> {
+    fn record(&mut self, _: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
         Ok(())
     }
 }
@@ -89,10 +92,6 @@ pub struct Best {
     pub violation: f64,
     /// Its field.
     pub analysis: Analysis,
-    /// What the method was told of it.
-    pub(crate) sample: Sample,
-    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
-    pub(crate) round: usize,
 }
 
 /// How an optimisation went.

@@ -1,20 +1,22 @@
 //! One evaluation after another: limits, the mesh, objective and constraints, the row of the history, the best design.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fluxmorph_geometry::ElementId;
-use fluxmorph_remesh::{Moved, RemeshError};
+use fluxmorph_remesh::{Motion, Moved, RemeshError};
 
 use super::{Best, Optimised, Recorder, Stop};
 use crate::algorithm::{CONSTRAINT_TOLERANCE, Sample};
 use crate::config::Optimizer;
 use crate::constraint::Bound;
 use crate::error::Error;
+use crate::journal::{Record, reference_hash};
 use crate::memory::Memory;
 use crate::objective::Goal;
 use crate::observer::{Evaluation, Observer, column};
 use crate::output::{RunStatus, StopReason};
-use crate::problem::{Analysis, Problem, Shape, Timings, Want};
+use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Want};
 use crate::rounds::RoundEvent;
 
 /// What the first evaluation fixes for the rest of the run.
@@ -25,12 +27,50 @@ struct Initial {
     bounds: Vec<Bound>,
 }
 
+/// How a design stands beside the best before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Standing {
+    First,
+    Better,
+    /// In the place of the best one, whose mesh has changed.
+    Renewed,
+    Worse,
+}
+
+impl Standing {
+    fn is_improved(self) -> bool {
+        self != Self::Worse
+    }
+}
+
+/// What is known of the field of the best design.
+#[derive(Debug)]
+enum Field {
+    Computed(Analysis),
+    /// It was computed before the run was broken off, in this round.
+    Recalled(Box<Motion>),
+}
+
+/// The best design so far.
+#[derive(Debug)]
+pub(super) struct BestSoFar {
+    pub(super) evaluation: usize,
+    values: Vec<f64>,
+    pub(super) objective: f64,
+    pub(super) violation: f64,
+    /// What the method was told of it.
+    sample: Sample,
+    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
+    round: usize,
+    field: Field,
+}
+
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
     goal: Goal,
     settings: &'a Optimizer,
-    /// What the linear solvers remember of the design before.
+    /// What the linear solvers remember of the designs before: which methods work.
     memory: Memory,
     pub(super) observer: &'a mut dyn Observer,
     recorder: &'a mut dyn Recorder,
@@ -40,7 +80,9 @@ pub(super) struct Run<'a> {
     iterations: usize,
     initial: Option<Initial>,
     last: Vec<f64>,
-    pub(super) best: Option<Best>,
+    /// The record that the next design should be answered with.
+    next: Option<Record>,
+    pub(super) best: Option<BestSoFar>,
     /// The best design has another mesh now: the next evaluation takes its place.
     pub(super) best_is_stale: bool,
     worst_residual: f64,
@@ -73,6 +115,7 @@ impl<'a> Run<'a> {
             iterations: 0,
             initial: None,
             last,
+            next: None,
             best: None,
             best_is_stale: false,
             worst_residual: 0.0,
@@ -110,7 +153,16 @@ impl<'a> Run<'a> {
     /// Makes the mesh of the best design the reference.
     pub(super) fn stand_at_best(&mut self) -> Result<(), RemeshError> {
         let Some(best) = self.best.as_ref().filter(|_| !self.best_is_stale) else { return Ok(()) };
-        let motion = self.shape().next_round(&best.values, &best.analysis)?;
+        let shape = self.shape();
+        let motion = match &best.field {
+            Field::Computed(Analysis { mesh, displacement, .. }) => {
+                shape.next_round(&best.values, mesh.clone(), displacement.clone())?
+            }
+            Field::Recalled(motion) => {
+                let moved = motion.moved(&shape.displacement(&best.values))?;
+                shape.next_round(&best.values, moved.mesh, moved.displacement)?
+            }
+        };
         self.shape_mut().motion = motion;
         Ok(())
     }
@@ -128,7 +180,8 @@ impl<'a> Run<'a> {
 
     /// ±F/|F0| and the constraints of a design, with their gradients.
     ///
-    /// What is known of the best design in this round is not computed again.
+    /// What is known of the best design in this round is not computed again, nor what was computed before the run was
+    /// broken off.
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         let round = self.shape().motion.round();
         if let Some(best) = &self.best
@@ -137,29 +190,92 @@ impl<'a> Run<'a> {
         {
             return Ok(best.sample.clone());
         }
+        if self.next.is_none() {
+            self.next = self.recorder.recall();
+        }
+        match self.next.take() {
+            Some(record) if self.is_of(&record, p) => self.recall(record),
+            Some(record) => {
+                // A design that the mesh refused has left no record.
+                let difference = self.difference(&record, p);
+                self.next = Some(record);
+                self.mesh(p)?;
+                Err(Stop::Error(Box::new(difference)))
+            }
+            None => self.compute(p),
+        }
+    }
+
+    /// Whether a record is that of a design on this mesh, to the last bit.
+    fn is_of(&self, record: &Record, p: &[f64]) -> bool {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        record.row.evaluation == self.evaluations
+            && record.row.round == self.shape().motion.round()
+            && record.design.len() == p.len()
+            && record.design.iter().zip(p).all(same)
+            && record.reference == reference_hash(self.shape().motion.reference())
+    }
+
+    /// Why a record is not the answer to what the method asks for.
+    fn difference(&self, record: &Record, p: &[f64]) -> Error {
+        let Record { row, design, .. } = record;
+        let round = self.shape().motion.round();
+        let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
+        let cause = match differing {
+            _ if row.evaluation != self.evaluations => {
+                format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations)
+            }
+            _ if row.round != round => format!("it was in round {}, now the mesh is in {round}", row.round),
+            Some(k) => format!("variable {k} was {:e} m, now the method asks for {:e} m", design[k], p[k]),
+            None => "the reference mesh of its round is another one".to_owned(),
+        };
+        Error::Replay { evaluation: row.evaluation, cause }
+    }
+
+    /// The answer to a design that was computed before the run was broken off.
+    fn recall(&mut self, record: Record) -> Result<Sample, Stop> {
+        let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
+        let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
+        let sample = self.sample(&initial, &record);
+        let field = Field::Recalled(Box::new(self.shape().motion.clone()));
+        self.memory = Memory::with_methods(&record.methods);
+        let standing = self.standing(record.row.objective, &sample);
+        if standing.is_improved() != record.improved
+            || self.iterations_after(standing) != record.row.iteration
+        {
+            let (evaluation, cause) = (record.row.evaluation, "its standing among the others is another one");
+            return Err(Stop::Error(Box::new(Error::Replay { evaluation, cause: cause.to_owned() })));
+        }
+        self.observer.evaluation(&record.row);
+        self.keep(record, sample.clone(), standing, field);
+        Ok(sample)
+    }
+
+    /// Computes a design.
+    fn compute(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         self.check_limits()?;
         let clock = Instant::now();
         let moved = self.mesh(p)?;
         let remesh = clock.elapsed().as_secs_f64();
         let mut analysis = self.problem.analyse_with(&mut self.memory, p, moved, Want::Gradient)?;
         analysis.timings.remesh += remesh;
-        let value = analysis.objective.expect("an optimisation has an objective");
-        let initial = match &self.initial {
-            Some(initial) => initial.clone(),
-            None => self.initial.insert(self.first(value, &analysis)?).clone(),
-        };
-        let scale = self.goal.sign() / initial.objective.abs();
-        let derivative = analysis.gradient.as_ref().expect("a gradient was asked for");
-        let constraints = initial.bounds.iter().zip(&analysis.constraints).map(|(bound, measured)| {
-            let gradient = measured.gradient.as_ref().expect("a gradient was asked for");
-            (bound.excess(measured.value), bound.gradient(gradient))
-        });
-        let sample = Sample {
-            value: scale * value,
-            gradient: derivative.iter().map(|d| scale * d).collect(),
-            constraints: constraints.collect(),
-        };
-        self.keep(p, &initial, &sample, analysis, clock.elapsed().as_secs_f64())?;
+        let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
+        let objective = analysis.objective.expect("an optimisation has an objective");
+        let initial = self.initial(objective, analysis.quality.worst, &values)?;
+        let mut record = self.record(p, &initial, &analysis);
+        let sample = self.sample(&initial, &record);
+        let standing = self.standing(objective, &sample);
+        record.improved = standing.is_improved();
+        record.row.iteration = self.iterations_after(standing);
+        let names = self.problem.constraints.iter().map(|constraint| column(&constraint.name));
+        record.row.constraints = names.zip(sample.constraints.iter().map(|(c, _)| *c)).collect();
+        record.row.seconds = clock.elapsed().as_secs_f64();
+        for event in &analysis.solver_events {
+            self.observer.notice(&event.to_string());
+        }
+        self.recorder.record(&record, &analysis, self.problem)?;
+        self.observer.evaluation(&record.row);
+        self.keep(record, sample.clone(), standing, Field::Computed(analysis));
         Ok(sample)
     }
 
@@ -194,17 +310,92 @@ impl<'a> Run<'a> {
         Ok(moved)
     }
 
-    /// Scale of the objective and bounds of the constraints, from the initial design.
-    fn first(&self, objective: f64, analysis: &Analysis) -> Result<Initial, Error> {
+    /// Scale of the objective and bounds of the constraints, which the first design fixes.
+    fn initial(&mut self, objective: f64, quality: f64, measured: &[f64]) -> Result<Initial, Error> {
+        if let Some(initial) = &self.initial {
+            return Ok(initial.clone());
+        }
         if objective == 0.0 {
             return Err(Error::Optimisation {
                 cause: "the objective of the initial design is zero: there is no field to change, or its terms cancel; \
                         check coils, regions, frequencies and weights",
             });
         }
-        let measured = self.problem.constraints.iter().zip(&analysis.constraints);
-        let bounds = measured.map(|(constraint, initial)| constraint.bound(initial.value));
-        Ok(Initial { objective, quality: analysis.quality.worst, bounds: bounds.collect::<Result<_, _>>()? })
+        let constraints = self.problem.constraints.iter().zip(measured);
+        let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
+        let initial = Initial { objective, quality, bounds: bounds.collect::<Result<_, _>>()? };
+        Ok(self.initial.insert(initial).clone())
+    }
+
+    /// What the method is told of a design.
+    fn sample(&self, initial: &Initial, record: &Record) -> Sample {
+        let scale = self.goal.sign() / initial.objective.abs();
+        let constraints = initial.bounds.iter().zip(&record.constraints);
+        Sample {
+            value: scale * record.row.objective,
+            gradient: record.gradient.iter().map(|d| scale * d).collect(),
+            constraints: constraints
+                .map(|(bound, (value, gradient))| (bound.excess(*value), bound.gradient(gradient)))
+                .collect(),
+        }
+    }
+
+    /// How a design stands beside the best so far.
+    fn standing(&self, objective: f64, sample: &Sample) -> Standing {
+        let Some(best) = &self.best else { return Standing::First };
+        let sign = self.goal.sign();
+        let order = violation(sample).total_cmp(&best.violation);
+        match order.then((sign * objective).total_cmp(&(sign * best.objective))) {
+            _ if self.best_is_stale => Standing::Renewed,
+            std::cmp::Ordering::Less => Standing::Better,
+            _ => Standing::Worse,
+        }
+    }
+
+    fn iterations_after(&self, standing: Standing) -> usize {
+        self.iterations + usize::from(standing == Standing::Better)
+    }
+
+    /// The record of a design but for its standing.
+    fn record(&self, p: &[f64], initial: &Initial, analysis: &Analysis) -> Record {
+        let shape = self.shape();
+        let thickness = shape.thickness.as_ref().map(|thickness| thickness.range(&shape.surface.heights(p)));
+        let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
+        let objective = analysis.objective.expect("an optimisation has an objective");
+        let gradient = analysis.gradient.clone().expect("a gradient was asked for");
+        let region = |e: ElementId| analysis.mesh.topology().region_name_at(e).to_owned();
+        let row = Evaluation {
+            evaluation: self.evaluations,
+            iteration: 0,
+            objective,
+            ratio: objective / initial.objective,
+            gradient_norm: euclidean(&gradient),
+            step_norm: euclidean(&difference),
+            worst_quality: analysis.quality.worst,
+            min_thickness_m: thickness.map(|t| t.0),
+            max_thickness_m: thickness.map(|t| t.1),
+            linear_iterations: analysis.linear_iterations,
+            seconds: 0.0,
+            step_to_inversion: analysis.inversion.element.map(|_| analysis.inversion.step),
+            inversion_element: analysis.inversion.element.map(ElementId::index),
+            inversion_region: analysis.inversion.element.map(region),
+            round: shape.motion.round(),
+            constraints: BTreeMap::new(),
+        };
+        let constraint = |measured: &Measured| {
+            (measured.value, measured.gradient.clone().expect("a gradient was asked for"))
+        };
+        Record {
+            row,
+            improved: false,
+            design: p.to_vec(),
+            gradient,
+            constraints: analysis.constraints.iter().map(constraint).collect(),
+            reference: reference_hash(shape.motion.reference()),
+            methods: self.memory.methods(),
+            worst_residual: analysis.worst_residual,
+            timings: analysis.timings,
+        }
     }
 
     fn check_limits(&self) -> Result<(), Stop> {
@@ -222,77 +413,36 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Counts an evaluation, tells observer and recorder, and remembers the best.
-    fn keep(
-        &mut self,
-        p: &[f64],
-        initial: &Initial,
-        sample: &Sample,
-        analysis: Analysis,
-        seconds: f64,
-    ) -> Result<(), Error> {
-        let value = analysis.objective.expect("an optimisation has an objective");
-        let violation = violation(sample);
-        let stale = std::mem::take(&mut self.best_is_stale);
-        let improved = stale
-            || self.best.as_ref().is_none_or(|best| {
-                let sign = self.goal.sign();
-                let order = violation.total_cmp(&best.violation);
-                order.then((sign * value).total_cmp(&(sign * best.objective))).is_lt()
-            });
-        if improved && !stale && self.best.is_some() {
-            self.iterations += 1;
-        }
-        let thickness = self
-            .shape()
-            .thickness
-            .as_ref()
-            .map(|thickness| thickness.range(&self.shape().surface.heights(p)));
-        let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
-        let excess = self.problem.constraints.iter().zip(&sample.constraints);
-        let row = Evaluation {
-            evaluation: self.evaluations,
-            iteration: self.iterations,
-            objective: value,
-            ratio: value / initial.objective,
-            gradient_norm: euclidean(analysis.gradient.as_deref().unwrap_or_default()),
-            step_norm: euclidean(&difference),
-            worst_quality: analysis.quality.worst,
-            min_thickness_m: thickness.map(|t| t.0),
-            max_thickness_m: thickness.map(|t| t.1),
-            linear_iterations: analysis.linear_iterations,
-            seconds,
-            step_to_inversion: analysis.inversion.element.map(|_| analysis.inversion.step),
-            inversion_element: analysis.inversion.element.map(ElementId::index),
-            inversion_region: analysis
-                .inversion
-                .element
-                .map(|e| analysis.mesh.topology().region_name_at(e).to_owned()),
-            round: self.shape().motion.round(),
-            constraints: excess.map(|(constraint, (c, _))| (column(&constraint.name), *c)).collect(),
-        };
+    /// Counts an evaluation, and remembers the best.
+    fn keep(&mut self, record: Record, sample: Sample, standing: Standing, field: Field) {
+        self.iterations = self.iterations_after(standing);
         self.evaluations += 1;
-        self.last = p.to_vec();
-        self.worst_residual = self.worst_residual.max(analysis.worst_residual);
-        self.timings += analysis.timings;
-        for event in &analysis.solver_events {
-            self.observer.notice(&event.to_string());
+        self.worst_residual = self.worst_residual.max(record.worst_residual);
+        self.timings += record.timings;
+        self.best_is_stale = false;
+        self.last.clone_from(&record.design);
+        if standing.is_improved() {
+            self.best = Some(BestSoFar {
+                evaluation: record.row.evaluation,
+                values: record.design,
+                objective: record.row.objective,
+                violation: violation(&sample),
+                sample,
+                round: record.row.round,
+                field,
+            });
         }
-        self.recorder.record(&row, &analysis, self.problem, improved)?;
-        self.observer.evaluation(&row);
-        if improved {
-            let (evaluation, values) = (row.evaluation, p.to_vec());
-            let (sample, round) = (sample.clone(), row.round);
-            self.best =
-                Some(Best { evaluation, values, objective: value, violation, analysis, sample, round });
-        }
-        Ok(())
     }
 
-    pub(super) fn finish(self, stop_reason: StopReason) -> Result<Optimised, Error> {
-        let (Some(best), Some(initial)) = (self.best, self.initial) else {
+    pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
+        if let Some(record) = self.next.take().or_else(|| self.recorder.recall()) {
+            let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
+            return Err(Error::Replay { evaluation, cause });
+        }
+        let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
+        let best = self.analysed(best)?;
         if best.violation > 0.0 {
             self.observer.warning(&format!(
                 "no design keeps all constraints: the best one is beyond a bound by {:.1e} of it; loosen the constraint, \
@@ -316,6 +466,22 @@ impl<'a> Run<'a> {
             timings: self.timings,
             rounds: self.rounds,
         })
+    }
+
+    /// The best design with its field: one that was recalled is computed in its own round, and comes out as it was.
+    fn analysed(&mut self, best: BestSoFar) -> Result<Best, Error> {
+        let BestSoFar { evaluation, values, objective, violation, field, .. } = best;
+        let analysis = match field {
+            Field::Computed(analysis) => analysis,
+            Field::Recalled(motion) => {
+                self.observer.phase("computing the field of the best design");
+                let own = std::mem::replace(&mut self.shape_mut().motion, *motion);
+                let analysis = self.problem.evaluate_with(&mut self.memory, &values, Want::Gradient);
+                self.shape_mut().motion = own;
+                analysis?
+            }
+        };
+        Ok(Best { evaluation, values, objective, violation, analysis })
     }
 }
 

@@ -19,9 +19,7 @@ use super::{CaseReport, MorphReport, Parameters, Walk, csv, walk};
 use crate::config::{Config, Morph, Paper, Source, resolved_toml};
 use crate::error::Error;
 use crate::observer::Observer;
-use crate::output::{
-    Manifest, RunDirectory, RunStatus, StopReason, peak_memory_bytes, to_json, write_atomic,
-};
+use crate::output::{Manifest, RunDirectory, RunStatus, StopReason, peak_memory_bytes, to_json};
 use crate::session::{Options, mesh_hash};
 use crate::setup::{MotionSetup, set_up_motion};
 
@@ -56,7 +54,7 @@ pub fn morph(
     // An earlier run is replaced only by one that can begin.
     jobs.iter().try_for_each(|job| check_body(&job.setup))?;
     warn(config, parameters, &jobs, observer);
-    let directory = RunDirectory::create_flat(&config.output.directory, options.older_run)?;
+    let directory = RunDirectory::create_flat(options.disk, &config.output.directory, options.older_run)?;
     let mut manifest = Manifest::started("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;
@@ -171,8 +169,8 @@ struct Session<'a> {
 impl Session<'_> {
     fn work(&self, observer: &mut dyn Observer) -> Result<MorphReport, Error> {
         let directory = &self.directory;
-        write_atomic(&directory.config(), self.source.text().as_bytes())?;
-        write_atomic(&directory.resolved(), resolved_toml(self.config).as_bytes())?;
+        directory.write(&directory.config(), self.source.text().as_bytes())?;
+        directory.write(&directory.resolved(), resolved_toml(self.config).as_bytes())?;
         let tuned = self.tuned(observer)?;
         let (mut cases, mut cut_short) = (Vec::new(), None);
         for (index, job) in self.jobs.iter().enumerate() {
@@ -220,8 +218,8 @@ impl Session<'_> {
             timings_s: BTreeMap::from([("total".to_owned(), self.clock.elapsed().as_secs_f64())]),
             peak_memory_bytes: peak_memory_bytes(),
         };
-        write_atomic(&directory.morph_csv(), csv(&report).as_bytes())?;
-        write_atomic(&directory.result(), &to_json(&report))?;
+        directory.write(&directory.morph_csv(), csv(&report).as_bytes())?;
+        directory.write(&directory.result(), &to_json(&report))?;
         if let Some(left_out) = left_out {
             observer.warning(&format!("interrupted, and left out: {left_out}"));
         }
@@ -232,7 +230,7 @@ impl Session<'_> {
     fn tuned(&self, observer: &mut dyn Observer) -> Result<Option<Found>, Error> {
         let (Parameters::Tuned, [job]) = (self.parameters, self.jobs.as_slice()) else { return Ok(None) };
         let found = tune(job.config, job.source, &job.setup, self.options.interrupted, observer)?;
-        write_atomic(&self.directory.tuned(), resolved_toml(&found.config).as_bytes())?;
+        self.directory.write(&self.directory.tuned(), resolved_toml(&found.config).as_bytes())?;
         Ok(Some(found))
     }
 
@@ -251,8 +249,8 @@ impl Session<'_> {
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let walked = walk(setup, morph.increments, morph.least_quality, &mut tell)?;
-        write_atomic(&self.directory.before(number), &vtu(&walked, &walked.before)?)?;
-        write_atomic(&self.directory.after(number), &vtu(&walked, &walked.after)?)?;
+        self.directory.write(&self.directory.before(number), &vtu(&walked, &walked.before)?)?;
+        self.directory.write(&self.directory.after(number), &vtu(&walked, &walked.after)?)?;
         Ok(walked)
     }
 

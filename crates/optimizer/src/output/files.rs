@@ -1,151 +1,136 @@
-//! Files that are always whole.
+//! Files that are always whole, and logs that grow record by record.
 //!
 //! A file is written beside its place under a temporary name, synced, renamed, and its folder synced: after a
-//! crash at any moment the place holds the old content or the new one. The history is appended to and synced
-//! row by row instead.
+//! crash at any moment the place holds the old content or the new one. A log is appended to and synced record by record
+//! instead: after a crash its last record may be cut short, and whoever reads it back drops that.
 
-use std::fs::{File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::OutputError;
+use super::disk::{Disk, DiskFile};
 
 /// Start of the names of unfinished files.
 pub(super) const UNFINISHED: &str = ".fluxmorph-";
 
-/// Write a whole file, replacing an older one.
+/// Writes a whole file, replacing an older one.
 ///
 /// # Errors
-/// When the operating system refuses; the older file then is as it was.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    write_atomic_with(path, |file| file.write_all(bytes))
-}
-
-/// Write a whole file with a function that fills it, replacing an older one.
-///
-/// # Errors
-/// When the function fails or the operating system refuses; the older file then is as it was.
-pub fn write_atomic_with(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> Result<(), OutputError> {
-    let write = || {
-        let folder = folder_of(path);
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(UNFINISHED);
-        // A temporary file is private by default; results are as readable as any file of the user.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let mut file = builder.tempfile_in(folder)?;
-        let mut buffered = BufWriter::with_capacity(1 << 16, file.as_file_mut());
-        fill(&mut buffered)?;
-        buffered.flush()?;
-        drop(buffered);
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|error| error.error)?;
-        sync_folder(folder)
+/// When the operating system refuses; the older file then is as it was, or the new one is whole in its place.
+pub(super) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let folder = folder_of(path);
+    let unfinished = unfinished(path);
+    let aside = || -> io::Result<()> {
+        let mut file = match disk.create(&unfinished) {
+            // Left by a process that was killed.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+                disk.remove(&unfinished)?;
+                disk.create(&unfinished)?
+            }
+            other => other?,
+        };
+        file.write_all(bytes)?;
+        file.sync()?;
+        drop(file);
+        disk.rename(&unfinished, path)
     };
-    write().map_err(OutputError::io("write", path))
+    let written = aside().inspect_err(|_| {
+        // The error to report is the first one; what is left has a name that is cleared away later.
+        let _ = disk.remove(&unfinished);
+    });
+    written.and_then(|()| disk.sync_dir(folder)).map_err(OutputError::io("write", path))
 }
 
-fn folder_of(path: &Path) -> &Path {
+/// The temporary name of a file, in its folder.
+fn unfinished(path: &Path) -> PathBuf {
+    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    path.with_file_name(format!("{UNFINISHED}{name}"))
+}
+
+pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Make the names in a folder durable.
-#[cfg(unix)]
-fn sync_folder(folder: &Path) -> std::io::Result<()> {
-    File::open(folder)?.sync_all()
-}
-
-/// Other systems keep names without being asked, and cannot open folders as files.
-#[cfg(not(unix))]
-fn sync_folder(_folder: &Path) -> std::io::Result<()> {
-    Ok(())
-}
-
-/// A text file that grows by whole lines, each on the disk before the next.
+/// A file that grows by whole records, each on the disk before the next.
 #[derive(Debug)]
 pub struct SyncedLog {
-    file: File,
+    file: Box<dyn DiskFile>,
     path: PathBuf,
+    /// Bytes of whole records.
+    length: u64,
 }
 
 impl SyncedLog {
-    /// A new, empty log in place of an older one.
+    /// A new log that starts with some bytes. Those are written aside: the log never is without them.
     ///
     /// # Errors
     /// When the operating system refuses.
-    pub fn create(path: &Path) -> Result<Self, OutputError> {
-        let file = File::create(path).map_err(OutputError::io("create", path))?;
-        sync_folder(folder_of(path)).map_err(OutputError::io("create", path))?;
-        Ok(Self { file, path: path.to_owned() })
+    pub(super) fn create(disk: &dyn Disk, path: &Path, start: &[u8]) -> Result<Self, OutputError> {
+        write_whole(disk, path, start)?;
+        Self::reopen(disk, path, start.len() as u64)
     }
 
-    /// An existing log, to go on behind its last line.
+    /// An existing log, to go on behind its first `length` bytes.
     ///
     /// # Errors
-    /// When the operating system refuses.
-    pub fn reopen(path: &Path) -> Result<Self, OutputError> {
-        let file = OpenOptions::new().append(true).open(path).map_err(OutputError::io("open", path))?;
-        Ok(Self { file, path: path.to_owned() })
+    /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.
+    pub(super) fn reopen(disk: &dyn Disk, path: &Path, length: u64) -> Result<Self, OutputError> {
+        let file = disk.append(path, length).map_err(OutputError::io("open", path))?;
+        Ok(Self { file, path: path.to_owned(), length })
     }
 
-    /// Append one line, given without its line break, and wait until it is on the disk.
+    /// Appends one record and waits until it is on the disk.
     ///
     /// # Errors
-    /// When the operating system refuses.
-    pub fn append(&mut self, line: &str) -> Result<(), OutputError> {
-        let write = |file: &mut File| {
-            file.write_all(format!("{line}\n").as_bytes())?;
-            file.sync_data()
-        };
-        write(&mut self.file).map_err(OutputError::io("append to", &self.path))
+    /// When the operating system refuses; the log then ends with the record before, as far as the disk allows that.
+    pub fn append(&mut self, record: &[u8]) -> Result<(), OutputError> {
+        match self.file.write_all(record).and_then(|()| self.file.sync()) {
+            Ok(()) => {
+                self.length += record.len() as u64;
+                Ok(())
+            }
+            Err(error) => {
+                // Half a record would look like a row with other numbers. The error to report is the first one.
+                let _ = self.file.cut(self.length);
+                Err(OutputError::io("append to", &self.path)(error))
+            }
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::io;
-
+    use super::super::disk::system_disk;
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let entries = std::fs::read_dir(folder).expect("a folder");
-        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+        system_disk().names(folder).expect("a folder")
     }
 
     #[test]
     fn a_file_is_written_whole_and_leaves_nothing_beside_it() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("result.json");
-        write_atomic(&path, b"one").expect("written");
-        write_atomic(&path, b"two").expect("replaced");
-        assert_eq!(std::fs::read(&path).expect("read"), b"two");
+        // What a killed process left does no harm.
+        std::fs::write(folder.path().join(".fluxmorph-result.json"), "half").expect("written");
+        for content in ["one", "two"] {
+            write_whole(&*system_disk(), &path, content.as_bytes()).expect("written");
+            assert_eq!(std::fs::read_to_string(&path).expect("read"), content);
+        }
         assert_eq!(names(folder.path()), ["result.json"]);
     }
 
     #[test]
-    fn a_failed_write_keeps_the_old_file() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("result.json");
-        write_atomic(&path, b"old").expect("written");
-        let failing = |file: &mut dyn Write| {
-            file.write_all(b"half")?;
-            Err(io::Error::from(io::ErrorKind::StorageFull))
-        };
-        let message = write_atomic_with(&path, failing).expect_err("no space").to_string();
-        assert!(message.contains("result.json") && message.contains("free some space"), "{message}");
-        assert_eq!(std::fs::read(&path).expect("read"), b"old");
-        assert_eq!(names(folder.path()), ["result.json"]);
-    }
-
-    #[test]
-    fn an_absent_folder_is_named() {
+    fn a_failed_write_names_the_file_and_leaves_nothing() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("none/result.json");
-        let message = write_atomic(&path, b"").expect_err("no folder").to_string();
+        let message = write_whole(&*system_disk(), &path, b"").expect_err("no folder").to_string();
         assert!(message.contains("cannot write") && message.contains("none/result.json"), "{message}");
+        // A folder in the place of the file: all goes well but the last step.
+        let taken = folder.path().join("taken");
+        std::fs::create_dir(&taken).expect("created");
+        assert!(write_whole(&*system_disk(), &taken, b"x").is_err());
+        assert_eq!(names(folder.path()), ["taken"]);
     }
 
     #[cfg(unix)]
@@ -157,18 +142,18 @@ mod tests {
             let path = folder.path().join(name);
             std::fs::metadata(path).expect("a file").permissions().mode() & 0o777
         };
-        write_atomic(&folder.path().join("ours"), b"").expect("written");
+        write_whole(&*system_disk(), &folder.path().join("ours"), b"").expect("written");
         std::fs::write(folder.path().join("plain"), b"").expect("written");
         assert_eq!(mode("ours"), mode("plain"));
     }
 
     #[test]
-    fn a_log_grows_by_lines_and_goes_on_when_reopened() {
+    fn a_log_grows_by_records_and_goes_on_when_reopened() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("history.csv");
-        SyncedLog::create(&path).and_then(|mut log| log.append("a")).expect("written");
-        SyncedLog::reopen(&path).and_then(|mut log| log.append("b")).expect("written");
-        assert_eq!(std::fs::read_to_string(&path).expect("read"), "a\nb\n");
-        assert!(SyncedLog::reopen(&folder.path().join("none")).is_err());
+        let (path, disk) = (folder.path().join("history.csv"), system_disk());
+        SyncedLog::create(&*disk, &path, b"a\n").and_then(|mut log| log.append(b"b\ntorn")).expect("written");
+        SyncedLog::reopen(&*disk, &path, 4).and_then(|mut log| log.append(b"c\n")).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("read"), "a\nb\nc\n");
+        assert!(SyncedLog::reopen(&*disk, &folder.path().join("none"), 0).is_err());
     }
 }

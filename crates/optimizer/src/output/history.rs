@@ -14,37 +14,33 @@ pub struct History {
 }
 
 impl History {
-    /// Start both files, the table with its header; `constraints` are the names of the constraints in their order.
+    /// Starts both files with the rows so far; `constraints` are the names of the constraints in their order.
     ///
     /// # Errors
     /// When the operating system refuses.
-    pub fn create(directory: &RunDirectory, constraints: &[&str]) -> Result<Self, OutputError> {
+    pub fn create(
+        directory: &RunDirectory,
+        constraints: &[&str],
+        rows: &[&Evaluation],
+    ) -> Result<Self, OutputError> {
         let columns = columns(constraints);
-        let mut csv = SyncedLog::create(&directory.history_csv())?;
-        csv.append(&columns.join(","))?;
-        Ok(Self { csv, jsonl: SyncedLog::create(&directory.history_jsonl())?, columns })
-    }
-
-    /// Go on with the files of an earlier run of the same configuration.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
-    pub fn reopen(directory: &RunDirectory, constraints: &[&str]) -> Result<Self, OutputError> {
+        let mut table = format!("{}\n", columns.join(","));
+        table.extend(rows.iter().map(|row| csv_line(row, &columns)));
+        let lines: String = rows.iter().map(|row| json_line(row)).collect();
         Ok(Self {
-            csv: SyncedLog::reopen(&directory.history_csv())?,
-            jsonl: SyncedLog::reopen(&directory.history_jsonl())?,
-            columns: columns(constraints),
+            csv: directory.log(&directory.history_csv(), table.as_bytes())?,
+            jsonl: directory.log(&directory.history_jsonl(), lines.as_bytes())?,
+            columns,
         })
     }
 
-    /// Append one evaluation to both files, and wait until it is on the disk.
+    /// Appends one evaluation to both files, and waits until it is on the disk.
     ///
     /// # Errors
     /// When the operating system refuses.
     pub fn append(&mut self, evaluation: &Evaluation) -> Result<(), OutputError> {
-        self.csv.append(&csv_line(evaluation, &self.columns))?;
-        let line = serde_json::to_string(evaluation).expect("numbers and text have a JSON form");
-        self.jsonl.append(&line)
+        self.csv.append(csv_line(evaluation, &self.columns).as_bytes())?;
+        self.jsonl.append(json_line(evaluation).as_bytes())
     }
 }
 
@@ -54,7 +50,7 @@ fn columns(constraints: &[&str]) -> Vec<String> {
     fixed.chain(constraints.iter().map(|name| column(name))).collect()
 }
 
-/// The row of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
+/// The line of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
 /// the device does not have.
 fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
     let value = serde_json::to_value(evaluation).expect("numbers and text have a JSON form");
@@ -63,13 +59,19 @@ fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
         Value::String(text) => csv_text(text),
         other => other.to_string(),
     };
-    columns.iter().map(cell).collect::<Vec<_>>().join(",")
+    format!("{}\n", columns.iter().map(cell).collect::<Vec<_>>().join(","))
+}
+
+/// The line of an evaluation in `history.jsonl`.
+fn json_line(evaluation: &Evaluation) -> String {
+    let object = serde_json::to_string(evaluation).expect("numbers and text have a JSON form");
+    format!("{object}\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::OlderRun;
+    use crate::output::{OlderRun, system_disk};
 
     fn evaluation() -> Evaluation {
         Evaluation {
@@ -95,13 +97,11 @@ mod tests {
     #[test]
     fn rows_have_the_documented_columns_and_exact_numbers() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run = RunDirectory::create(folder.path(), OlderRun::Keep).expect("a run directory");
-        let mut history = History::create(&run, &["volume"]).expect("created");
-        history.append(&evaluation()).expect("appended");
-        drop(history);
-        History::reopen(&run, &["volume"])
+        let run =
+            RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("a run directory");
+        History::create(&run, &["volume"], &[&evaluation()])
             .and_then(|mut history| history.append(&evaluation()))
-            .expect("appended");
+            .expect("written");
 
         let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,-0.5\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\

@@ -1,13 +1,13 @@
 //! `manifest.json`: what was run, on what, and how it ended. Written first, completed last.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
 use super::process::{hostname, utc_timestamp};
-use super::{OutputError, RunDirectory, write_atomic};
-use crate::config::Source;
+use super::{OutputError, RunDirectory};
+use crate::config::{Optimizer, Source};
 
 /// The mark by which a run directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -30,8 +30,17 @@ pub struct Manifest {
     pub status: RunStatus,
     /// The configuration.
     pub config: Option<FileHash>,
+    /// Folder that paths in the configuration are relative to, absolute.
+    #[serde(default)]
+    pub folder: Option<PathBuf>,
     /// Overrides of the command line, as TOML lines.
     pub overrides: Vec<String>,
+    /// Limits in force, of the configuration or the command line; `None` where nothing is optimised.
+    #[serde(default)]
+    pub limits: Option<LimitsInForce>,
+    /// When the run was gone on with.
+    #[serde(default)]
+    pub resumed: Vec<Resumption>,
     /// The mesh.
     pub mesh: Option<MeshHash>,
     /// Names of the STL files in the directory.
@@ -89,6 +98,44 @@ pub struct MeshHash {
     pub tets: usize,
 }
 
+/// When an optimisation stops at the latest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LimitsInForce {
+    /// Most evaluations.
+    pub max_evaluations: usize,
+    /// Longest time [s], from the start or the last resumption.
+    pub max_time_s: Option<f64>,
+}
+
+impl LimitsInForce {
+    /// Those of a configuration, with what the command line put in their place.
+    pub fn of(optimizer: &Optimizer) -> Self {
+        Self { max_evaluations: optimizer.max_evaluations, max_time_s: optimizer.max_time }
+    }
+}
+
+/// How a run was gone on with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Resumption {
+    /// When, UTC.
+    pub at: String,
+    /// Evaluations in the journal then.
+    pub evaluations: usize,
+    /// Limits in force since then.
+    pub limits: LimitsInForce,
+    /// Threads used since then.
+    pub threads: usize,
+    /// The machine.
+    pub host: Host,
+}
+
+impl Resumption {
+    /// A resumption now, on this machine.
+    pub fn now(evaluations: usize, limits: LimitsInForce, threads: usize) -> Self {
+        Self { at: utc_timestamp(SystemTime::now()), evaluations, limits, threads, host: Host::this() }
+    }
+}
+
 /// The machine of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Host {
@@ -124,7 +171,10 @@ impl Manifest {
             command: command.to_owned(),
             status: RunStatus::Running,
             config: None,
+            folder: None,
             overrides: Vec::new(),
+            limits: None,
+            resumed: Vec::new(),
             mesh: None,
             surfaces: Vec::new(),
             host: Host::this(),
@@ -142,8 +192,16 @@ impl Manifest {
             path: document.name.clone(),
             blake3: blake3_hex(document.text.as_bytes()),
         });
+        self.folder = Some(source.directory().to_owned());
         self.overrides = source.overrides().map(str::to_owned).collect();
         self
+    }
+
+    /// The run goes on.
+    pub fn resumed(&mut self, resumption: Resumption) {
+        (self.status, self.finished, self.seconds) = (RunStatus::Running, None, None);
+        self.limits = Some(resumption.limits);
+        self.resumed.push(resumption);
     }
 
     /// Fill in how the run ended, now; `seconds` is its duration [s].
@@ -163,21 +221,18 @@ impl Manifest {
     /// # Errors
     /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
-        write_atomic(&directory.manifest(), &super::result::to_json(self))
+        directory.write(&directory.manifest(), &super::result::to_json(self))
     }
 
-    /// Read a manifest.
+    /// Read the manifest of a run directory.
     ///
     /// # Errors
     /// When there is none, or it is none of ours.
-    pub fn read(path: &Path) -> Result<Self, OutputError> {
-        let damaged = |message: String| OutputError::Damaged { path: path.to_owned(), message };
-        let size = std::fs::metadata(path).map_err(OutputError::io("read", path))?.len();
-        if size > LARGEST {
-            return Err(damaged(format!("{size} bytes are too many for a manifest")));
-        }
-        let bytes = std::fs::read(path).map_err(OutputError::io("read", path))?;
-        serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))
+    pub fn read(directory: &RunDirectory) -> Result<Self, OutputError> {
+        let path = directory.manifest();
+        let bytes = directory.disk().read(&path, LARGEST).map_err(OutputError::io("read", &path))?;
+        let damaged = |error: serde_json::Error| OutputError::Damaged { path, message: error.to_string() };
+        serde_json::from_slice(&bytes).map_err(damaged)
     }
 }
 
@@ -189,21 +244,22 @@ pub fn blake3_hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::OlderRun;
+    use crate::output::{OlderRun, system_disk};
 
     #[test]
     fn a_manifest_is_written_first_and_completed_last() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run = RunDirectory::create(folder.path(), OlderRun::Keep).expect("a run directory");
+        let run =
+            RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("a run directory");
         let mut manifest = Manifest::started("run", 2);
         manifest.config = Some(FileHash { path: "a.toml".into(), blake3: blake3_hex(b"") });
         manifest.write(&run).expect("written");
-        let read = Manifest::read(&run.manifest()).expect("read");
+        let read = Manifest::read(&run).expect("read");
         assert_eq!((read.status, read.finished.as_deref()), (RunStatus::Running, None));
 
         manifest.complete(RunStatus::Converged, 1.5);
         manifest.write(&run).expect("written");
-        assert_eq!(Manifest::read(&run.manifest()).expect("read"), manifest);
+        assert_eq!(Manifest::read(&run).expect("read"), manifest);
         let text = std::fs::read_to_string(run.manifest()).expect("read");
         assert!(
             text.contains("\"program\": \"fluxmorph\"") && text.contains("\"status\": \"converged\""),

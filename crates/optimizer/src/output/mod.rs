@@ -2,6 +2,7 @@
 
 mod csv;
 mod design_file;
+mod disk;
 mod files;
 mod history;
 mod manifest;
@@ -13,9 +14,10 @@ use std::path::PathBuf;
 
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFileError, read_design};
-pub use files::{SyncedLog, write_atomic, write_atomic_with};
+pub use disk::{Disk, DiskFile, system_disk};
+pub use files::SyncedLog;
 pub use history::History;
-pub use manifest::{FileHash, Host, Manifest, MeshHash, RunStatus, blake3_hex};
+pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
 pub use process::{hostname, peak_memory_bytes, utc_timestamp};
 pub(crate) use result::to_json;
 pub use result::{
@@ -52,6 +54,20 @@ pub enum OutputError {
     )]
     NotADirectory {
         /// The path.
+        path: PathBuf,
+    },
+    /// There is no run in a directory.
+    #[error("`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into")]
+    NoRun {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// Another process writes into the run directory.
+    #[error(
+        "`{path}` is written by another process: wait for it, stop it, or choose another directory with --out"
+    )]
+    InUse {
+        /// The file that it holds.
         path: PathBuf,
     },
     /// A file of a run does not hold what it should.
@@ -93,7 +109,10 @@ impl OutputError {
     /// Turns an error of the operating system into one that names the path, for `map_err`.
     pub(crate) fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
-        move |source| Self::Io { action, path, source }
+        move |source: std::io::Error| match source.kind() {
+            std::io::ErrorKind::ResourceBusy => Self::InUse { path },
+            _ => Self::Io { action, path, source },
+        }
     }
 }
 

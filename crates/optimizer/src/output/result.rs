@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::RunStatus;
-use super::{OutputError, RunDirectory, write_atomic};
+use super::{OutputError, RunDirectory};
 use crate::cli::ExitCode;
 use crate::rounds::RoundEvent;
 
@@ -257,7 +257,7 @@ impl RunResult {
     /// # Errors
     /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
-        write_atomic(&directory.result(), &self.to_json())
+        directory.write(&directory.result(), &self.to_json())
     }
 
     /// The file's content.

@@ -1,11 +1,12 @@
 //! The run directory: which folder may become one, and the names of the files in it.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::OutputError;
-use super::files::UNFINISHED;
+use super::disk::Disk;
+use super::files::{SyncedLog, UNFINISHED, folder_of, write_whole};
 use super::manifest::Manifest;
 
 /// What to do with an earlier run in the same folder.
@@ -18,15 +19,18 @@ pub enum OlderRun {
 }
 
 /// The folder one run writes into.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct RunDirectory {
+    disk: Arc<dyn Disk>,
     path: PathBuf,
 }
 
 const MANIFEST: &str = "manifest.json";
 const FIELDS: &str = "fields";
-/// The files of a run beside its manifest.
+const JOURNAL: &str = "journal.bin";
+/// The files of a run beside its manifest. The journal goes first: it must not be taken for that of a new run.
 const FILES: &[&str] = &[
+    JOURNAL,
     "config.toml",
     "resolved.toml",
     "history.csv",
@@ -51,10 +55,9 @@ impl RunDirectory {
     ///
     /// # Errors
     /// When the folder holds something else, or the operating system refuses.
-    pub fn create(path: &Path, older: OlderRun) -> Result<Self, OutputError> {
-        let directory = Self::create_flat(path, older)?;
-        let fields = directory.fields();
-        fs::create_dir_all(&fields).map_err(OutputError::io("create", fields))?;
+    pub fn create(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        let directory = Self::create_flat(disk, path, older)?;
+        directory.make(&directory.fields())?;
         Ok(directory)
     }
 
@@ -62,21 +65,17 @@ impl RunDirectory {
     ///
     /// # Errors
     /// As [`RunDirectory::create`].
-    pub fn create_flat(path: &Path, older: OlderRun) -> Result<Self, OutputError> {
-        let directory = Self { path: path.to_owned() };
-        match fs::read_dir(path) {
-            Ok(mut entries) => {
-                if entries.next().is_some() {
-                    directory.clear(older)?;
-                }
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+    pub fn create_flat(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        match disk.names(path) {
+            Ok(names) if names.is_empty() => {}
+            Ok(_) => directory.clear(older)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => directory.make(path)?,
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
                 return Err(OutputError::NotADirectory { path: path.to_owned() });
             }
             Err(error) => return Err(OutputError::io("read", path)(error)),
         }
-        fs::create_dir_all(path).map_err(OutputError::io("create", path))?;
         Ok(directory)
     }
 
@@ -84,17 +83,25 @@ impl RunDirectory {
     ///
     /// # Errors
     /// When the folder does not hold one.
-    pub fn open(path: &Path) -> Result<Self, OutputError> {
-        let directory = Self { path: path.to_owned() };
-        if directory.holds_run() {
-            Ok(directory)
-        } else {
-            Err(OutputError::NotOurs { path: path.to_owned() })
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, OutputError> {
+        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        if directory.holds_run() { Ok(directory) } else { Err(OutputError::NoRun { path: path.to_owned() }) }
+    }
+
+    /// Makes a folder whose name is on the disk.
+    fn make(&self, path: &Path) -> Result<(), OutputError> {
+        self.disk.create_dir(path).map_err(OutputError::io("create", path))?;
+        match self.disk.sync_dir(folder_of(path)) {
+            // Whoever may write into a folder may not always read it.
+            Err(error) if error.kind() != io::ErrorKind::PermissionDenied => {
+                Err(OutputError::io("create", path)(error))
+            }
+            _ => Ok(()),
         }
     }
 
     fn holds_run(&self) -> bool {
-        Manifest::read(&self.manifest()).is_ok_and(|manifest| manifest.is_ours())
+        Manifest::read(self).is_ok_and(|manifest| manifest.is_ours())
     }
 
     fn clear(&self, older: OlderRun) -> Result<(), OutputError> {
@@ -109,30 +116,59 @@ impl RunDirectory {
         if older == OlderRun::Keep {
             return Err(OutputError::HoldsRun { path: self.path.clone() });
         }
-        let surfaces = Manifest::read(&self.manifest()).map(|manifest| manifest.surfaces).unwrap_or_default();
+        self.check_unused()?;
+        let surfaces = Manifest::read(self).map(|manifest| manifest.surfaces).unwrap_or_default();
         // The list is a file's content: only names that this program gives are taken from it.
         let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
         for name in FILES.iter().copied().chain(surfaces) {
-            remove_if_there(&self.path.join(name))?;
+            self.remove_if_there(&self.path.join(name))?;
         }
-        for name in entries(&self.path)?.iter().filter(|name| is_case(name)) {
-            remove_if_there(&self.path.join(name))?;
+        for name in self.entries(&self.path)?.iter().filter(|name| is_case(name)) {
+            self.remove_if_there(&self.path.join(name))?;
         }
         self.remove_unfinished(&self.path)?;
+        self.remove_fields(0)
+    }
+
+    /// Whether no other process writes a run here.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] where one does.
+    fn check_unused(&self) -> Result<(), OutputError> {
+        let path = self.journal();
+        match self.disk.hold(&path) {
+            Err(error) if error.kind() == io::ErrorKind::ResourceBusy => Err(OutputError::InUse { path }),
+            // What cannot be opened is found out by whoever needs it.
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes what a killed process left half-written, and the fields of evaluations from a number on.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn remove_leftovers(&self, evaluations: usize) -> Result<(), OutputError> {
+        self.remove_unfinished(&self.path)?;
+        self.remove_fields(evaluations)
+    }
+
+    fn remove_fields(&self, from: usize) -> Result<(), OutputError> {
         let fields = self.fields();
         // A link may lead to the fields of another run: those stay.
-        if fs::symlink_metadata(&fields).is_ok_and(|entry| entry.is_dir()) {
-            self.remove_unfinished(&fields)?;
-            for name in entries(&fields)?.iter().filter(|name| is_field(name)) {
-                remove_if_there(&fields.join(name))?;
-            }
+        if !self.disk.is_own_dir(&fields) {
+            return Ok(());
+        }
+        self.remove_unfinished(&fields)?;
+        let removed = |name: &&String| field_number(name).is_some_and(|evaluation| evaluation >= from);
+        for name in self.entries(&fields)?.iter().filter(removed) {
+            self.remove_if_there(&fields.join(name))?;
         }
         Ok(())
     }
 
     fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
-        let fields_are_empty = || Ok(entries(&self.fields())?.is_empty());
-        for name in entries(&self.path)? {
+        let fields_are_empty = || Ok(self.entries(&self.fields())?.is_empty());
+        for name in self.entries(&self.path)? {
             let leftover = name.starts_with(UNFINISHED) || (name == FIELDS && fields_are_empty()?);
             if !leftover {
                 return Ok(false);
@@ -142,10 +178,69 @@ impl RunDirectory {
     }
 
     fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
-        for name in entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
-            remove_if_there(&folder.join(name))?;
+        for name in self.entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
+            self.remove_if_there(&folder.join(name))?;
         }
         Ok(())
+    }
+
+    /// Names in a folder, sorted; none when there is no folder.
+    fn entries(&self, folder: &Path) -> Result<Vec<String>, OutputError> {
+        match self.disk.names(folder) {
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                Ok(Vec::new())
+            }
+            other => other.map_err(OutputError::io("read", folder)),
+        }
+    }
+
+    fn remove_if_there(&self, path: &Path) -> Result<(), OutputError> {
+        match self.disk.remove(path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(OutputError::io("remove", path)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes a whole file of the run, replacing an older one: at any moment its place holds the one or the other.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+        write_whole(&*self.disk, path, bytes)
+    }
+
+    /// A new log of the run, in place of an older one.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn log(&self, path: &Path, start: &[u8]) -> Result<SyncedLog, OutputError> {
+        SyncedLog::create(&*self.disk, path, start)
+    }
+
+    /// A log of the run, to go on behind its first `length` bytes.
+    ///
+    /// # Errors
+    /// As [`SyncedLog::append`], and [`OutputError::InUse`].
+    pub fn reopened(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
+        SyncedLog::reopen(&*self.disk, path, length)
+    }
+
+    /// Evaluations with a field file, ascending.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn evaluations_with_fields(&self) -> Result<Vec<usize>, OutputError> {
+        let mut numbers: Vec<_> =
+            self.entries(&self.fields())?.iter().filter_map(|name| field_number(name)).collect();
+        numbers.sort_unstable();
+        Ok(numbers)
+    }
+
+    /// The disk that the folder is on.
+    pub fn disk(&self) -> &dyn Disk {
+        &*self.disk
     }
 
     /// The folder itself.
@@ -176,6 +271,11 @@ impl RunDirectory {
     /// `history.jsonl`.
     pub fn history_jsonl(&self) -> PathBuf {
         self.path.join("history.jsonl")
+    }
+
+    /// `journal.bin`, all evaluations with their raw bits.
+    pub fn journal(&self) -> PathBuf {
+        self.path.join(JOURNAL)
     }
 
     /// `result.json`.
@@ -277,44 +377,22 @@ fn field_name(evaluation: usize) -> String {
     format!("eval_{evaluation:04}.vtu")
 }
 
-fn is_field(name: &str) -> bool {
-    name.strip_prefix("eval_")
-        .and_then(|rest| rest.strip_suffix(".vtu"))
-        .is_some_and(|digits| digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit()))
-}
-
-/// Names in a folder, sorted; none when there is no folder.
-fn entries(folder: &Path) -> Result<Vec<String>, OutputError> {
-    let read = || -> io::Result<Vec<String>> {
-        let mut names = Vec::new();
-        for entry in fs::read_dir(folder)? {
-            names.push(entry?.file_name().to_string_lossy().into_owned());
-        }
-        names.sort();
-        Ok(names)
-    };
-    match read() {
-        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-            Ok(Vec::new())
-        }
-        other => other.map_err(OutputError::io("read", folder)),
-    }
-}
-
-fn remove_if_there(path: &Path) -> Result<(), OutputError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(OutputError::io("remove", path)(error)),
-        _ => Ok(()),
-    }
+/// The evaluation of a field file.
+fn field_number(name: &str) -> Option<usize> {
+    let digits = name.strip_prefix("eval_")?.strip_suffix(".vtu")?;
+    let is_ours = digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit());
+    digits.parse().ok().filter(|_| is_ours)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
+    use super::super::disk::system_disk;
     use super::*;
-    use crate::output::write_atomic;
 
     fn started(path: &Path) -> RunDirectory {
-        let run = RunDirectory::create(path, OlderRun::Keep).expect("a new run directory");
+        let run = RunDirectory::create(&system_disk(), path, OlderRun::Keep).expect("a new run directory");
         Manifest::started("run", 2).write(&run).expect("a manifest");
         run
     }
@@ -322,14 +400,15 @@ mod tests {
     #[test]
     fn an_absent_or_empty_folder_is_taken() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        assert!(RunDirectory::create(folder.path(), OlderRun::Keep).is_ok());
-        let run = RunDirectory::create(&folder.path().join("a/b"), OlderRun::Keep).expect("made");
+        assert!(RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).is_ok());
+        let run =
+            RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OlderRun::Keep).expect("made");
         assert!(run.fields().is_dir());
         assert!(run.field(7).ends_with("fields/eval_0007.vtu"));
         assert_eq!(run.field_in_collection(12345), "fields/eval_12345.vtu");
         // Broken off before the manifest: still nothing of anybody.
         std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
-        assert!(RunDirectory::create(run.path(), OlderRun::Keep).is_ok());
+        assert!(RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).is_ok());
         assert!(!run.path().join(".fluxmorph-abc").exists());
     }
 
@@ -340,22 +419,22 @@ mod tests {
         fs::write(&note, "years of work").expect("written");
         for manifest in ["", "{}", r#"{"program": "other"}"#, "[]"] {
             for older in [OlderRun::Keep, OlderRun::Replace] {
-                let error = RunDirectory::create(folder.path(), older).expect_err("foreign");
+                let error = RunDirectory::create(&system_disk(), folder.path(), older).expect_err("foreign");
                 assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
             }
             fs::write(folder.path().join("manifest.json"), manifest).expect("written");
         }
         assert!(note.exists());
-        let error = RunDirectory::create(&note, OlderRun::Replace).expect_err("a file");
+        let error = RunDirectory::create(&system_disk(), &note, OlderRun::Replace).expect_err("a file");
         assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
-        assert!(RunDirectory::open(folder.path()).is_err());
+        assert!(RunDirectory::open(&system_disk(), folder.path()).is_err());
     }
 
     #[test]
     fn an_earlier_run_is_replaced_only_when_forced_and_foreign_files_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = started(&folder.path().join("run"));
-        assert_eq!(RunDirectory::open(run.path()).expect("a run"), run);
+        assert!(RunDirectory::open(&system_disk(), run.path()).is_ok());
         let mut ours =
             vec![run.result(), run.history_csv(), run.field(0), run.field(10_000), run.collection()];
         ours.extend([
@@ -368,13 +447,14 @@ mod tests {
         let foreign = ["notes.md", "fields/eval_best.vtu", "case_1_before.vtu", "case_01.vtu"];
         let foreign = foreign.map(|name| run.path().join(name));
         for path in ours.iter().chain(&foreign) {
-            write_atomic(path, b"x").expect("written");
+            fs::write(path, b"x").expect("written");
         }
-        let error = RunDirectory::create(run.path(), OlderRun::Keep).expect_err("holds a run");
+        let error =
+            RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).expect_err("holds a run");
         assert!(matches!(error, OutputError::HoldsRun { .. }) && error.to_string().contains("--force"));
         assert!(ours.iter().all(|path| path.exists()));
 
-        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
         assert!(ours.iter().all(|path| !path.exists()));
         assert!(foreign.iter().all(|path| path.exists()));
         assert!(run.manifest().exists(), "the mark stays until the next manifest");
@@ -402,16 +482,17 @@ mod tests {
     #[test]
     fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run = RunDirectory::create(&folder.path().join("run"), OlderRun::Keep).expect("new");
+        let run =
+            RunDirectory::create(&system_disk(), &folder.path().join("run"), OlderRun::Keep).expect("new");
         let mut manifest = Manifest::started("run", 1);
         manifest.surfaces =
             ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
         manifest.write(&run).expect("written");
         let (ours, theirs) = (run.surface("optimum_a.stl"), run.surface("optimum_b.stl"));
         for path in [&ours, &theirs, &folder.path().join("stay.stl"), &run.optimum()] {
-            write_atomic(path, b"x").expect("written");
+            fs::write(path, b"x").expect("written");
         }
-        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
         assert!(!ours.exists() && !run.optimum().exists());
         assert!(theirs.exists() && folder.path().join("stay.stl").exists());
     }
@@ -421,11 +502,11 @@ mod tests {
     fn fields_behind_a_link_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let other = started(&folder.path().join("other"));
-        write_atomic(&other.field(0), b"x").expect("written");
+        fs::write(other.field(0), b"x").expect("written");
         let run = started(&folder.path().join("run"));
         fs::remove_dir(run.fields()).expect("removed");
         std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
-        RunDirectory::create(run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
         assert!(other.field(0).exists());
     }
 }

@@ -30,6 +30,16 @@ pub(super) struct Held {
 }
 
 impl SolverMemory {
+    /// A memory of nothing but the method to begin with; `None` is the first one of the ladder.
+    pub fn with_method(method: Option<Method>) -> Self {
+        Self { method, ..Self::default() }
+    }
+
+    /// The method that worked last, where it is not the first of the ladder.
+    pub fn method(&self) -> Option<Method> {
+        self.method
+    }
+
     /// What may serve the same design at another frequency: the preconditioner, as far as the patterns are the same.
     pub fn lent(&self) -> Self {
         Self { held: self.held.clone(), method: self.method, solutions: Vec::new() }

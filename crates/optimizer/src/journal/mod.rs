@@ -1,0 +1,150 @@
+//! `journal.bin`: every evaluation of a run with its raw bits, so that a run can go on where it was broken off.
+//!
+//! NLopt keeps its state to itself, but its methods are deterministic: started afresh and told the same objectives,
+//! constraints and gradients, it asks for the same designs and is in the same state at the end. The journal holds what it
+//! was told. [`crate::driver`] answers from it as long as designs, rounds and reference meshes agree to the last bit.
+//!
+//! The file is a header and records, appended and synced one by one (`codec` has the bytes). Each carries a checksum over
+//! itself and the checksum before it: a record that was cut short, changed or moved ends what is read. A journal belongs to
+//! an [`Identity`]: program version, configuration and mesh.
+
+mod codec;
+mod identity;
+
+use fluxmorph_solver::linear::Method;
+
+use crate::observer::Evaluation;
+use crate::output::{OutputError, RunDirectory, SyncedLog};
+use crate::problem::Timings;
+
+pub use identity::{Identity, Mismatch, configuration_hash, mesh_hash, reference_hash};
+
+/// Largest journal that is read [bytes]: a million evaluations of a thousand variables.
+const LARGEST: u64 = 1 << 34;
+
+/// One evaluation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// Its row in the history; objective and round stand there.
+    pub row: Evaluation,
+    /// Whether it was the best until then.
+    pub improved: bool,
+    /// The design variables [m].
+    pub design: Vec<f64>,
+    /// dF/dp [unit of F per m].
+    pub gradient: Vec<f64>,
+    /// What the constraints measure, in SI, with the derivatives by the variables.
+    pub constraints: Vec<(f64, Vec<f64>)>,
+    /// [`reference_hash`] of the round's reference mesh.
+    pub reference: [u8; 32],
+    /// The method of the linear solver that worked last, by state; `None` where it is the first one.
+    pub methods: Vec<Option<Method>>,
+    /// Largest relative residual of its linear solves.
+    pub worst_residual: f64,
+    /// Where its time went.
+    pub timings: Timings,
+}
+
+/// What the bytes of a journal hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contents {
+    /// What the journal belongs to.
+    pub identity: Identity,
+    /// The whole records, in their order.
+    pub records: Vec<Record>,
+    /// Bytes of header and whole records.
+    pub length: u64,
+    /// Bytes behind them: a record that was cut short, or what a damaged disk left.
+    pub dropped: u64,
+    /// Checksum that the next record carries on.
+    chain: [u8; codec::CHECKSUM],
+}
+
+/// Why bytes are no journal.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// The file begins otherwise.
+    #[error("it does not begin as a journal of fluxmorph does")]
+    NotAJournal,
+    /// The form is that of another program version.
+    #[error("its form has the version {found}, expected {expected}")]
+    Form {
+        /// Version in the file.
+        found: u32,
+        /// Version that is read.
+        expected: u32,
+    },
+    /// The header is damaged.
+    #[error("its header is damaged")]
+    Header,
+}
+
+/// Reads the bytes of a journal. Whatever does not agree with its checksum ends the records.
+///
+/// # Errors
+/// [`JournalError`] when the header cannot be read.
+pub fn parse(bytes: &[u8]) -> Result<Contents, JournalError> {
+    codec::parse(bytes)
+}
+
+/// A journal that is written.
+#[derive(Debug)]
+pub struct Journal {
+    log: SyncedLog,
+    identity: Identity,
+    chain: [u8; codec::CHECKSUM],
+}
+
+impl Journal {
+    /// A new journal in a run directory, without records.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn create(directory: &RunDirectory, identity: Identity) -> Result<Self, OutputError> {
+        let (header, chain) = codec::header(&identity);
+        Ok(Self { log: directory.log(&directory.journal(), &header)?, identity, chain })
+    }
+
+    /// Reads the journal of a run directory; `None` where there is none, since the run was broken off before.
+    ///
+    /// # Errors
+    /// [`OutputError::Damaged`] when its header cannot be read, or when the operating system refuses.
+    pub fn read(directory: &RunDirectory) -> Result<Option<Contents>, OutputError> {
+        let path = directory.journal();
+        match directory.disk().read(&path, LARGEST) {
+            Ok(bytes) => match parse(&bytes) {
+                Ok(contents) => Ok(Some(contents)),
+                Err(error) => Err(OutputError::Damaged { path, message: error.to_string() }),
+            },
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(OutputError::io("read", path)(error)),
+        }
+    }
+
+    /// A journal to go on with behind what was read of it.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.
+    pub fn reopen(directory: &RunDirectory, contents: &Contents) -> Result<Self, OutputError> {
+        let log = directory.reopened(&directory.journal(), contents.length)?;
+        Ok(Self { log, identity: contents.identity.clone(), chain: contents.chain })
+    }
+
+    /// Appends a record and waits until it is on the disk.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    ///
+    /// # Panics
+    /// If the record has another number of variables or constraints than the identity says.
+    pub fn append(&mut self, record: &Record) -> Result<(), OutputError> {
+        let (bytes, chain) = codec::record(record, &self.identity, &self.chain);
+        self.log.append(&bytes)?;
+        self.chain = chain;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

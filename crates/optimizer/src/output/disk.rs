@@ -1,0 +1,196 @@
+//! The few operations through which run directories are written and read back, so that tests can put a disk that fails
+//! in their place.
+//!
+//! What a file must go through to be safe is decided above ([`super::files`]); here is one call for each step.
+
+use std::fmt::Debug;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something.
+pub trait Disk: Debug + Send + Sync {
+    /// Makes a folder and those above it; one that is there already is no error.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn create_dir(&self, path: &Path) -> io::Result<()>;
+
+    /// Makes a new file, readable for others as the user's mask says.
+    ///
+    /// # Errors
+    /// When there is one already, be it a link, or the operating system refuses.
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
+
+    /// Opens a file to write behind its first `length` bytes; what follows them is cut off.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::ResourceBusy`] when another process holds it, or when the operating system refuses.
+    fn append(&self, path: &Path, length: u64) -> io::Result<Box<dyn DiskFile>>;
+
+    /// Whether a file can be held against other processes now.
+    ///
+    /// # Errors
+    /// As [`Disk::append`].
+    fn hold(&self, path: &Path) -> io::Result<()>;
+
+    /// Gives a file another name, in place of what had it.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+
+    /// Removes a file or a link.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn remove(&self, path: &Path) -> io::Result<()>;
+
+    /// Waits until the names in a folder are on the disk.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn sync_dir(&self, path: &Path) -> io::Result<()>;
+
+    /// Reads a whole file.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::FileTooLarge`] beyond `most` bytes, or when the operating system refuses.
+    fn read(&self, path: &Path, most: u64) -> io::Result<Vec<u8>>;
+
+    /// Names in a folder, sorted.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn names(&self, path: &Path) -> io::Result<Vec<String>>;
+
+    /// Whether a folder stands there itself, and not a link to one.
+    fn is_own_dir(&self, path: &Path) -> bool;
+}
+
+/// A file that is written.
+pub trait DiskFile: Write + Debug + Send {
+    /// Waits until the content is on the disk.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn sync(&mut self) -> io::Result<()>;
+
+    /// Cuts off what follows the first `length` bytes, and writes on from there.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    fn cut(&mut self, length: u64) -> io::Result<()>;
+}
+
+/// The disk of the operating system.
+pub fn system_disk() -> Arc<dyn Disk> {
+    Arc::new(SystemDisk)
+}
+
+#[derive(Debug)]
+struct SystemDisk;
+
+impl Disk for SystemDisk {
+    fn create_dir(&self, path: &Path) -> io::Result<()> {
+        fs::create_dir_all(path)
+    }
+
+    fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>> {
+        let file = OpenOptions::new().write(true).create_new(true).open(path)?;
+        hold(&file)?;
+        Ok(Box::new(file))
+    }
+
+    fn append(&self, path: &Path, length: u64) -> io::Result<Box<dyn DiskFile>> {
+        let mut file = OpenOptions::new().write(true).open(path)?;
+        hold(&file)?;
+        DiskFile::cut(&mut file, length)?;
+        Ok(Box::new(file))
+    }
+
+    fn hold(&self, path: &Path) -> io::Result<()> {
+        hold(&OpenOptions::new().write(true).open(path)?)
+    }
+
+    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+        fs::rename(from, to)
+    }
+
+    fn remove(&self, path: &Path) -> io::Result<()> {
+        fs::remove_file(path)
+    }
+
+    /// Other systems than Unix keep names without being asked, and cannot open folders as files.
+    fn sync_dir(&self, path: &Path) -> io::Result<()> {
+        if cfg!(unix) { File::open(path)?.sync_all() } else { Ok(()) }
+    }
+
+    fn read(&self, path: &Path, most: u64) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > most { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+    }
+
+    fn names(&self, path: &Path) -> io::Result<Vec<String>> {
+        let names = fs::read_dir(path)?
+            .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+            .collect::<io::Result<Vec<_>>>();
+        names.map(|mut names| {
+            names.sort();
+            names
+        })
+    }
+
+    fn is_own_dir(&self, path: &Path) -> bool {
+        fs::symlink_metadata(path).is_ok_and(|entry| entry.is_dir())
+    }
+}
+
+/// Holds a file against other processes until it is closed, where the file system can do so.
+fn hold(file: &File) -> io::Result<()> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(io::ErrorKind::ResourceBusy.into()),
+        Err(TryLockError::Error(_)) | Ok(()) => Ok(()),
+    }
+}
+
+impl DiskFile for File {
+    fn sync(&mut self) -> io::Result<()> {
+        self.sync_all()
+    }
+
+    fn cut(&mut self, length: u64) -> io::Result<()> {
+        self.set_len(length)?;
+        io::Seek::seek(self, io::SeekFrom::Start(length)).map(|_| ())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_written_is_held_against_others() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("log");
+        let file = SystemDisk.create(&path).expect("created");
+        let error = SystemDisk.append(&path, 0).expect_err("held");
+        assert_eq!(error.kind(), io::ErrorKind::ResourceBusy);
+        drop(file);
+        assert!(SystemDisk.append(&path, 0).is_ok());
+    }
+
+    #[test]
+    fn a_log_goes_on_where_it_is_cut() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("log");
+        std::fs::write(&path, "abcdef").expect("written");
+        let mut file = SystemDisk.append(&path, 3).expect("opened");
+        file.write_all(b"XY").and_then(|()| file.sync()).expect("written");
+        file.cut(4).and_then(|()| file.write_all(b"Z")).expect("cut");
+        assert_eq!(SystemDisk.read(&path, 5).expect("read"), b"abcXZ");
+        assert_eq!(SystemDisk.read(&path, 4).expect_err("too long").kind(), io::ErrorKind::FileTooLarge);
+    }
+}

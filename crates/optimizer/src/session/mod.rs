@@ -1,0 +1,334 @@
+//! One run or one analysis with its directory: what the commands `run`, `resume` and `solve` do, without a terminal.
+//!
+//! The manifest is written first and completed last; journal, history and fields are written as evaluations come
+//! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
+//! final name is whole, and `resume` goes on with it.
+
+mod recorder;
+mod resume;
+mod summary;
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use fluxmorph_geometry::Mesh;
+
+use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
+use crate::driver;
+use crate::error::Error;
+use crate::exports;
+use crate::fresh_mesh::{Gain, Shapes};
+use crate::journal::{self, Identity};
+use crate::observer::{Observer, Started};
+use crate::output::{
+    Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
+    StopReason, peak_memory_bytes, surface_files,
+};
+use crate::problem::{Problem, Want};
+use crate::rounds::RoundEvent;
+use crate::setup::{Purpose, Setup, set_up};
+use recorder::{DirectoryRecorder, write_collection, write_field};
+pub use resume::{Limits, resume};
+use summary::{constraints, linear_solver, terms};
+
+/// What a session is told beside the configuration.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Where run directories are.
+    pub disk: &'a Arc<dyn Disk>,
+    /// What happens to an earlier run in the output directory.
+    pub older_run: OlderRun,
+    /// Threads in use, for the manifest.
+    pub threads: usize,
+    /// Whether the user wants to stop; asked before each evaluation but the first.
+    pub interrupted: &'a dyn Fn() -> bool,
+}
+
+/// Optimises and writes everything into the run directory.
+///
+/// # Errors
+/// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
+pub fn run(
+    config: &Config,
+    source: &Source,
+    options: Options<'_>,
+    observer: &mut dyn Observer,
+) -> Result<RunResult, Error> {
+    let clock = Instant::now();
+    observer.phase("setting up mesh and matrices");
+    let mut setup = set_up(config, source, Purpose::Optimisation)?;
+    // A first design that the mesh cannot reach is refused before an earlier run is replaced.
+    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
+    let approach = setup.problem.approach(&initial).map_err(|error| unreached(error, source))?;
+    let session = Session::open("run", config, source, options, (setup, clock), observer)?;
+    session.conclude(observer, |session, observer| {
+        let directory = session.directory.clone();
+        let names = constraint_names(&session.setup.problem);
+        let recorder =
+            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?;
+        session.optimise(&approach, recorder, options.interrupted, observer)
+    })
+}
+
+/// Analyses one design and writes its field and result.
+///
+/// # Errors
+/// As [`run`].
+pub fn solve(
+    config: &Config,
+    source: &Source,
+    design: Option<Vec<f64>>,
+    options: Options<'_>,
+    observer: &mut dyn Observer,
+) -> Result<RunResult, Error> {
+    let clock = Instant::now();
+    observer.phase("setting up mesh and matrices");
+    let mut setup = set_up(config, source, Purpose::Analysis)?;
+    let values = match (&setup.problem.shape, design) {
+        (Some(shape), given) => {
+            let values = given.unwrap_or_else(|| shape.initial.clone());
+            let outside = |k: usize| values[k] < shape.lower[k] || values[k] > shape.upper[k];
+            if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
+                observer.warning(&format!(
+                    "design variable {k} = {} mm lies outside its bounds",
+                    values[k] * 1e3
+                ));
+            }
+            Some(values)
+        }
+        (None, _) => None,
+    };
+    // A design that breaks the mesh is refused before an earlier run is replaced.
+    let p = values.as_deref().unwrap_or_default();
+    let approach = setup.problem.approach(p)?;
+    let moved = setup.problem.moved(p)?;
+    let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
+    session.conclude(observer, |session, observer| {
+        let problem = &session.setup.problem;
+        approach.iter().for_each(|event| observer.round(event));
+        observer.phase("solving the field");
+        let p = values.as_deref().unwrap_or_default();
+        let analysis = problem.analyse(p, moved, Want::Gradient)?;
+        for event in &analysis.solver_events {
+            observer.notice(&event.to_string());
+        }
+        let bounds = problem.bounds(p, &analysis)?;
+        if config.output.fields != FieldsKept::Nothing {
+            write_field(&session.directory, 0, problem, &analysis)?;
+            write_collection(&session.directory, &[0])?;
+        }
+        exports::write(config, &session.directory, &analysis.mesh, observer)?;
+        let value = analysis.objective;
+        let initial_quality = problem.quality(&problem.original).worst;
+        Ok(RunResult {
+            evaluations: 1,
+            objective: value.map(|value| ObjectiveResult {
+                initial: value,
+                best: value,
+                ratio: 1.0,
+                best_evaluation: 0,
+                verified_ratio: None,
+                verification: None,
+                terms: terms(problem, &analysis),
+            }),
+            constraints: constraints(problem, &analysis, &bounds),
+            rounds: approach.clone(),
+            ..session.result(
+                StopReason::Done,
+                &analysis,
+                values.as_deref(),
+                initial_quality,
+                &analysis.timings,
+                observer,
+            )?
+        })
+    })
+}
+
+/// A run directory with its manifest, and the problem.
+struct Session<'a> {
+    command: &'static str,
+    config: &'a Config,
+    source: &'a Source,
+    setup: Setup,
+    directory: RunDirectory,
+    manifest: Manifest,
+    clock: Instant,
+    setup_seconds: f64,
+}
+
+impl<'a> Session<'a> {
+    /// Takes the output directory, and writes the manifest.
+    fn open(
+        command: &'static str,
+        config: &'a Config,
+        source: &'a Source,
+        options: Options<'_>,
+        (setup, clock): (Setup, Instant),
+        observer: &mut dyn Observer,
+    ) -> Result<Self, Error> {
+        let setup_seconds = clock.elapsed().as_secs_f64();
+        let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
+        let mut manifest = Manifest::started(command, options.threads).reading(source);
+        manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
+        manifest.surfaces = surface_files(&config.output.stl);
+        manifest.limits = Some(LimitsInForce::of(&config.optimizer));
+        manifest.write(&directory)?;
+        let session = Self { command, config, source, setup, directory, manifest, clock, setup_seconds };
+        session.announce(observer);
+        Ok(session)
+    }
+
+    /// Tells what is set up.
+    fn announce(&self, observer: &mut dyn Observer) {
+        let Self { command, config, setup, directory, .. } = self;
+        let mesh = setup.problem.original.topology();
+        observer.started(&Started {
+            title: &config.title,
+            algorithm: (*command == "run").then(|| config.optimizer.algorithm.name()),
+            variables: setup.problem.shape.as_ref().map_or(0, |s| s.surface.variable_count()),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            unknowns: setup.problem.states.iter().map(|model| model.unknown_count()).sum(),
+            directory: Some(directory.path()),
+        });
+        for warning in &setup.warnings {
+            observer.warning(warning);
+        }
+    }
+
+    /// What the journal of this run belongs to.
+    fn identity(&self) -> Identity {
+        let Problem { shape, constraints, .. } = &self.setup.problem;
+        let variables = shape.as_ref().map_or(0, |shape| shape.surface.variable_count());
+        Identity::new(self.config, &self.setup.full_mesh, variables, constraints.len())
+    }
+
+    /// Optimises, and writes what the best design leaves.
+    fn optimise(
+        &mut self,
+        approach: &[RoundEvent],
+        mut recorder: DirectoryRecorder<'_>,
+        interrupted: &dyn Fn() -> bool,
+        observer: &mut dyn Observer,
+    ) -> Result<RunResult, Error> {
+        let config = self.config;
+        approach.iter().for_each(|event| observer.round(event));
+        let problem = &mut self.setup.problem;
+        let optimised = driver::optimise(problem, &config.optimizer, observer, &mut recorder, interrupted)?;
+        let best = &optimised.best;
+        if config.output.fields == FieldsKept::FirstLast {
+            recorder.write(best.evaluation, problem, &best.analysis)?;
+        }
+        exports::write(config, &self.directory, &best.analysis.mesh, observer)?;
+        let problem = &self.setup.problem;
+        let result = RunResult {
+            evaluations: optimised.evaluations,
+            iterations: optimised.iterations,
+            objective: Some(ObjectiveResult {
+                initial: optimised.initial,
+                best: best.objective,
+                ratio: best.objective / optimised.initial,
+                best_evaluation: best.evaluation,
+                verified_ratio: None,
+                verification: None,
+                terms: terms(problem, &best.analysis),
+            }),
+            constraints: constraints(problem, &best.analysis, &optimised.bounds),
+            rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
+            linear_solver: linear_solver(problem, optimised.worst_residual),
+            ..self.result(
+                optimised.stop_reason,
+                &best.analysis,
+                Some(&best.values),
+                optimised.initial_quality,
+                &optimised.timings,
+                observer,
+            )?
+        };
+        let shapes = Shapes::of(config, &self.setup, &best.values)?;
+        drop(optimised);
+        self.verified(result, &shapes, interrupted, observer)
+    }
+
+    /// Does the work, writes the result, and completes the manifest whatever happens.
+    fn conclude(
+        mut self,
+        observer: &mut dyn Observer,
+        work: impl FnOnce(&mut Self, &mut dyn Observer) -> Result<RunResult, Error>,
+    ) -> Result<RunResult, Error> {
+        let outcome =
+            self.write_configuration().and_then(|()| work(&mut self, observer)).and_then(|result| {
+                result.write(&self.directory)?;
+                Ok(result)
+            });
+        let status = outcome.as_ref().map_or(RunStatus::Failed, |result| result.status);
+        self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
+        let completed = self.manifest.write(&self.directory);
+        let result = outcome?;
+        completed?;
+        observer.finished(&result);
+        Ok(result)
+    }
+
+    fn write_configuration(&self) -> Result<(), Error> {
+        self.directory.write(&self.directory.config(), self.source.text().as_bytes())?;
+        Ok(self.directory.write(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
+    }
+
+    /// The result with the gain checked on a fresh mesh; the run's own problem is gone then.
+    ///
+    /// # Errors
+    /// When the result cannot be written.
+    fn verified(
+        &mut self,
+        mut result: RunResult,
+        shapes: &Shapes,
+        interrupted: &dyn Fn() -> bool,
+        observer: &mut dyn Observer,
+    ) -> Result<RunResult, Error> {
+        // The check may need more memory or patience than there is: what the run has found is safe before.
+        result.write(&self.directory)?;
+        (self.setup.problem.states, self.setup.problem.shape) = (Vec::new(), None);
+        let clock = Instant::now();
+        let gain = Gain { config: self.config, source: self.source, stop_reason: result.stop_reason, shapes };
+        if let Some(objective) = &mut result.objective {
+            gain.verify(objective, interrupted, observer);
+        }
+        let seconds = clock.elapsed().as_secs_f64();
+        result.timings_s.insert("verification".to_owned(), seconds);
+        result.timings_s.insert("total".to_owned(), self.clock.elapsed().as_secs_f64());
+        result.peak_memory_bytes = peak_memory_bytes();
+        Ok(result)
+    }
+}
+
+/// A first design that the mesh cannot reach is a fault of the configuration.
+fn unreached(error: Error, source: &Source) -> Error {
+    match error {
+        Error::DesignUnreached { .. } => {
+            let fault = source.fault("design.initial", error.to_string());
+            source.error(vec![fault]).into()
+        }
+        other => other,
+    }
+}
+
+/// Names of the constraints in their order.
+fn constraint_names(problem: &Problem) -> Vec<&str> {
+    problem.constraints.iter().map(|constraint| constraint.name.as_str()).collect()
+}
+
+/// Origin and content hash of the mesh with all its regions.
+pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
+    let origin = match &config.mesh {
+        MeshConfig::Shield(_) => "shield".to_owned(),
+        MeshConfig::Block(_) => "block".to_owned(),
+        MeshConfig::Boxes(_) => "boxes".to_owned(),
+        MeshConfig::Sphere(_) => "sphere".to_owned(),
+        MeshConfig::File { path, .. } => path.display().to_string(),
+    };
+    let topology = mesh.topology();
+    let hash = blake3::Hash::from_bytes(journal::mesh_hash(mesh)).to_hex().to_string();
+    MeshHash { origin, blake3: hash, nodes: topology.node_count(), tets: topology.tets().len() }
+}
