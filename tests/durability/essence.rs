@@ -1,0 +1,106 @@
+//! What two runs must have in common: every file, but for times, memory and the manifest.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use fluxmorph_optimizer::journal;
+use fluxmorph_optimizer::problem::Timings;
+use serde_json::Value;
+
+/// The files of a run by their paths, without what depends on the clock.
+pub(crate) type Essence = BTreeMap<PathBuf, Vec<u8>>;
+
+/// The files of a run without what depends on the clock.
+pub(crate) fn essence(files: &BTreeMap<PathBuf, Vec<u8>>) -> Essence {
+    let stripped = |(path, bytes): (&PathBuf, &Vec<u8>)| {
+        let name = path.file_name()?.to_str()?;
+        let bytes = match name {
+            "manifest.json" => return None,
+            "result.json" => result(bytes),
+            "history.jsonl" => lines(bytes),
+            "history.csv" => table(bytes),
+            "journal.bin" => format!("{:?}", records(bytes)).into_bytes(),
+            // The limits may differ, and are written there.
+            "resolved.toml" => return None,
+            _ => bytes.clone(),
+        };
+        Some((path.clone(), bytes))
+    };
+    files.iter().filter_map(stripped).collect()
+}
+
+/// The files of a folder.
+pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(&next).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below it").to_owned();
+                found.insert(name, std::fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    found
+}
+
+/// Says which file differs, not only that one does.
+pub(crate) fn assert_same(own: &Essence, expected: &Essence, context: &str) {
+    let names = |essence: &Essence| essence.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(own), names(expected), "{context}");
+    for (path, bytes) in own {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(&bytes[..bytes.len().min(2000)]).into_owned();
+        assert!(
+            *bytes == expected[path],
+            "{context}: {} differs\n{}\n---\n{}",
+            path.display(),
+            text(bytes),
+            text(&expected[path])
+        );
+    }
+}
+
+fn result(bytes: &[u8]) -> Vec<u8> {
+    let mut value: Value = serde_json::from_slice(bytes).expect("a result");
+    let object = value.as_object_mut().expect("an object");
+    object.remove("timings_s");
+    object.remove("peak_memory_bytes");
+    value.to_string().into_bytes()
+}
+
+fn lines(bytes: &[u8]) -> Vec<u8> {
+    let text = std::str::from_utf8(bytes).expect("text");
+    let line = |line: &str| {
+        let mut value: Value = serde_json::from_str(line).expect("a row");
+        value.as_object_mut().expect("an object").remove("seconds");
+        format!("{value}\n")
+    };
+    text.lines().map(line).collect::<String>().into_bytes()
+}
+
+fn table(bytes: &[u8]) -> Vec<u8> {
+    let text = std::str::from_utf8(bytes).expect("text");
+    let header: Vec<&str> = text.lines().next().expect("a header").split(',').collect();
+    let seconds = header.iter().position(|&name| name == "seconds").expect("a column");
+    let line = |line: &str| {
+        // No cell before that column holds a comma.
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells.remove(seconds);
+        cells.join(",") + "\n"
+    };
+    text.lines().map(line).collect::<String>().into_bytes()
+}
+
+fn records(bytes: &[u8]) -> Vec<journal::Record> {
+    let contents = journal::parse(bytes).expect("a journal");
+    assert_eq!(contents.dropped, 0);
+    let strip = |mut record: journal::Record| {
+        record.row.seconds = 0.0;
+        record.timings = Timings::default();
+        record
+    };
+    contents.records.into_iter().map(strip).collect()
+}
