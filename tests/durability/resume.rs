@@ -73,6 +73,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("constrained", constrained()),
         ("rounds", with_rounds()),
         ("last", first_last()),
+        ("shield", shipped("shield_quick.toml")),
     ] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.bin")]);
@@ -85,6 +86,13 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
     }
 }
 
+/// The quick shield, which keeps the fields of its first and its last evaluation alone.
+fn shipped_with(evaluations: usize) -> (Config, Source) {
+    let (mut config, source) = shipped("shield_quick.toml");
+    config.optimizer.max_evaluations = evaluations;
+    (config, source)
+}
+
 #[test]
 fn the_rounds_of_the_device_are_there_to_be_tested() {
     let (files, _) = whole_run(&with_rounds());
@@ -95,7 +103,7 @@ fn the_rounds_of_the_device_are_there_to_be_tested() {
 
 #[test]
 fn a_run_may_be_cut_again_and_again() {
-    for device in [constrained(), with_rounds()] {
+    for device in [constrained(), with_rounds(), shipped_with(8)] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.bin")]);
         let mut disk = cut_behind(&files, 0);

@@ -127,7 +127,7 @@ impl RunDirectory {
             self.remove_if_there(&self.path.join(name))?;
         }
         self.remove_unfinished(&self.path)?;
-        self.remove_fields(0)
+        self.remove_fields(&[])
     }
 
     /// Whether no other process writes a run here.
@@ -143,23 +143,24 @@ impl RunDirectory {
         }
     }
 
-    /// Removes what a killed process left half-written, and the fields of evaluations from a number on.
+    /// Removes what a killed process left half-written, and the fields of all evaluations but some.
     ///
     /// # Errors
     /// When the operating system refuses.
-    pub fn remove_leftovers(&self, evaluations: usize) -> Result<(), OutputError> {
+    pub fn remove_leftovers(&self, kept: &[usize]) -> Result<(), OutputError> {
         self.remove_unfinished(&self.path)?;
-        self.remove_fields(evaluations)
+        self.remove_fields(kept)
     }
 
-    fn remove_fields(&self, from: usize) -> Result<(), OutputError> {
+    fn remove_fields(&self, kept: &[usize]) -> Result<(), OutputError> {
         let fields = self.fields();
         // A link may lead to the fields of another run: those stay.
         if !self.disk.is_own_dir(&fields) {
             return Ok(());
         }
         self.remove_unfinished(&fields)?;
-        let removed = |name: &&String| field_number(name).is_some_and(|evaluation| evaluation >= from);
+        let removed =
+            |name: &&String| field_number(name).is_some_and(|evaluation| !kept.contains(&evaluation));
         for name in self.entries(&fields)?.iter().filter(removed) {
             self.remove_if_there(&fields.join(name))?;
         }

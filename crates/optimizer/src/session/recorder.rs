@@ -62,7 +62,7 @@ impl<'a> DirectoryRecorder<'a> {
         written.retain(|&evaluation| records.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
         // No collection names a file that is removed.
         write_collection(directory, &written)?;
-        directory.remove_leftovers(records.len())?;
+        directory.remove_leftovers(&written)?;
         Ok(Self { directory, journal, history, kept, written, recalled: records.into() })
     }
 
