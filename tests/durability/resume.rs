@@ -67,12 +67,15 @@ fn whole_run(device: &(Config, Source)) -> (BTreeMap<PathBuf, Vec<u8>>, Essence)
 
 #[test]
 fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
-    let first_last = || block(&[("verify_refinement = 0", "verify_refinement = 0\nfields = \"first_last\"")]);
+    let kept = |fields: &str| {
+        block(&[("verify_refinement = 0", &format!("verify_refinement = 0\nfields = \"{fields}\""))])
+    };
     for (name, device) in [
         ("plain", block(&[])),
         ("constrained", constrained()),
         ("rounds", with_rounds()),
-        ("last", first_last()),
+        ("last", kept("first_last")),
+        ("none", kept("none")),
         ("shield", shipped("shield_quick.toml")),
     ] {
         let (files, expected) = whole_run(&device);

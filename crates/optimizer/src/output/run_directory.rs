@@ -121,10 +121,10 @@ impl RunDirectory {
         // The list is a file's content: only names that this program gives are taken from it.
         let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
         for name in FILES.iter().copied().chain(surfaces) {
-            self.remove_if_there(&self.path.join(name))?;
+            self.remove(&self.path.join(name))?;
         }
         for name in self.entries(&self.path)?.iter().filter(|name| is_case(name)) {
-            self.remove_if_there(&self.path.join(name))?;
+            self.remove(&self.path.join(name))?;
         }
         self.remove_unfinished(&self.path)?;
         self.remove_fields(&[])
@@ -162,7 +162,7 @@ impl RunDirectory {
         let removed =
             |name: &&String| field_number(name).is_some_and(|evaluation| !kept.contains(&evaluation));
         for name in self.entries(&fields)?.iter().filter(removed) {
-            self.remove_if_there(&fields.join(name))?;
+            self.remove(&fields.join(name))?;
         }
         Ok(())
     }
@@ -180,7 +180,7 @@ impl RunDirectory {
 
     fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
         for name in self.entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
-            self.remove_if_there(&folder.join(name))?;
+            self.remove(&folder.join(name))?;
         }
         Ok(())
     }
@@ -195,7 +195,11 @@ impl RunDirectory {
         }
     }
 
-    fn remove_if_there(&self, path: &Path) -> Result<(), OutputError> {
+    /// Removes a file of the run, if it is there.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn remove(&self, path: &Path) -> Result<(), OutputError> {
         match self.disk.remove(path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
                 Err(OutputError::io("remove", path)(error))

@@ -172,7 +172,7 @@ impl<'a> Session<'a> {
         let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
         manifest.surfaces = surface_files(&config.output.stl);
-        manifest.limits = Some(LimitsInForce::of(&config.optimizer));
+        manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
         manifest.write(&directory)?;
         let session = Self { command, config, source, setup, directory, manifest, clock, setup_seconds };
         session.announce(observer);

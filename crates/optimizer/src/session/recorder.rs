@@ -61,7 +61,11 @@ impl<'a> DirectoryRecorder<'a> {
         let mut written = directory.evaluations_with_fields()?;
         written.retain(|&evaluation| records.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
         // No collection names a file that is removed.
-        write_collection(directory, &written)?;
+        if written.is_empty() {
+            directory.remove(&directory.collection())?;
+        } else {
+            write_collection(directory, &written)?;
+        }
         directory.remove_leftovers(&written)?;
         Ok(Self { directory, journal, history, kept, written, recalled: records.into() })
     }
