@@ -24,9 +24,21 @@ test-long:
 verify:
     cargo test --release --test verification -- --ignored --nocapture write_the_table
 
+# Tables of mesh motion in docs/torture.md, of killed runs, full disks and signals in docs/robustness.md
+torture: torture-meshes torture-runs
+
 # Computes the tables of mesh motion in docs/torture.md
-torture:
+torture-meshes:
     cargo test --release -p fluxmorph-remesh --test torture -- --ignored --nocapture write_the_table
+
+# Real kills, full disks (as root, or where this user may mount) and timed signals; writes docs/robustness.md
+torture-runs:
+    cargo test --release --test real_runs -- --ignored --nocapture write_the_table
+
+# The same bits from the program built without and with optimisation
+determinism:
+    cargo build
+    cargo test --release --test real_runs -- --ignored --nocapture debug_and_release
 
 # The fields of fresh runs read through VTK; installs pyvista with pip below target/
 test-pyvista:
@@ -47,6 +59,18 @@ bench-kernels:
 # A first optimisation, in seconds (it ends at its limit of evaluations): results in configs/runs/shield_quick
 demo:
     cargo run --release -- run configs/shield_quick.toml --force || test $? -eq 1
+
+# Fuzz one reader (msh22, msh41_ascii, msh41_binary, config, quantity, journal); needs `cargo install cargo-fuzz`
+fuzz TARGET SECONDS="60":
+    fuzz/run {{ TARGET }} {{ SECONDS }}
+
+# Fuzz all readers one after the other, so many seconds each
+fuzz-all SECONDS="60":
+    for target in msh22 msh41_ascii msh41_binary config quantity journal; do fuzz/run $target {{ SECONDS }} || exit 1; done
+
+# The boundary to NLopt with address and undefined-behaviour sanitizers, C included; needs clang
+sanitize:
+    fuzz/sanitize
 
 # What must be green before a change is taken
 ci:

@@ -24,13 +24,20 @@ fn a_run_leaves_every_file_and_the_files_agree_with_each_other() {
         let home = folder();
         let run = run(model, &home.path().join("out"));
         let fields = (0..EVALUATIONS).map(|e| format!("fields/eval_{e:04}.vtu"));
-        let mut expected: Vec<String> =
-            ["config.toml", "fields.pvd", "history.csv", "history.jsonl", "manifest.json", "resolved.toml"]
-                .iter()
-                .map(ToString::to_string)
-                .chain(fields)
-                .chain(["optimum.msh", "optimum_plate_bottom.stl", "result.json"].map(str::to_owned))
-                .collect();
+        let mut expected: Vec<String> = [
+            "config.toml",
+            "fields.pvd",
+            "history.csv",
+            "history.jsonl",
+            "journal.bin",
+            "manifest.json",
+            "resolved.toml",
+        ]
+        .iter()
+        .map(ToString::to_string)
+        .chain(fields)
+        .chain(["optimum.msh", "optimum_plate_bottom.stl", "result.json"].map(str::to_owned))
+        .collect();
         expected.sort();
         assert_eq!(files_below(&run.0), expected, "{model:?}");
 

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::algorithm::{Minimisation, Sample, minimise};
 use fluxmorph_optimizer::config::Algorithm;
 use fluxmorph_optimizer::journal::{Identity, Journal, Record, parse};
@@ -17,15 +18,6 @@ const VARIABLES: usize = 91;
 
 /// Length of the run.
 const EVALUATIONS: usize = 120;
-
-const ALL: [Algorithm; 6] = [
-    Algorithm::Mma,
-    Algorithm::Ccsaq,
-    Algorithm::Slsqp,
-    Algorithm::Lbfgs,
-    Algorithm::Tnewton,
-    Algorithm::Var2,
-];
 
 /// A chain of Rosenbrock's valleys about 10 mm, never done in so few evaluations, and the bound of a sphere on it.
 fn function(p: &[f64]) -> (f64, Vec<f64>, (f64, Vec<f64>)) {
@@ -107,9 +99,9 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
     let (mut count, mut computed) = (0, 0);
     // No two variables alike: a symmetric start would be a problem of few variables.
     let start: Vec<f64> = (0..VARIABLES).map(|k| -0.004 + 0.006 * (k as f64).sin().abs()).collect();
-    minimise::<()>(&settings, &start, |p| {
+    minimise::<Error>(&settings, &start, |p| {
         if count == EVALUATIONS {
-            return Err(());
+            return Err(Error::Optimisation { cause: "enough" });
         }
         let record = match recalled.get(count) {
             Some(record) => {
@@ -133,7 +125,7 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
 
 #[test]
 fn every_algorithm_is_brought_back_into_its_state_at_every_evaluation() {
-    for algorithm in ALL {
+    for algorithm in Algorithm::ALL {
         let (whole, computed) = minimised(algorithm, None);
         assert_eq!(computed, EVALUATIONS, "{algorithm:?} is to run that long");
         let all = parse(&whole).expect("a journal");

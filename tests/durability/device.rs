@@ -7,75 +7,10 @@ use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Config, Source};
 use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::{Disk, OlderRun, RunResult};
-use fluxmorph_optimizer::session::{self, Limits, Options};
+use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
 
 /// An iron block over a gap in a uniform field; its lower face moves.
-const BLOCK: &str = r#"
-title = "Block over a gap"
-
-[mesh]
-generator = "boxes"
-
-[mesh.boxes]
-box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "30 mm", "40 mm"]]
-
-[[mesh.boxes.regions]]
-name = "observation"
-box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "10 mm", "10 mm"]]
-cells = [1, 1, 1]
-
-[[mesh.boxes.regions]]
-name = "gap"
-box = [["0 mm", "0 mm", "10 mm"], ["20 mm", "20 mm", "20 mm"]]
-cells = [2, 2, 1]
-
-[[mesh.boxes.regions]]
-name = "iron"
-box = [["0 mm", "0 mm", "20 mm"], ["20 mm", "20 mm", "30 mm"]]
-cells = [2, 2, 1]
-
-[[mesh.boxes.surfaces]]
-name = "face"
-box = [["0 mm", "0 mm", "20 mm"], ["20 mm", "20 mm", "20 mm"]]
-
-[analysis]
-frequency = "50 Hz"
-
-[materials.iron]
-relative_permeability = 100
-conductivity = "1e6 S/m"
-
-[regions.iron]
-material = "iron"
-
-[boundaries]
-flux_parallel = ["x_min", "y_min"]
-flux_normal = ["z_min"]
-uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = [0.0, 0.0, 0.1] }
-
-[objective]
-kind = "flux_density_squared"
-region = "observation"
-weighting = "volume"
-
-[design]
-surface = "face"
-direction = [0.0, 0.0, -1.0]
-lower = "-4 mm"
-upper = "4 mm"
-
-[remesh]
-region = ["gap", "iron"]
-slide = ["x_min", "y_min"]
-
-[optimizer]
-algorithm = "mma"
-max_evaluations = 6
-ftol_rel = 0
-
-[output]
-verify_refinement = 0
-"#;
+const BLOCK: &str = include_str!("block.toml");
 
 /// Where the runs write.
 pub(crate) const FOLDER: &str = "/runs/block";
@@ -127,5 +62,5 @@ pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, Source)) -> 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
     let options = Options { disk, older_run: OlderRun::Keep, threads: 1, interrupted: &|| false };
-    session::resume(FOLDER.as_ref(), limits, options, &mut Silent)
+    session::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
 }

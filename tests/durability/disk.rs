@@ -159,7 +159,14 @@ impl State {
     /// The power fails: what is left is durable.
     fn crash(&mut self, fault: Fault) {
         if fault == Fault::CrashLosing {
-            self.names.clone_from(&self.durable_names);
+            // What has no durable way that leads to it is lost as well.
+            let durable = &self.durable_names;
+            let is_reached = |path: &PathBuf| {
+                let mut above = path.ancestors().skip(1).filter(|folder| folder.parent().is_some());
+                above.all(|folder| durable.get(folder) == Some(&Node::Folder))
+            };
+            self.names =
+                durable.iter().filter(|(path, _)| is_reached(path)).map(|(p, n)| (p.clone(), *n)).collect();
         }
         for content in &mut self.files {
             match fault {
@@ -252,10 +259,6 @@ impl Disk for SimulatedDisk {
             .collect();
         state.durable_names.retain(|name, _| !own(name));
         state.durable_names.extend(now);
-        // A folder that can be synced has a way that leads to it.
-        for folder in path.ancestors() {
-            state.durable_names.insert(folder.to_owned(), Node::Folder);
-        }
         Ok(())
     }
 
@@ -283,8 +286,8 @@ impl Disk for SimulatedDisk {
         Ok(state.names.keys().filter(|name| name.parent() == Some(path)).filter_map(name).collect())
     }
 
-    fn is_own_dir(&self, path: &Path) -> bool {
-        self.state().names.get(path) == Some(&Node::Folder)
+    fn is_link(&self, _: &Path) -> bool {
+        false
     }
 }
 

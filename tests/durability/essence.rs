@@ -1,7 +1,7 @@
 //! What two runs must have in common: every file, but for times, memory and the manifest.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use fluxmorph_optimizer::journal;
 use fluxmorph_optimizer::problem::Timings;
@@ -15,36 +15,17 @@ pub(crate) fn essence(files: &BTreeMap<PathBuf, Vec<u8>>) -> Essence {
     let stripped = |(path, bytes): (&PathBuf, &Vec<u8>)| {
         let name = path.file_name()?.to_str()?;
         let bytes = match name {
-            "manifest.json" => return None,
+            "manifest.json" | "journal.damaged.bin" => return None,
             "result.json" => result(bytes),
             "history.jsonl" => lines(bytes),
             "history.csv" => table(bytes),
             "journal.bin" => format!("{:?}", records(bytes)).into_bytes(),
-            // The limits may differ, and are written there.
-            "resolved.toml" => return None,
+            "resolved.toml" => without_own_keys(bytes),
             _ => bytes.clone(),
         };
         Some((path.clone(), bytes))
     };
     files.iter().filter_map(stripped).collect()
-}
-
-/// The files of a folder.
-pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(next) = folders.pop() {
-        for entry in std::fs::read_dir(&next).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(folder).expect("below it").to_owned();
-                found.insert(name, std::fs::read(&path).expect("a file"));
-            }
-        }
-    }
-    found
 }
 
 /// Says which file differs, not only that one does.
@@ -61,6 +42,18 @@ pub(crate) fn assert_same(own: &Essence, expected: &Essence, context: &str) {
             text(&expected[path])
         );
     }
+}
+
+/// Without limits, which a resumed run may have others of, and without the directory.
+fn without_own_keys(bytes: &[u8]) -> Vec<u8> {
+    let mut table: toml::Table = std::str::from_utf8(bytes).expect("text").parse().expect("TOML");
+    for (name, keys) in
+        [("optimizer", ["max_evaluations", "max_time"].as_slice()), ("output", &["directory"])]
+    {
+        let own = table.get_mut(name).and_then(toml::Value::as_table_mut).expect("every run has it");
+        keys.iter().for_each(|key| drop(own.remove(*key)));
+    }
+    table.to_string().into_bytes()
 }
 
 fn result(bytes: &[u8]) -> Vec<u8> {
@@ -96,7 +89,7 @@ fn table(bytes: &[u8]) -> Vec<u8> {
 
 fn records(bytes: &[u8]) -> Vec<journal::Record> {
     let contents = journal::parse(bytes).expect("a journal");
-    assert_eq!(contents.dropped, 0);
+    assert_eq!(contents.rest.bytes(), 0);
     let strip = |mut record: journal::Record| {
         record.row.seconds = 0.0;
         record.timings = Timings::default();

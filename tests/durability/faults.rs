@@ -1,20 +1,19 @@
 //! Every operation on files of a run, and of a resumed run, fails in every way once: nothing is lost, nothing is torn, and
 //! no failed write is taken for a success.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use fluxmorph_geometry::io::read_vtu;
+use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::cli::ExitCode;
 use fluxmorph_optimizer::config::{Config, Source};
-use fluxmorph_optimizer::output::RunResult;
+use fluxmorph_optimizer::output::{OutputError, RunResult};
 use fluxmorph_optimizer::session::Limits;
-use fluxmorph_optimizer::{Error, journal};
 use rayon::prelude::*;
 
 use crate::device::{FOLDER, block, constrained, resume, run, with_rounds};
 use crate::disk::{Fault, SimulatedDisk};
 use crate::essence::{Essence, assert_same, essence};
+use crate::whole::{Logs, torn};
 
 /// What was tried, and what came of it.
 #[derive(Debug, Default)]
@@ -89,7 +88,12 @@ impl Trial<'_> {
             match resume(&disk.shared(), self.limits) {
                 Ok(_) => tally.resumed = 1,
                 // So early that there is nothing to go on with.
-                Err(Error::NotResumable { .. } | Error::Output(_)) => {
+                Err(Error::NotResumable { .. } | Error::Output(OutputError::NoRun { .. })) => {
+                    let journal = disk.files(FOLDER.as_ref()).remove(Path::new("journal.bin"));
+                    assert!(
+                        journal.is_none(),
+                        "{context}: evaluations are there, and cannot be gone on with"
+                    );
                     run(&disk.shared(), self.device).unwrap_or_else(|e| panic!("{context}: {e}"));
                     tally.started_again = 1;
                 }
@@ -103,34 +107,8 @@ impl Trial<'_> {
 
 /// No file under its final name is torn; logs may end in the middle of a record after a crash.
 fn check_whole(disk: &SimulatedDisk, fault: Fault, context: &str) {
-    let files = disk.files(FOLDER.as_ref());
-    let own = |(path, _): &(&PathBuf, &Vec<u8>)| !path.to_string_lossy().contains(".fluxmorph-");
-    let whole: BTreeMap<&PathBuf, &Vec<u8>> = files.iter().filter(own).collect();
-    let scratch = tempfile::tempdir().expect("a temporary folder");
-    for (path, bytes) in &whole {
-        let text = String::from_utf8_lossy(bytes);
-        let name = path.file_name().and_then(|name| name.to_str()).expect("a name");
-        let is_whole = match path.extension().and_then(|e| e.to_str()).expect("an extension") {
-            "json" => serde_json::from_slice::<serde_json::Value>(bytes).is_ok(),
-            "toml" => !text.is_empty() && text.parse::<toml::Table>().is_ok(),
-            "vtu" => {
-                let file = scratch.path().join("field.vtu");
-                std::fs::write(&file, bytes).expect("written");
-                read_vtu(&file).is_ok_and(|contents| !contents.points.is_empty())
-            }
-            "pvd" => {
-                let named = text.split("file=\"").skip(1).filter_map(|rest| rest.split('"').next());
-                let exist = named.clone().all(|file| whole.contains_key(&PathBuf::from(file)));
-                text.ends_with("</VTKFile>\n") && exist
-            }
-            "msh" => text.ends_with("$EndElements\n"),
-            "stl" => bytes.len() > 84,
-            "csv" | "jsonl" => fault.is_crash() || text.is_empty() || text.ends_with('\n'),
-            "bin" => journal::parse(bytes).is_ok(),
-            other => panic!("{context}: unexpected file {name} ({other})"),
-        };
-        assert!(is_whole, "{context}: {} is torn", path.display());
-    }
+    let logs = if fault.is_crash() { Logs::MayBeCut } else { Logs::AreWhole };
+    assert_eq!(torn(&disk.files(FOLDER.as_ref()), logs), Vec::<String>::new(), "{context}");
 }
 
 /// The essence of a run without faults.

@@ -7,3 +7,4 @@ mod disk;
 mod essence;
 mod faults;
 mod resume;
+mod whole;

@@ -12,7 +12,7 @@ use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Recorder, optimise};
 use fluxmorph_optimizer::journal::Record;
-use fluxmorph_optimizer::observer::{Evaluation, Silent};
+use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::setup::{Purpose, set_up};

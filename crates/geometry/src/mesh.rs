@@ -21,6 +21,7 @@ impl Mesh {
     ///
     /// # Errors
     /// [`MeshError::PointCount`], [`MeshError::NotFinite`] (first node), [`MeshError::Inverted`] (worst element).
+    #[expect(clippy::disallowed_methods, reason = "numbers of elements tell equal volumes apart")]
     pub fn new(topology: Arc<Topology>, points: Vec<Point>) -> Result<Self, MeshError> {
         if points.len() != topology.node_count() {
             return Err(MeshError::PointCount { points: points.len(), nodes: topology.node_count() });
@@ -35,9 +36,13 @@ impl Mesh {
             .par_iter()
             .enumerate()
             .map(|(e, tet)| (tet4::volume(tet.map(|n| mesh.points[n.index()])), e))
-            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            // Coordinates so large that a product overflows give a volume that is no number: worse than any other.
+            .min_by(|a, b| {
+                let order = |volume: f64| if volume.is_finite() { volume } else { f64::NEG_INFINITY };
+                order(a.0).total_cmp(&order(b.0)).then(a.1.cmp(&b.1))
+            });
         match smallest {
-            Some((volume, e)) if volume <= 0.0 => {
+            Some((volume, e)) if !(volume > 0.0 && volume.is_finite()) => {
                 let element = ElementId::new(e);
                 let centroid = tet4::centroid(mesh.vertices(element));
                 Err(MeshError::Inverted { element, volume, centroid })

@@ -186,6 +186,11 @@ impl Topology {
         }
     }
 
+    /// The cells of a region as given by [`Topology::with_cells`]; `None` where its elements are its cells.
+    pub fn given_cells(&self, region: &str) -> Option<&[Vec<ElementId>]> {
+        self.cells.get(region).map(Vec::as_slice)
+    }
+
     /// Names of the surfaces, sorted.
     pub fn surface_names(&self) -> impl Iterator<Item = &str> {
         self.surfaces.keys().map(String::as_str)

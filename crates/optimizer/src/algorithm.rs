@@ -4,8 +4,9 @@
 //! one after the other, in an order of its own: the first question evaluates the design, the others are answered from
 //! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
 //! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
-//! thrown away. A panic inside the closure would abort the process at the C boundary: it is caught here and goes on
-//! after NLopt has returned.
+//! thrown away. A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
+//! NLopt's that is no number, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
+//! caught here and goes on after NLopt has returned.
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -13,6 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use nlopt::{FailState, Nlopt, SuccessState, Target};
 
 use crate::config::Algorithm;
+use crate::error::Error;
 
 /// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres. The
 /// methods that are not invariant under scaling were measured there.
@@ -20,6 +22,9 @@ const SCALED_SPAN: f64 = 25.0;
 
 /// Below every objective: returning less makes NLopt stop.
 const STOP_VALUE: f64 = -1e300;
+
+/// Largest magnitude of a number that NLopt is shown: its methods square and multiply what is of order one at the start.
+const LARGEST: f64 = 1e100;
 
 /// Largest value of a constraint, relative to its bound, that counts as satisfied: far below the error of a mesh, and
 /// above what the conservative methods leave of rounding.
@@ -34,6 +39,50 @@ pub struct Sample {
     pub gradient: Vec<f64>,
     /// Values of the constraints, satisfied where ≤ 0 and of order one, with their gradients.
     pub constraints: Vec<(f64, Vec<f64>)>,
+}
+
+impl Sample {
+    /// Whether an optimiser may see it.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] names the first number that is none, or is beyond every range; [`Error::Optimisation`] where
+    /// there is not one derivative a variable, or another number of constraints.
+    pub fn check(&self, variables: usize, constraints: usize) -> Result<(), Error> {
+        let refuse = |what: String, value: f64| {
+            let expected = "expected a finite number below 1e100 after division by the initial design's value; check weights, \
+                            bounds of constraints and units";
+            Err(Error::NotFinite { what, value, expected })
+        };
+        let is_sound = |value: f64| value.abs() <= LARGEST;
+        let derivatives = |of: &str, gradient: &[f64]| {
+            if gradient.len() != variables {
+                return Err(Error::Optimisation {
+                    cause: "an evaluation gives another number of derivatives than there are design variables",
+                });
+            }
+            match gradient.iter().enumerate().find(|(_, g)| !is_sound(**g)) {
+                Some((k, &value)) => refuse(format!("the derivative of {of} by design variable {k}"), value),
+                None => Ok(()),
+            }
+        };
+        if !is_sound(self.value) {
+            return refuse("the relative objective".to_owned(), self.value);
+        }
+        derivatives("the relative objective", &self.gradient)?;
+        if self.constraints.len() != constraints {
+            return Err(Error::Optimisation {
+                cause: "an evaluation gives another number of constraints than the method was told",
+            });
+        }
+        for (number, (value, gradient)) in self.constraints.iter().enumerate() {
+            let name = format!("constraint {number}, relative to its bound,");
+            derivatives(&name, gradient)?;
+            if !is_sound(*value) {
+                return refuse(name, *value);
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What to minimise within, and when to stop.
@@ -98,14 +147,28 @@ impl Algorithm {
 
 /// Minimises from `start`: `evaluate` gives objective and constraints of a design, and is asked once for each.
 ///
-/// The closure's error ends the minimisation as [`Outcome::Interrupted`].
-pub fn minimise<E>(
+/// The closure's error ends the minimisation as [`Outcome::Interrupted`], and so does a sample that
+/// [`Sample::check`] refuses.
+///
+/// # Panics
+/// When `evaluate` does.
+pub fn minimise<E: From<Error>>(
     settings: &Minimisation,
     start: &[f64],
     evaluate: impl FnMut(&[f64]) -> Result<Sample, E>,
 ) -> Outcome<E> {
-    let unit: Vec<f64> =
-        settings.lower.iter().zip(&settings.upper).map(|(low, high)| (high - low) / SCALED_SPAN).collect();
+    let [lower, upper] = [&settings.lower, &settings.upper];
+    let are_sound = start.len() == lower.len()
+        && start.len() == upper.len()
+        && start.iter().all(|p| p.is_finite())
+        // Of infinite bounds the span is no length either.
+        && lower.iter().zip(upper).all(|(low, high)| low <= high && (high - low).is_finite());
+    if !are_sound {
+        return Outcome::Failed("a bound or the first design is not finite, or the bounds cross");
+    }
+    // A variable between equal bounds keeps its value in any unit.
+    let unit_of = |span: f64| if span > 0.0 { span / SCALED_SPAN } else { 1.0 };
+    let unit: Vec<f64> = lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect();
     let factor = settings.algorithm.objective_scale();
     let scaled =
         |values: &[f64]| -> Vec<f64> { values.iter().zip(&unit).map(|(v, unit)| v / unit).collect() };
@@ -214,7 +277,7 @@ struct Bridge<'a, F, E> {
     interruption: Option<Interruption<E>>,
 }
 
-impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
+impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
     /// The sample at a design of NLopt's; `None` once the closure has been interrupted.
     fn at(&mut self, x: &[f64]) -> Option<&Sample> {
         if self.interruption.is_some() {
@@ -223,6 +286,13 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
         self.asked += 1;
         if self.last.as_ref().is_none_or(|(design, _)| design != x) {
             self.asked = 1;
+            if let Some(k) = x.iter().position(|x| !x.is_finite()) {
+                let what = format!("variable {k} of a design that the method asks for");
+                let expected = "the method broke down; take another optimizer.algorithm, or other bounds";
+                let error = Error::NotFinite { what, value: x[k], expected };
+                self.interruption = Some(Interruption::Error(error.into()));
+                return None;
+            }
             // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
             // mesh that is known.
             let (start, scaled_start) = &self.start;
@@ -230,7 +300,13 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
             let physical: Vec<f64> =
                 (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
             match catch_unwind(AssertUnwindSafe(|| (self.evaluate)(&physical))) {
-                Ok(Ok(sample)) => self.last = Some((x.to_vec(), sample)),
+                Ok(Ok(sample)) => {
+                    if let Err(error) = sample.check(x.len(), self.settings.constraints) {
+                        self.interruption = Some(Interruption::Error(error.into()));
+                        return None;
+                    }
+                    self.last = Some((x.to_vec(), sample));
+                }
                 Ok(Err(error)) => {
                     self.interruption = Some(Interruption::Error(error));
                     return None;
@@ -250,177 +326,4 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E> Bridge<'_, F, E> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ALL: [Algorithm; 6] = [
-        Algorithm::Mma,
-        Algorithm::Ccsaq,
-        Algorithm::Slsqp,
-        Algorithm::Lbfgs,
-        Algorithm::Tnewton,
-        Algorithm::Var2,
-    ];
-
-    fn settings(algorithm: Algorithm) -> Minimisation {
-        Minimisation {
-            algorithm,
-            lower: vec![-0.005; 8],
-            upper: vec![0.020; 8],
-            constraints: 0,
-            ftol_rel: 1e-8,
-            xtol_rel: 0.0,
-        }
-    }
-
-    /// Where a variable is best: inside the bounds, or beyond the upper one.
-    fn centre(k: usize) -> f64 {
-        if k.is_multiple_of(3) { 0.03 } else { 0.004 }
-    }
-
-    /// `1 + Σ w_k ((p_k − c_k)/25 mm)²` with minima inside the bounds, and beyond the upper one.
-    fn quadratic(p: &[f64]) -> Sample {
-        let mut sample = Sample { value: 1.0, ..Sample::default() };
-        for (k, p) in p.iter().enumerate() {
-            let (weight, centre) = (1.0 + k as f64, centre(k));
-            sample.value += weight * ((p - centre) / 0.025).powi(2);
-            sample.gradient.push(2.0 * weight * (p - centre) / 0.025_f64.powi(2));
-        }
-        sample
-    }
-
-    /// The quadratic with the mean of all variables at most 2 mm, and the seventh at most 10 mm.
-    fn constrained(p: &[f64]) -> Sample {
-        let n = p.len() as f64;
-        let mean = p.iter().sum::<f64>() / n / 0.002 - 1.0;
-        let seventh = (0..p.len()).map(|k| if k == 6 { 100.0 } else { 0.0 }).collect();
-        Sample {
-            constraints: vec![(mean, vec![1.0 / n / 0.002; p.len()]), (100.0 * p[6] - 1.0, seventh)],
-            ..quadratic(p)
-        }
-    }
-
-    #[test]
-    fn every_algorithm_finds_a_bounded_quadratic_minimum() {
-        for algorithm in ALL {
-            let mut best = (f64::INFINITY, vec![]);
-            let outcome = minimise::<()>(&settings(algorithm), &[0.0; 8], |p| {
-                let sample = quadratic(p);
-                if sample.value < best.0 {
-                    best = (sample.value, p.to_vec());
-                }
-                Ok(sample)
-            });
-            assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
-            for (k, p) in best.1.iter().enumerate() {
-                let exact = if k % 3 == 0 { 0.020 } else { 0.004 };
-                assert!((p - exact).abs() < 1e-4, "{algorithm:?}: variable {k} is {p}");
-            }
-        }
-    }
-
-    #[test]
-    fn without_a_tolerance_a_method_ends_where_it_settles() {
-        for algorithm in [Algorithm::Mma, Algorithm::Ccsaq] {
-            // A linear function: the minimum is the corner of the upper bounds.
-            let settings = Minimisation { ftol_rel: 0.0, ..settings(algorithm) };
-            let outcome = minimise::<()>(&settings, &[0.0; 8], |p| {
-                Ok(Sample {
-                    value: 1.0 - p.iter().sum::<f64>(),
-                    gradient: vec![-1.0; p.len()],
-                    ..Sample::default()
-                })
-            });
-            assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
-        }
-    }
-
-    #[test]
-    fn every_algorithm_stops_at_once_when_the_closure_does() {
-        for algorithm in ALL {
-            for last in [1, 2, 4] {
-                let mut calls = 0;
-                let outcome = minimise(&settings(algorithm), &[0.0; 8], |p| {
-                    calls += 1;
-                    if calls == last { Err("enough") } else { Ok(quadratic(p)) }
-                });
-                assert!(matches!(outcome, Outcome::Interrupted("enough")), "{algorithm:?}: {outcome:?}");
-                assert_eq!(calls, last, "{algorithm:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_first_design_asked_for_is_the_start_to_the_last_bit() {
-        let start: Vec<f64> = (0..8).map(|k| 1e-3 * (f64::from(k)).sqrt()).collect();
-        for algorithm in ALL {
-            let mut first = None;
-            minimise::<()>(&settings(algorithm), &start, |p| {
-                first.get_or_insert_with(|| p.to_vec());
-                Ok(quadratic(p))
-            });
-            assert_eq!(first.as_ref(), Some(&start), "{algorithm:?}");
-        }
-    }
-
-    #[test]
-    fn a_panic_in_the_closure_comes_out_on_this_side() {
-        let caught = catch_unwind(|| {
-            minimise::<()>(&settings(Algorithm::Mma), &[0.0; 8], |_| panic!("inside the callback"))
-        });
-        assert!(caught.is_err());
-    }
-
-    #[test]
-    fn constraints_are_kept_from_inside_and_from_outside() {
-        for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-            for start in [0.0, 0.015] {
-                let settings = Minimisation { constraints: 2, ..settings(algorithm) };
-                let (mut best, mut seen) = ((f64::INFINITY, vec![]), Vec::new());
-                let outcome = minimise::<()>(&settings, &[start; 8], |p| {
-                    assert!(!seen.contains(&p.to_vec()), "{algorithm:?}: a design is evaluated once");
-                    seen.push(p.to_vec());
-                    let sample = constrained(p);
-                    let feasible = sample.constraints.iter().all(|c| c.0 <= CONSTRAINT_TOLERANCE);
-                    if feasible && sample.value < best.0 {
-                        best = (sample.value, p.to_vec());
-                    }
-                    Ok(sample)
-                });
-                assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
-                let p = &best.1;
-                // From far outside CCSAQ reaches a feasible design and ends there, short of the optimum.
-                if (algorithm, start) == (Algorithm::Ccsaq, 0.015) {
-                    assert!(!p.is_empty(), "no feasible design");
-                    continue;
-                }
-                // Lagrange's conditions: both bounds are active, and all free variables have w_k (p_k − c_k) = −μ.
-                assert!((p[6] - 0.010).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
-                assert!((p.iter().sum::<f64>() - 0.016).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
-                let multiplier = |k: usize| (1.0 + k as f64) * (centre(k) - p[k]);
-                let free: Vec<f64> = (0..8)
-                    .filter(|&k| k != 6 && p[k] > -0.004999 && p[k] < 0.019999)
-                    .map(multiplier)
-                    .collect();
-                let spread = free.iter().fold(0.0_f64, |m, x| m.max((x - free[0]).abs()));
-                assert!(spread < 0.02 * free[0].abs(), "{algorithm:?} from {start}: {free:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn constrained_methods_stop_at_once_too() {
-        for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-            for (start, last) in [(0.0, 1), (0.0, 3), (0.015, 1), (0.015, 2), (0.015, 4)] {
-                let mut calls = 0;
-                let settings = Minimisation { constraints: 2, ..settings(algorithm) };
-                let outcome = minimise(&settings, &[start; 8], |p| {
-                    calls += 1;
-                    if calls == last { Err("enough") } else { Ok(constrained(p)) }
-                });
-                assert!(matches!(outcome, Outcome::Interrupted("enough")), "{algorithm:?}: {outcome:?}");
-                assert_eq!(calls, last, "{algorithm:?}");
-            }
-        }
-    }
-}
+mod tests;

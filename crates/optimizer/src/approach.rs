@@ -13,15 +13,17 @@ impl Problem {
     /// Makes the mesh of a design the reference of the present round; nothing where it is already, or where the problem
     /// allows no rounds. What happened on the way, if one step was not enough.
     ///
+    /// `interrupted` is asked after each step.
+    ///
     /// # Errors
-    /// [`Error::DesignUnreached`] says how far the mesh can be taken.
+    /// [`Error::DesignUnreached`] says how far the mesh can be taken; [`Error::Interrupted`].
     ///
     /// # Panics
     /// If `p` has another length than there are variables.
-    pub fn approach(&mut self, p: &[f64]) -> Result<Vec<RoundEvent>, Error> {
+    pub fn approach(&mut self, p: &[f64], interrupted: &dyn Fn() -> bool) -> Result<Vec<RoundEvent>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let displacement = shape.displacement(p);
-        self.approach_displacement(displacement)
+        self.approach_displacement(displacement, interrupted)
     }
 
     /// As [`Problem::approach`] for displacements of the design nodes from the undeformed mesh [m], shape `(n_design, 3)`,
@@ -32,11 +34,17 @@ impl Problem {
     ///
     /// # Panics
     /// If there is not one displacement per design node.
-    pub fn approach_displacement(&mut self, goal: Vec<Point>) -> Result<Vec<RoundEvent>, Error> {
+    pub fn approach_displacement(
+        &mut self,
+        goal: Vec<Point>,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Vec<RoundEvent>, Error> {
         let Some(shape) = self.shape.as_mut().filter(|shape| shape.limits.rounds > 0) else {
             return Ok(Vec::new());
         };
-        let Some((motion, events)) = shape.standing_at(&shape.motion, goal)? else { return Ok(Vec::new()) };
+        let Some((motion, events)) = shape.standing_at(&shape.motion, goal, interrupted)? else {
+            return Ok(Vec::new());
+        };
         shape.motion = motion;
         Ok(events)
     }
@@ -49,7 +57,8 @@ impl Shape {
     /// As [`Problem::approach`], and [`RemeshError::Inverted`] where there are no rounds.
     pub fn from_undeformed(&self, p: &[f64]) -> Result<Moved, Error> {
         let (motion, goal) = (self.motion.restarted()?, self.displacement(p));
-        let standing = if self.limits.rounds > 0 { self.standing_at(&motion, goal.clone())? } else { None };
+        let standing =
+            if self.limits.rounds > 0 { self.standing_at(&motion, goal.clone(), &|| false)? } else { None };
         let motion = standing.map_or(motion, |(motion, _)| motion);
         Ok(motion.moved(&goal)?)
     }
@@ -60,6 +69,7 @@ impl Shape {
         &self,
         motion: &Motion,
         goal: Vec<Point>,
+        interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<(Motion, Vec<RoundEvent>)>, Error> {
         let start = motion.anchor();
         if start == goal {
@@ -86,10 +96,11 @@ impl Shape {
         let mut events = Vec::new();
         let travelled = motion.clone().travel(&path, &limits, &mut |event: &Event| {
             events.push(RoundEvent::approach(event));
-            ControlFlow::Continue(())
+            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         let Travelled { motion, moved, reached, .. } = travelled;
         if reached < 1.0 {
+            Error::unless(interrupted)?;
             return Err(Error::DesignUnreached { reached });
         }
         let policy = motion.policy();

@@ -33,9 +33,11 @@ pub struct Search {
 }
 
 /// Makes `evaluate` large from `start`, which is moved into the bounds, and gives the best point with its value; a value
-/// that is not finite is worse than all others. `Break` ends the search at once.
+/// that is not finite is worse than all others. `Break` ends the search at once, and so does a point of the library's that is
+/// no number.
 ///
-/// `None` without variables, or where the library refuses its arguments at once.
+/// `None` without variables, where bounds or start are not finite or the bounds cross, and where the library refuses its
+/// arguments at once.
 ///
 /// # Panics
 /// If `start` has not one entry a variable; and when `evaluate` does.
@@ -46,7 +48,11 @@ pub fn maximise(
 ) -> Option<(Vec<f64>, f64)> {
     let n = search.lower.len();
     assert_eq!(start.len(), n, "one value per variable");
-    if n == 0 {
+    let are_sound = |k: usize| {
+        let [low, high] = [search.lower[k], search.upper[k]];
+        start[k].is_finite() && low <= high && (high - low).is_finite()
+    };
+    if n == 0 || search.upper.len() != n || !(0..n).all(are_sound) {
         return None;
     }
     let physical = |x: &[f64]| -> Vec<f64> {
@@ -56,14 +62,15 @@ pub fn maximise(
     let state = RefCell::new(State { evaluate, best: None, panic: None });
     let objective = |x: &[f64], _: Option<&mut [f64]>, (): &mut ()| -> f64 {
         let state = &mut *state.borrow_mut();
-        if state.panic.is_some() {
+        if state.panic.is_some() || x.iter().any(|x| !x.is_finite()) {
             return 2.0 * STOP_VALUE;
         }
         let point = physical(x);
         match catch_unwind(AssertUnwindSafe(|| (state.evaluate)(&point))) {
             Ok(ControlFlow::Break(())) => 2.0 * STOP_VALUE,
             Ok(ControlFlow::Continue(value)) => {
-                let value = if value.is_finite() { value } else { -1e30 };
+                // Larger ones would overflow in the products of the library.
+                let value = if value.abs() < 1e30 { value } else { -1e30 };
                 if state.best.as_ref().is_none_or(|best| value > best.1) {
                     state.best = Some((point, value));
                 }
@@ -86,7 +93,10 @@ pub fn maximise(
         .and_then(|_| library.set_maxeval(u32::try_from(search.evaluations).unwrap_or(u32::MAX)));
     if accepted.is_ok() {
         let mut x: Vec<f64> = (0..n)
-            .map(|k| ((start[k] - search.lower[k]) / (search.upper[k] - search.lower[k])).clamp(0.0, 1.0))
+            .map(|k| {
+                let span = search.upper[k] - search.lower[k];
+                if span > 0.0 { ((start[k] - search.lower[k]) / span).clamp(0.0, 1.0) } else { 0.5 }
+            })
             .collect();
         // However it ends, the best point is kept here.
         let _ = library.optimize(&mut x);
@@ -160,5 +170,35 @@ mod tests {
         let search = Search { lower: vec![0.0; 2], upper: vec![1.0; 2], evaluations: 5 };
         let caught = catch_unwind(|| maximise(&search, &[0.5, 0.5], |_| panic!("inside")));
         assert!(caught.is_err());
+    }
+
+    #[test]
+    fn bounds_and_starts_that_are_no_numbers_are_refused_before_anything_is_asked() {
+        for (start, lower, upper) in [
+            ([f64::NAN, 0.5], [0.0; 2], vec![1.0; 2]),
+            ([0.5; 2], [f64::NEG_INFINITY, 0.0], vec![1.0; 2]),
+            ([0.5; 2], [0.0; 2], vec![f64::NAN, 1.0]),
+            ([0.5; 2], [2.0, 0.0], vec![1.0; 2]),
+            ([0.5; 2], [0.0; 2], vec![1.0]),
+        ] {
+            let search = Search { lower: lower.to_vec(), upper, evaluations: 5 };
+            assert!(maximise(&search, &start, |_| panic!("nothing is to be asked")).is_none());
+        }
+    }
+
+    #[test]
+    fn nothing_but_values_that_are_no_numbers_still_ends_within_the_budget() {
+        for n in 1..=3 {
+            for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308] {
+                let mut asked = 0;
+                let search = Search { lower: vec![0.0; n], upper: vec![1.0; n], evaluations: 20 };
+                let best = maximise(&search, &vec![0.5; n], |x| {
+                    asked += 1;
+                    assert!(x.iter().all(|x| x.is_finite()));
+                    ControlFlow::Continue(bad)
+                });
+                assert!(asked <= 20 && best.is_some_and(|best| best.1.is_finite()), "{n}, {bad}");
+            }
+        }
     }
 }

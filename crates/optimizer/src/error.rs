@@ -26,6 +26,24 @@ pub enum Error {
     /// The field problem is wrong, or cannot be solved.
     #[error(transparent)]
     Solver(#[from] SolverError),
+    /// One linear system of the field problem cannot be solved.
+    #[error("{problem}: {cause}")]
+    Field {
+        /// Which one: of the state or an adjoint, at which frequency.
+        problem: String,
+        /// Why.
+        cause: Box<SolverError>,
+    },
+    /// Something computed that is no number to go on with.
+    #[error("{what} is {value:e}: {expected}")]
+    NotFinite {
+        /// What, of which state, region, term or variable.
+        what: String,
+        /// Its value.
+        value: f64,
+        /// What is needed, and what to do.
+        expected: &'static str,
+    },
     /// The mesh cannot follow the design.
     #[error(transparent)]
     Remesh(#[from] RemeshError),
@@ -108,6 +126,12 @@ pub enum Error {
         /// Why, and what to do.
         cause: String,
     },
+    /// A signal came before there was anything to keep.
+    #[error("interrupted before there was anything to keep")]
+    Interrupted,
+    /// A signal ended a run before an evaluation that its journal does not have.
+    #[error("interrupted before anything new was computed")]
+    InterruptedRun,
     /// A pool of threads cannot be made.
     #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
     Threads {
@@ -119,10 +143,19 @@ pub enum Error {
 }
 
 impl Error {
+    /// Nothing, unless `interrupted` says that a signal came.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(crate) fn unless(interrupted: &dyn Fn() -> bool) -> Result<(), Self> {
+        if interrupted() { Err(Self::Interrupted) } else { Ok(()) }
+    }
+
     /// Whether a run that ends with this error can be gone on with once its cause is mended.
     pub fn leaves_a_run(&self) -> bool {
         match self {
             Self::Output(error) => matches!(error, OutputError::Io { .. }),
+            Self::InterruptedRun => true,
             other => other.exit_code() == ExitCode::Numerical,
         }
     }
@@ -133,18 +166,27 @@ impl Error {
             Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
                 ExitCode::Files
             }
-            Self::Output(_) => ExitCode::Files,
+            Self::Output(_) | Self::Replay { .. } => ExitCode::Files,
+            // Of a motion; a file's or a generator's is a wrong mesh.
+            Self::Remesh(RemeshError::Mesh(MeshError::NotFinite { .. } | MeshError::Inverted { .. })) => {
+                ExitCode::Numerical
+            }
             Self::Mesh(mesh)
             | Self::Solver(SolverError::Mesh(mesh))
             | Self::Remesh(RemeshError::Mesh(mesh)) => match mesh {
-                MeshError::Factorisation { .. } => ExitCode::Numerical,
+                MeshError::Factorisation { .. } | MeshError::NotFiniteArray { .. } => ExitCode::Numerical,
                 MeshError::File { .. } => ExitCode::Files,
                 _ => ExitCode::Configuration,
             },
-            Self::Solver(SolverError::NotConverged { .. } | SolverError::NotFinite { .. })
-            | Self::Remesh(RemeshError::NotConverged { .. })
+            Self::Solver(
+                SolverError::NotConverged { .. }
+                | SolverError::NotFinite { .. }
+                | SolverError::OutOfRange { .. },
+            )
+            | Self::Field { .. }
+            | Self::NotFinite { .. }
+            | Self::Remesh(RemeshError::NotConverged { .. } | RemeshError::NotFinite { .. })
             | Self::Optimisation { .. }
-            | Self::Replay { .. }
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
             | Self::OtherRun { .. }
@@ -158,6 +200,7 @@ impl Error {
             | Self::Geometric(_)
             | Self::Design(_) => ExitCode::Configuration,
             Self::Threads { .. } => ExitCode::Usage,
+            Self::Interrupted | Self::InterruptedRun => ExitCode::Interrupted,
         }
     }
 }

@@ -77,6 +77,15 @@ impl Shapes {
     }
 }
 
+/// Whether a check was brought to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// It was, or none was wanted, or the run itself had been cut short.
+    Finished,
+    /// A signal came first.
+    CutShort,
+}
+
 /// A run whose gain is to be checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Gain<'a> {
@@ -99,14 +108,14 @@ impl Gain<'_> {
         objective: &mut ObjectiveResult,
         interrupted: &dyn Fn() -> bool,
         observer: &mut dyn Observer,
-    ) {
+    ) -> Check {
         let factor = self.config.output.verify_refinement;
         if factor == 0.0 {
-            return;
+            return Check::Finished;
         }
         if *self.shapes == Shapes::Unchanged {
             objective.verified_ratio = Some(1.0);
-            return;
+            return Check::Finished;
         }
         let refined = self.config.mesh.refined(factor);
         let cut_short = matches!(self.stop_reason, StopReason::Interrupted | StopReason::MaxTime);
@@ -121,7 +130,7 @@ impl Gain<'_> {
                     "the best shape is not checked on a fresh mesh: only the generators `shield`, `boxes` and `sphere` make \
                      one",
                 );
-                return;
+                return Check::Finished;
             }
         };
         match outcome {
@@ -129,12 +138,19 @@ impl Gain<'_> {
                 objective.verified_ratio = Some(verification.ratio);
                 objective.verification = Some(verification);
             }
-            Ok(None) => observer
-                .notice("the best shape is not checked on a fresh mesh: the run was told to end before that"),
+            Ok(None) => {
+                observer.notice(
+                    "the best shape is not checked on a fresh mesh: the run was told to end before that",
+                );
+                if !cut_short {
+                    return Check::CutShort;
+                }
+            }
             Err(error) => {
                 observer.warning(&format!("the best shape could not be checked on a fresh mesh: {error}"));
             }
         }
+        Check::Finished
     }
 
     /// Both values on the fresh mesh; `None` where a signal came first.
@@ -146,6 +162,9 @@ impl Gain<'_> {
     ) -> Result<Option<Verification>, Error> {
         let config = fresh_configuration(self.config, mesh);
         let setup = set_up(&config, self.source, Purpose::Optimisation)?;
+        if interrupted() {
+            return Ok(None);
+        }
         let displacements = self.shapes.displacements(&config, &setup)?;
         let Setup { mut problem, .. } = setup;
         let tets = problem.original.topology().tets().len();
@@ -157,7 +176,10 @@ impl Gain<'_> {
             if interrupted() {
                 return Ok(None);
             }
-            *value = objective_at(&mut problem, &mut memory, displacement)?;
+            *value = match objective_at(&mut problem, &mut memory, displacement, interrupted) {
+                Err(Error::Interrupted) => return Ok(None),
+                value => value?,
+            };
         }
         let [initial, best] = values;
         let ratio = best / initial;
@@ -184,9 +206,14 @@ fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
 }
 
 /// The objective at a shape, reached from the undeformed mesh.
-fn objective_at(problem: &mut Problem, memory: &mut Memory, displacement: Vec<Point>) -> Result<f64, Error> {
+fn objective_at(
+    problem: &mut Problem,
+    memory: &mut Memory,
+    displacement: Vec<Point>,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<f64, Error> {
     let undeformed = problem.shape.as_ref().map(|shape| shape.motion.clone());
-    problem.approach_displacement(displacement.clone())?;
+    problem.approach_displacement(displacement.clone(), interrupted)?;
     let moved = match &problem.shape {
         Some(shape) => shape.motion.moved(&displacement)?,
         None => problem.moved(&[])?,

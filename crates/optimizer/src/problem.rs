@@ -13,12 +13,13 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
-use fluxmorph_solver::linear::{PreparedSystem, SolverEvent};
-use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, SolverError, adjoint};
+use fluxmorph_solver::linear::{PreparedSystem, Reuse, SolverEvent};
+use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, adjoint};
 
 use crate::constraint::{Bound, Constraint, Limit, Quantity};
 use crate::design::DesignSurface;
 use crate::error::Error;
+use crate::finite;
 use crate::memory::Memory;
 use crate::objective::{Term, WeightedSum};
 use crate::thickness::Thickness;
@@ -170,9 +171,16 @@ impl Problem {
     pub fn memory_estimate(&self) -> usize {
         let elements = self.original.topology().tets().len();
         let nodes = self.original.points().len();
-        // Every state keeps its factor for the next design.
-        let of_state = |model: &FieldModel| model.linear_solver().memory_estimate().unwrap_or_default();
-        let systems = self.states.iter().map(of_state).sum::<usize>();
+        // Factors that serve the next design are held all at once, the others one after the other.
+        let (mut held, mut largest) = (0, 0);
+        for solver in self.states.iter().map(FieldModel::linear_solver) {
+            let bytes = solver.memory_estimate().unwrap_or_default();
+            match solver.reuse() {
+                Reuse::WhileItPays => held += bytes,
+                Reuse::Never => largest = bytes.max(largest),
+            }
+        }
+        let systems = held + largest;
         let elastic = self.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
         systems + elastic + elements * BYTES_PER_ELEMENT + nodes * BYTES_PER_NODE
     }
@@ -188,7 +196,8 @@ impl Problem {
     /// Field, objective, constraints and, if wanted, gradients of a design.
     ///
     /// # Errors
-    /// [`Error::Remesh`] when the mesh would break, [`Error::Solver`] when the field cannot be computed.
+    /// [`Error::Remesh`] when the mesh would break, [`Error::Field`] when a linear system cannot be solved,
+    /// [`Error::NotFinite`] when what is computed is no number.
     pub fn evaluate(&self, p: &[f64], want: Want) -> Result<Analysis, Error> {
         self.evaluate_with(&mut Memory::default(), p, want)
     }
@@ -209,7 +218,7 @@ impl Problem {
     /// As [`Problem::evaluate`] on a mesh made before for the variables `p`.
     ///
     /// # Errors
-    /// [`Error::Solver`] when the field cannot be computed, [`Error::Remesh`] when the elastic gradient cannot.
+    /// As [`Problem::evaluate`]; [`Error::Remesh`] where the elastic gradient cannot be computed.
     pub fn analyse(&self, p: &[f64], moved: Moved, want: Want) -> Result<Analysis, Error> {
         self.analyse_with(&mut Memory::default(), p, moved, want)
     }
@@ -240,15 +249,18 @@ impl Problem {
             let mut clock = Lap::start();
             let (matrix, load) = (model.assemble(&mesh), model.load(&mesh));
             work.timings.assembly += clock.lap();
-            let mut system = model.prepare_with(matrix, memory.of_state(index))?;
+            let named = || finite::of_field("the state", model);
+            let mut system = model.prepare_with(matrix, memory.of_state(index)).map_err(named())?;
             work.timings.factor += clock.lap();
-            let state = model.solve_prepared(&mut system, &load)?;
+            let state = model.solve_prepared(&mut system, &load).map_err(named())?;
+            finite::state(model, &mesh, &state)?;
             work.report.include(&state);
             work.timings.state += clock.lap();
             let mut solved = Solved { index, model, system, state };
-            objective.add(&mut work, &mut solved, &all, shape)?;
-            for (gathered, (_, term)) in constrained.iter_mut().zip(&fields) {
-                gathered.add(&mut work, &mut solved, &[(0, *term)], shape)?;
+            objective.add("the objective", &mut work, &mut solved, &all, shape)?;
+            for (gathered, (k, term)) in constrained.iter_mut().zip(&fields) {
+                let name = format!("the constraint `{}`", self.constraints[*k].name);
+                gathered.add(&name, &mut work, &mut solved, &[(0, *term)], shape)?;
             }
             let Solved { system, state, .. } = solved;
             events.extend_from_slice(system.events());
@@ -258,17 +270,14 @@ impl Problem {
         let Work { mut timings, report, .. } = work;
         let mut clock = Lap::start();
         let value = terms.iter().zip(&objective.values).map(|(term, value)| term.weight * value).sum();
+        let differentiated = shape.filter(|_| !terms.is_empty());
         let gradient =
-            shape.filter(|_| !terms.is_empty()).map(|shape| shape.pull_back(&objective.nodal)).transpose()?;
+            differentiated.map(|shape| shape.pull_back("the objective", &objective.nodal)).transpose()?;
         let constraints = self.measure_constraints(p, &mesh, shape, &fields, &constrained)?;
         timings.remesh += clock.lap();
-        let all_gradients = gradient.iter().chain(constraints.iter().filter_map(|c| c.gradient.as_ref()));
-        if let Some(value) = all_gradients.flatten().copied().find(|g| !g.is_finite()) {
-            return Err(SolverError::NotFinite { what: "gradient", value }.into());
-        }
-        let sensitivity = shape.filter(|_| !terms.is_empty()).map(|shape| moved_only(shape, objective.nodal));
+        let sensitivity = differentiated.map(|shape| moved_only(shape, objective.nodal));
         let quality = self.quality(&mesh);
-        Ok(Analysis {
+        let analysis = Analysis {
             mesh,
             displacement,
             inversion,
@@ -283,7 +292,9 @@ impl Problem {
             worst_residual: report.residual,
             solver_events: events,
             timings,
-        })
+        };
+        finite::analysis(&analysis, &self.constraints)?;
+        Ok(analysis)
     }
 
     /// Bounds of the constraints; a share of the initial design's value costs its analysis, unless that is `p`.
@@ -322,7 +333,7 @@ impl Problem {
         wanted: Option<&Shape>,
         fields: &[(usize, &Term)],
         gathered: &[Gathered],
-    ) -> Result<Vec<Measured>, RemeshError> {
+    ) -> Result<Vec<Measured>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let of = |(k, constraint): (usize, &Constraint)| {
             if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape)? {
@@ -330,7 +341,8 @@ impl Problem {
             }
             let position = fields.iter().position(|(number, _)| *number == k);
             let own = &gathered[position.expect("every constraint of the field was gathered")];
-            let gradient = wanted.map(|shape| shape.pull_back(&own.nodal)).transpose()?;
+            let name = format!("the constraint `{}`", constraint.name);
+            let gradient = wanted.map(|shape| shape.pull_back(&name, &own.nodal)).transpose()?;
             Ok(Measured { value: own.values[0], gradient })
         };
         self.constraints.iter().enumerate().map(of).collect()
@@ -361,8 +373,9 @@ impl Shape {
         self.motion.rebased(reference, displacement, self.displacement(p), self.motion.policy())
     }
 
-    /// dF/dp from dF/dx at the nodes, shape `(n_nodes, 3)`.
-    fn pull_back(&self, nodal: &[Point]) -> Result<Vec<f64>, RemeshError> {
+    /// dF/dp of `owner` from dF/dx at the nodes, shape `(n_nodes, 3)`.
+    fn pull_back(&self, owner: &str, nodal: &[Point]) -> Result<Vec<f64>, Error> {
+        finite::sensitivity(owner, nodal)?;
         Ok(self.surface.gradient(&self.motion.map().gradient(nodal)?))
     }
 }
@@ -395,20 +408,22 @@ impl Gathered {
         Self { values: vec![0.0; terms], nodal: vec![[0.0; 3]; nodes] }
     }
 
-    /// Adds what the terms `(number, term)` have on one state; derivatives where a shape is given, by one adjoint.
+    /// Adds what the terms `(number, term)` of `owner` have on one state; derivatives where a shape is given, by one adjoint.
     fn add(
         &mut self,
+        owner: &str,
         work: &mut Work<'_>,
         solved: &mut Solved<'_>,
         terms: &[(usize, &Term)],
         shape: Option<&Shape>,
-    ) -> Result<(), SolverError> {
+    ) -> Result<(), Error> {
         let Solved { index, model, system, state } = solved;
         let mut clock = Lap::start();
         let mut right_side: Option<Vec<c64>> = None;
         for (number, term) in terms.iter().filter(|(_, term)| term.states.contains(index)) {
+            let evaluated = term.functional.evaluate(model, work.mesh, state);
             let FunctionalValue { value, derivative, explicit } =
-                term.functional.evaluate(model, work.mesh, state)?;
+                evaluated.map_err(finite::of_term(owner, term, model))?;
             self.values[*number] += value;
             if shape.is_none() {
                 continue;
@@ -421,7 +436,8 @@ impl Gathered {
         }
         work.timings.gradient += clock.lap();
         let (Some(right_side), Some(shape)) = (right_side, shape) else { return Ok(()) };
-        let lambda = adjoint::solve(system, &right_side)?;
+        let named = finite::of_field(&format!("the adjoint of {owner}"), model);
+        let lambda = adjoint::solve(system, &right_side).map_err(named)?;
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
         let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving());

@@ -149,8 +149,26 @@ pub fn certify_all(
     problem: &Problem,
     p: &[f64],
     settings: &Settings,
+    progress: impl FnMut(Option<&str>, usize, &Direction),
+) -> Result<Certificates, Error> {
+    certify_until(problem, p, settings, &|| false, progress)
+}
+
+/// As [`certify_all`], until `interrupted` says so; it is asked before each evaluation.
+///
+/// # Errors
+/// [`Error::Interrupted`], or when an evaluation fails.
+///
+/// # Panics
+/// As [`certify_all`].
+pub fn certify_until(
+    problem: &Problem,
+    p: &[f64],
+    settings: &Settings,
+    interrupted: &dyn Fn() -> bool,
     mut progress: impl FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
+    Error::unless(interrupted)?;
     let mut memory = Memory::default();
     let base = problem.evaluate_with(&mut memory, p, Want::Gradient)?;
     let span = span(problem);
@@ -160,6 +178,7 @@ pub fn certify_all(
         if let Some(values) = known.borrow().get(&key) {
             return Ok(values[index]);
         }
+        Error::unless(interrupted)?;
         let values = numbers(&problem.evaluate_with(&mut memory.lent(), p, Want::Value)?);
         let value = values[index];
         known.borrow_mut().insert(key, values);

@@ -43,14 +43,7 @@ fn run(
 #[test]
 fn every_algorithm_improves_the_shield_within_its_bounds() {
     let (mut problem, settings) = quick();
-    for algorithm in [
-        Algorithm::Mma,
-        Algorithm::Ccsaq,
-        Algorithm::Slsqp,
-        Algorithm::Lbfgs,
-        Algorithm::Tnewton,
-        Algorithm::Var2,
-    ] {
+    for algorithm in Algorithm::ALL {
         let settings = Optimizer { algorithm, max_evaluations: 8, ..settings.clone() };
         let (optimised, rows) = run(&mut problem, &settings, &mut Silent);
         let ratio = optimised.best.objective / optimised.initial;

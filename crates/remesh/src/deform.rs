@@ -161,7 +161,7 @@ impl ElasticMap {
     /// The linear part: `Δx_d = −K_dd⁻¹ K_db Δx_b`, and `Δx_b` itself at the design nodes; shape `(n_nodes, 3)` [m].
     ///
     /// # Errors
-    /// [`RemeshError::NotConverged`] when the iterative solver fails.
+    /// [`RemeshError::NotConverged`] when the iterative solver fails, [`RemeshError::NotFinite`].
     ///
     /// # Panics
     /// If there is not one displacement per design node.
@@ -189,7 +189,7 @@ impl ElasticMap {
 
     /// Solves for the unknowns and spreads them over the mesh nodes.
     fn solved(&self, mut unknowns: Vec<f64>) -> Result<Vec<Point>, RemeshError> {
-        self.solver.solve_in_place(&mut unknowns)?;
+        self.solver.solve_in_place(&mut unknowns, "displacement")?;
         let topology = &self.plan.topology;
         Ok(topology.nodes().map(|node| self.plan.unknowns.gather(&unknowns, node)).collect())
     }

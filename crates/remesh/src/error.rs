@@ -136,6 +136,17 @@ pub enum RemeshError {
         /// What it should be.
         tolerance: f64,
     },
+    /// The elastic system gives something that is no number.
+    #[error(
+        "the elastic system gives a {what} of {value}: the displacements, or the stiffnesses of the remesh region, span \
+         more than numbers hold; check units, bounds and remesh.stiffness"
+    )]
+    NotFinite {
+        /// What was solved for.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// A smoothing asks for a quality that is no quality.
     #[error(
         "the target {target} of the smoothing: expected a positive, finite quality; 1 is the best there is"

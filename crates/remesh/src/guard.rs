@@ -34,6 +34,10 @@ impl StepToInversion {
 ///
 /// # Panics
 /// If there is not one displacement per node.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the least of steps and numbers of elements, no two alike, has no order"
+)]
 pub fn step_to_inversion(mesh: &Mesh, displacement: &[Point]) -> StepToInversion {
     assert_eq!(displacement.len(), mesh.points().len(), "one displacement per node");
     let never = (f64::INFINITY, None);

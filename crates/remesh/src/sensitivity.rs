@@ -14,7 +14,7 @@ impl ElasticMap {
     /// part of the map has no say in the gradient. Values of `g` where nothing moves are not used.
     ///
     /// # Errors
-    /// [`RemeshError::NotConverged`] when the iterative solver fails.
+    /// [`RemeshError::NotConverged`] when the iterative solver fails, [`RemeshError::NotFinite`].
     ///
     /// # Panics
     /// If `nodal` does not have one entry per mesh node.
@@ -25,7 +25,7 @@ impl ElasticMap {
         for (node, &g) in (0..).map(NodeId).zip(nodal) {
             unknowns.scatter_add(&mut adjoint, node, g);
         }
-        self.solver().solve_in_place(&mut adjoint)?;
+        self.solver().solve_in_place(&mut adjoint, "derivative")?;
         let mut carried = vec![0.0; prescribed.count()];
         self.coupling().mul_transposed(&adjoint, &mut carried);
         let at = |&node: &NodeId| {

@@ -4,6 +4,10 @@
 //! best there is, since an optimiser solves with it again and again. Above, conjugate gradients are preconditioned by
 //! factors of the blocks `K_xx`, `K_yy`, `K_zz`, at a tenth of the memory and work, with a number of iterations that does not
 //! grow with the mesh ([`fluxmorph_geometry::fem::components`]).
+//!
+//! A factorisation without a positive pivot, an iteration that stops short, and a solution that is not finite are errors: the
+//! map would not be the one that gradients are made for. What an optimisation does then is the driver's: the run ends with its
+//! best design.
 
 use std::sync::Arc;
 
@@ -108,11 +112,20 @@ impl ElasticSolver {
         })
     }
 
-    /// Solves in place.
+    /// Solves in place for `what`, as errors name it.
     ///
     /// # Errors
-    /// [`RemeshError::NotConverged`].
-    pub(crate) fn solve_in_place(&self, right_side: &mut Vec<f64>) -> Result<(), RemeshError> {
+    /// [`RemeshError::NotConverged`], [`RemeshError::NotFinite`].
+    pub(crate) fn solve_in_place(
+        &self,
+        right_side: &mut Vec<f64>,
+        what: &'static str,
+    ) -> Result<(), RemeshError> {
+        let check = |values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
+            Some(&value) => Err(RemeshError::NotFinite { what, value }),
+            None => Ok(()),
+        };
+        check(right_side)?;
         match self {
             Self::Nothing => {}
             Self::Direct(factor) => factor.solve_in_place(right_side),
@@ -135,6 +148,6 @@ impl ElasticSolver {
                 *right_side = solution;
             }
         }
-        Ok(())
+        check(right_side)
     }
 }

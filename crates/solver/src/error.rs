@@ -104,6 +104,15 @@ pub enum SolverError {
         /// Its value.
         value: f64,
     },
+    /// A right side whose norm cannot be computed.
+    #[error(
+        "the largest entry of the right side is {largest:e}: its products in the iteration leave the range of \
+         numbers; check currents, remanence, prescribed fields, weights and units"
+    )]
+    OutOfRange {
+        /// Largest modulus of its entries.
+        largest: f64,
+    },
     /// A probe lies outside the mesh.
     #[error(
         "point {point:?} m of the probe `{probe}` lies outside the mesh, whose box is {lower:?} to {upper:?} m"

@@ -15,6 +15,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::traits::RealField;
+use faer::traits::math_utils::is_finite;
 use faer::{Conj, Par, Side};
 
 use crate::error::MeshError;
@@ -98,7 +99,8 @@ impl<T: RealField> Cholesky<T> {
     /// Factors a matrix whose pattern was analysed.
     ///
     /// # Errors
-    /// [`MeshError::Factorisation`] when a pivot is not positive: the matrix is singular or indefinite.
+    /// [`MeshError::Factorisation`] when a pivot is not positive: the matrix is singular or indefinite; and when an entry
+    /// is not finite.
     ///
     /// # Panics
     /// If the matrix has another structure than the analysis.
@@ -109,6 +111,10 @@ impl<T: RealField> Cholesky<T> {
         );
         let n = matrix.structure.row_count();
         let failed = |cause: String| MeshError::Factorisation { unknowns: n, cause };
+        // An infinite diagonal has an infinite root, which the library takes for a pivot.
+        if let Some(value) = matrix.values.iter().find(|value| !is_finite(*value)) {
+            return Err(failed(format!("a stored entry is {value:?}: every one must be finite")));
+        }
         let symbolic = &analysis.symbolic;
         let a = SparseColMatRef::new(symbolic_matrix(&matrix.structure), matrix.values.as_slice());
         let scratch = symbolic.factorize_numeric_llt_scratch::<T>(parallel(), Default::default());

@@ -28,6 +28,22 @@ impl Default for BlockParameters {
 /// # Errors
 /// [`MeshError::Parameter`] names `mesh.block.size` or `mesh.block.cells`.
 pub fn block(parameters: &BlockParameters) -> Result<Mesh, MeshError> {
+    let grid = grid(parameters)?;
+    let topology = grid.topology(&["block"], |_| RegionId(0))?;
+    Mesh::new(Arc::new(topology), grid.points())
+}
+
+impl BlockParameters {
+    /// Tetrahedra of the mesh, which is not made.
+    ///
+    /// # Errors
+    /// As [`block`].
+    pub fn tet_count(&self) -> Result<usize, MeshError> {
+        Ok(grid(self)?.tet_count())
+    }
+}
+
+fn grid(parameters: &BlockParameters) -> Result<Grid, MeshError> {
     let BlockParameters { size, cells } = *parameters;
     if !size.iter().all(|s| *s > 0.0 && s.is_finite()) {
         return Err(MeshError::Parameter {
@@ -44,9 +60,7 @@ pub fn block(parameters: &BlockParameters) -> Result<Mesh, MeshError> {
         });
     }
     check_size("mesh.block.cells", cells)?;
-    let grid = Grid::new("mesh.block.size", [0, 1, 2].map(|d| equal_parts([0.0, size[d]], cells[d])))?;
-    let topology = grid.topology(&["block"], |_| RegionId(0))?;
-    Mesh::new(Arc::new(topology), grid.points())
+    Grid::new("mesh.block.size", [0, 1, 2].map(|d| equal_parts([0.0, size[d]], cells[d])))
 }
 
 #[cfg(test)]

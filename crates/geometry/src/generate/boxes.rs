@@ -80,15 +80,7 @@ pub struct BoxesParameters {
 /// # Errors
 /// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.boxes.…`).
 pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
-    check(parameters)?;
-    let axis_lines = |axis| {
-        let ends = parameters.corners.map(|corner| corner[axis]);
-        let growth = parameters.growth.powf(1.0 / parameters.refinement);
-        sizing::lines("mesh.boxes", ends, &limits(parameters, axis), growth)
-    };
-    let lines = [axis_lines(0)?, axis_lines(1)?, axis_lines(2)?];
-    check_size("mesh.boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
-    let grid = Grid::new("mesh.boxes", lines)?;
+    let grid = grid(parameters)?;
 
     let names = region_names(&parameters.regions);
     let id_of: BTreeMap<&str, RegionId> =
@@ -118,6 +110,28 @@ pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
         topology = topology.with_surface(&patch.name, triangles)?;
     }
     Mesh::new(Arc::new(topology), points)
+}
+
+impl BoxesParameters {
+    /// Tetrahedra of the mesh, which is not made.
+    ///
+    /// # Errors
+    /// As [`boxes`].
+    pub fn tet_count(&self) -> Result<usize, MeshError> {
+        Ok(grid(self)?.tet_count())
+    }
+}
+
+fn grid(parameters: &BoxesParameters) -> Result<Grid, MeshError> {
+    check(parameters)?;
+    let axis_lines = |axis| {
+        let ends = parameters.corners.map(|corner| corner[axis]);
+        let growth = parameters.growth.powf(1.0 / parameters.refinement);
+        sizing::lines("mesh.boxes", ends, &limits(parameters, axis), growth)
+    };
+    let lines = [axis_lines(0)?, axis_lines(1)?, axis_lines(2)?];
+    check_size("mesh.boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
+    Grid::new("mesh.boxes", lines)
 }
 
 /// Lengths below this are rounding of decimal lengths [m].

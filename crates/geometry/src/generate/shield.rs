@@ -113,9 +113,7 @@ const OBSERVATION: RegionId = RegionId(3);
 /// # Errors
 /// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.shield.…`).
 pub fn shield(parameters: &ShieldParameters) -> Result<Mesh, MeshError> {
-    shield_checks::check(parameters)?;
-    let [x, y] = [horizontal_lines(parameters, 0)?, horizontal_lines(parameters, 1)?];
-    let grid = Grid::new("mesh.shield.refinement", [x, y, vertical_lines(parameters)?])?;
+    let grid = grid(parameters)?;
     let mut topology = grid.topology(&REGIONS, |centre| region_at(parameters, centre))?;
     let [edge_x, edge_y, thickness] = parameters.plate;
     let face = |axis, at| grid.region_surface(&topology, PLATE, axis, grid.nearest_line(axis, at));
@@ -127,6 +125,22 @@ pub fn shield(parameters: &ShieldParameters) -> Result<Mesh, MeshError> {
         .with_surface("plate_side", side)?
         .with_cells("observation", observation_cells(&grid, &parameters.observation));
     Mesh::new(Arc::new(topology), grid.points())
+}
+
+impl ShieldParameters {
+    /// Tetrahedra of the mesh, which is not made.
+    ///
+    /// # Errors
+    /// As [`shield`].
+    pub fn tet_count(&self) -> Result<usize, MeshError> {
+        Ok(grid(self)?.tet_count())
+    }
+}
+
+fn grid(parameters: &ShieldParameters) -> Result<Grid, MeshError> {
+    shield_checks::check(parameters)?;
+    let [x, y] = [horizontal_lines(parameters, 0)?, horizontal_lines(parameters, 1)?];
+    Grid::new("mesh.shield.refinement", [x, y, vertical_lines(parameters)?])
 }
 
 fn region_at(p: &ShieldParameters, [x, y, z]: Point) -> RegionId {

@@ -77,10 +77,7 @@ const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0,
 /// # Errors
 /// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.sphere.…`).
 pub fn sphere(parameters: &SphereParameters) -> Result<Mesh, MeshError> {
-    check(parameters)?;
-    let n = ((parameters.divisions as f64 * parameters.refinement).round() as usize).max(1);
-    let radii = radii(parameters, n)?;
-    check_size(n, radii.len() - n)?;
+    let (n, radii) = shells(parameters)?;
     let numbering = Numbering { n };
     let (mut tets, mut region_of) = (Vec::new(), Vec::new());
     let mut cell = |corner: &dyn Fn([usize; 3]) -> NodeId, region| {
@@ -121,6 +118,26 @@ pub fn sphere(parameters: &SphereParameters) -> Result<Mesh, MeshError> {
     names.extend(parameters.inner_radius.map(|_| "cavity".to_owned()));
     let topology = with_surfaces(Topology::new(points.len(), tets, names, region_of)?, &points)?;
     Mesh::new(Arc::new(topology), points)
+}
+
+impl SphereParameters {
+    /// Tetrahedra of the mesh, which is not made.
+    ///
+    /// # Errors
+    /// As [`sphere`].
+    pub fn tet_count(&self) -> Result<usize, MeshError> {
+        let (n, radii) = shells(self)?;
+        Ok(TETS_PER_CELL * n * n * (n + 3 * (radii.len() - 1 - n)))
+    }
+}
+
+/// Cells along the radius of the core, and the radii of all shells [m].
+fn shells(parameters: &SphereParameters) -> Result<(usize, Vec<f64>), MeshError> {
+    check(parameters)?;
+    let n = ((parameters.divisions as f64 * parameters.refinement).round() as usize).max(1);
+    let radii = radii(parameters, n)?;
+    check_size(n, radii.len() - n)?;
+    Ok((n, radii))
 }
 
 /// The point of a face of the cube that is `n` along its axis; the other two follow in cyclic order.

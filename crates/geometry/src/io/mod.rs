@@ -4,11 +4,13 @@
 
 pub mod msh;
 pub mod pvd;
+mod regular;
 pub mod stl;
 pub mod vtu;
 
 pub use msh::{MshEncoding, MshError, MshMesh, MshNotices, msh_bytes, read_msh, read_msh_file};
 pub use pvd::pvd_text;
+pub use regular::open_regular;
 pub use stl::stl_bytes;
 pub use vtu::{
     ArrayData, Field, VtuArray, VtuContents, read_vtu, vtu_bytes, vtu_bytes_at, vtu_contents, write_vtu,

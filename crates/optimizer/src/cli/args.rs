@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::exit;
-use crate::config::{Config, Dimension, Source, parse_quantity};
+use crate::config::{Config, Dimension, OutputNamedBy, Source, parse_quantity};
 use crate::error::Error;
+use crate::memory_limit;
 use crate::output::OlderRun;
 
 /// Finds the shape of an electromagnetic device from a TOML file.
@@ -59,9 +60,13 @@ pub struct CommonArgs {
     #[arg(long)]
     pub json: bool,
 
-    /// Replace an earlier run in the output directory
+    /// Replace an earlier run in the output directory; go on where the memory seems too small
     #[arg(long)]
     pub force: bool,
+
+    /// Let mesh.file and output.directory lead out of the folder of the configuration
+    #[arg(long)]
+    pub allow_outside: bool,
 
     /// Set a key of the configuration, such as analysis.frequency="50 Hz" or coils[0].width="30 mm"; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
@@ -110,6 +115,14 @@ pub struct ResumeArgs {
     /// Print the result as JSON on standard output
     #[arg(long)]
     pub json: bool,
+
+    /// Let mesh.file lead out of the folder of the configuration
+    #[arg(long)]
+    pub allow_outside: bool,
+
+    /// Go on where the memory seems too small
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of `solve`.
@@ -160,9 +173,16 @@ impl CommonArgs {
     /// The configuration with `--set` and `--out` applied. A relative `--out` is relative to the working directory.
     ///
     /// # Errors
-    /// When the configuration cannot be read or is wrong.
+    /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
     pub fn load(&self) -> Result<(Config, Source), Error> {
         let (mut config, source) = Config::from_file(&self.config, &self.overrides)?;
+        if !self.allow_outside {
+            let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
+            source.confined(by)?;
+        }
+        if !self.force {
+            memory_limit::check_mesh(&config, &source)?;
+        }
         if let Some(out) = &self.out {
             config.output.directory = std::path::absolute(out).unwrap_or_else(|_| out.clone());
         }

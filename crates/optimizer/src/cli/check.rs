@@ -8,7 +8,9 @@ use super::exit::ExitCode;
 use super::{stdout, with_threads};
 use crate::config::{Config, MeshConfig, RegionModel, Source};
 use crate::error::Error;
+use crate::memory_limit;
 use crate::morph::{self, MotionSummary};
+use crate::output::OlderRun;
 use crate::setup::{Purpose, Setup, set_up};
 
 /// Set the problem up and print what it is, as a table or JSON.
@@ -18,7 +20,7 @@ use crate::setup::{Purpose, Setup, set_up};
 pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     with_threads(args.common.threads, |_| {
-        let summary = summary(&config, &source)?;
+        let summary = summary(&config, &source, args.common.older_run())?;
         if args.common.json {
             stdout::print_json(&summary)?;
         } else {
@@ -106,8 +108,9 @@ fn model_name(model: RegionModel) -> &'static str {
     }
 }
 
-fn summary(config: &Config, source: &Source) -> Result<Summary, Error> {
+fn summary(config: &Config, source: &Source, older: OlderRun) -> Result<Summary, Error> {
     let setup: Setup = set_up(config, source, Purpose::Inspection)?;
+    memory_limit::check_problem(setup.problem.memory_estimate(), source, older)?;
     let motions = morph::inspected(config, source)?;
     let mesh = &setup.full_mesh;
     let topology = mesh.topology();

@@ -2,25 +2,29 @@
 
 use super::args::GradientArgs;
 use super::exit::ExitCode;
-use super::{observer, stdout, with_threads};
+use super::{interrupt, observer, stdout, with_threads};
 use crate::config::FactorReuse;
 use crate::error::Error;
+use crate::memory_limit;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up};
-use crate::verify::{Certificate, Settings, certify_all};
+use crate::verify::{Certificate, Settings, certify_until};
 
 /// Do what the command line says.
 ///
 /// # Errors
 /// When the configuration or the numbers fail, and when the certificate does not hold.
 pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (mut config, source) = args.common.load()?;
     // The differences are between designs so near to each other that one factor serves them all.
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
-    with_threads(args.common.threads, |_| {
+    let outcome = with_threads(args.common.threads, |_| {
+        let interrupted = || signal.received().is_some();
         let mut observer = observer(args.common.quiet);
         observer.phase("setting up mesh and matrices");
         let mut setup = set_up(&config, &source, Purpose::Optimisation)?;
+        memory_limit::check_problem(setup.problem.memory_estimate(), &source, args.common.older_run())?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
@@ -29,18 +33,19 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             Some(path) => read_design(path, shape.surface.variable_count())?,
             None => shape.initial.clone(),
         };
-        setup.problem.approach(&p)?;
+        setup.problem.approach(&p, &interrupted)?;
         let settings = Settings::default();
-        let certificates = certify_all(&setup.problem, &p, &settings, |constraint, index, direction| {
-            observer.phase(&format!(
-                "{}direction {} of {}: slope {:.4}, difference {:.1e}",
-                constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),
-                index + 1,
-                settings.directions,
-                direction.slope,
-                direction.error
-            ));
-        })?;
+        let certificates =
+            certify_until(&setup.problem, &p, &settings, &interrupted, |constraint, index, direction| {
+                observer.phase(&format!(
+                    "{}direction {} of {}: slope {:.4}, difference {:.1e}",
+                    constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),
+                    index + 1,
+                    settings.directions,
+                    direction.slope,
+                    direction.error
+                ));
+            })?;
         let constraints =
             certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
         let all: Vec<(&Certificate, &str)> =
@@ -65,7 +70,8 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
                 settings.largest_error
             ),
         })
-    })
+    });
+    signal.ended(outcome)
 }
 
 /// The certificate as a table.

@@ -1,4 +1,7 @@
 //! Signals: the first asks the command to end after the work in hand, the second ends the process at once.
+//!
+//! The second needs no help of a thread that may be busy: the handler itself ends the process. The files of a run bear
+//! that at any moment.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -9,6 +12,7 @@ use signal_hook::flag;
 use signal_hook::iterator::Signals;
 
 use super::ExitCode;
+use crate::error::Error;
 
 /// What is shown at the first signal of a run.
 pub(super) const FINISHES_EVALUATION: &str =
@@ -29,6 +33,17 @@ impl Signal {
             Ok(SIGINT) => Some(ExitCode::Interrupted),
             Ok(SIGTERM) => Some(ExitCode::Terminated),
             _ => None,
+        }
+    }
+
+    /// How a command ended: one that a signal has ended, before it could have a result, says so and has that signal's code.
+    pub(super) fn ended(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
+        match (outcome, self.received()) {
+            (Err(error @ (Error::Interrupted | Error::InterruptedRun)), Some(code)) => {
+                let _ = writeln!(std::io::stderr(), "{error}");
+                Ok(code)
+            }
+            (outcome, _) => outcome,
         }
     }
 }
@@ -53,4 +68,11 @@ pub(super) fn watch(message: &'static str) -> Signal {
         });
     }
     Signal { number }
+}
+
+/// Lets a write beyond the limit on the size of files fail like any other, with the file named; by default the system ends
+/// the process.
+pub(super) fn survive_file_size_limits() {
+    #[cfg(unix)]
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }

@@ -6,6 +6,7 @@ mod exit;
 mod gradient;
 mod interrupt;
 mod morph;
+mod panic;
 mod run;
 mod solve;
 pub mod stdout;
@@ -24,6 +25,7 @@ use args::{Cli, Command};
 
 /// Do what the arguments of this process say.
 pub fn main() -> std::process::ExitCode {
+    interrupt::survive_file_size_limits();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -33,6 +35,11 @@ pub fn main() -> std::process::ExitCode {
             return code.into();
         }
     };
+    panic::reported(|| done(&cli)).into()
+}
+
+/// The outcome of a command.
+fn done(cli: &Cli) -> ExitCode {
     let outcome = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Resume(args) => run::resume(args),
@@ -41,11 +48,10 @@ pub fn main() -> std::process::ExitCode {
         Command::Check(args) => check::check(args),
         Command::Gradient(args) => gradient::gradient(args),
     };
-    let code = outcome.unwrap_or_else(|error| {
+    outcome.unwrap_or_else(|error| {
         let _ = writeln!(std::io::stderr(), "{}", message(&error));
         error.exit_code()
-    });
-    code.into()
+    })
 }
 
 /// What is shown for an error on standard error.

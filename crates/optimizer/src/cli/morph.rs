@@ -13,10 +13,10 @@ use crate::session::Options;
 /// # Errors
 /// When the configuration, the files or the numbers fail; a mesh that a motion breaks is a result.
 pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (config, source) = args.common.load()?;
     let parameters = if args.tune { Parameters::Tuned } else { Parameters::Given };
     with_threads(args.common.threads, |threads| {
-        let signal = interrupt::watch(interrupt::FINISHES_WORK);
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let older_run = args.common.older_run();

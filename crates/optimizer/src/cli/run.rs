@@ -6,19 +6,21 @@ use super::args::{ResumeArgs, RunArgs};
 use super::exit::ExitCode;
 use super::interrupt::{self, Signal};
 use super::{observer, stdout, with_threads};
+use crate::config::OutputNamedBy;
 use crate::error::Error;
+use crate::memory_limit;
 use crate::observer::Observer;
-use crate::output::{OlderRun, RunResult, StopReason, system_disk};
-use crate::session::{self, Limits, Options};
+use crate::output::{OlderRun, RunResult, RunStatus, StopReason, resume_command, system_disk};
+use crate::session::{self, Limits, Options, SavedRun};
 
 /// Do what the command line says.
 ///
 /// # Errors
 /// When the configuration, the files or the numbers fail; the error knows its exit code.
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
-    let (config, source) = args.load()?;
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
-    with_threads(args.common.threads, |threads| {
+    let (config, source) = args.load()?;
+    let outcome = with_threads(args.common.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let older_run = args.common.older_run();
@@ -26,7 +28,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         let mut observer = observer(args.common.quiet);
         let result = session::run(&config, &source, options, &mut *observer);
         concluded(result, &config.output.directory, args.common.json, &signal, &mut *observer)
-    })
+    });
+    signal.ended(outcome)
 }
 
 /// Do what the command line says.
@@ -35,15 +38,25 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 /// As [`run`].
 pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
-    with_threads(args.threads, |threads| {
+    let outcome = with_threads(args.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
-        let options = Options { disk: &disk, older_run: OlderRun::Keep, threads, interrupted: &interrupted };
+        let saved = SavedRun::open(&disk, &args.directory)?;
+        let (config, source) = saved.config();
+        if !args.allow_outside {
+            source.confined(OutputNamedBy::User)?;
+        }
+        if !args.force {
+            memory_limit::check_mesh(config, source)?;
+        }
+        let older_run = if args.force { OlderRun::Replace } else { OlderRun::Keep };
+        let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
         let limits = Limits { max_evaluations: args.max_evaluations, max_time: args.max_time };
         let mut observer = observer(args.quiet);
-        let result = session::resume(&args.directory, limits, options, &mut *observer);
+        let result = session::resume(saved, limits, options, &mut *observer);
         concluded(result, &args.directory, args.json, &signal, &mut *observer)
-    })
+    });
+    signal.ended(outcome)
 }
 
 /// Prints the result, and how to go on.
@@ -54,22 +67,20 @@ fn concluded(
     signal: &Signal,
     observer: &mut dyn Observer,
 ) -> Result<ExitCode, Error> {
-    let result = result.inspect_err(|error| {
-        if error.leaves_a_run() && directory.join("journal.bin").exists() {
-            observer.warning(&format!("what was computed is kept: {}", how_to_resume(directory)));
-        }
-    })?;
+    let result = result?;
     if json {
         stdout::print_json(&result)?;
     }
-    let interrupted = result.stop_reason == StopReason::Interrupted;
+    // The search may have ended by itself, and the check of its result not.
+    let interrupted = result.status == RunStatus::Interrupted;
     match result.stop_reason {
-        StopReason::Interrupted | StopReason::MaxTime => {
-            observer.warning(&format!("all evaluations are saved: {}", how_to_resume(directory)));
+        reason if interrupted || reason == StopReason::MaxTime => {
+            observer
+                .warning(&format!("all evaluations are saved: go on with `{}`", resume_command(directory)));
         }
         StopReason::MaxEvaluations => observer.note(&format!(
             "to go on from here: {} --max-evaluations {}",
-            command(directory),
+            resume_command(directory),
             2 * result.evaluations
         )),
         _ => {}
@@ -77,19 +88,4 @@ fn concluded(
     // A signal that came too late to stop anything does not change how the run ended.
     let stopped_by = signal.received().filter(|_| interrupted);
     Ok(stopped_by.unwrap_or_else(|| result.stop_reason.exit_code()))
-}
-
-fn how_to_resume(directory: &Path) -> String {
-    format!("go on with `{}`", command(directory))
-}
-
-/// The command that goes on with a run, as a shell takes it.
-fn command(directory: &Path) -> String {
-    let path = directory.display().to_string();
-    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
-    if path.chars().all(is_plain) {
-        format!("fluxmorph resume {path}")
-    } else {
-        format!("fluxmorph resume '{}'", path.replace('\'', "'\\''"))
-    }
 }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::ops::Range;
 
 /// A stretch of one of the texts a configuration was read from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Place {
     /// Index into [`Source::documents`](super::Source::documents): 0 is the file, the rest are overrides.
     pub document: usize,
@@ -13,7 +13,7 @@ pub struct Place {
 }
 
 /// One fault of a configuration.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Fault {
     /// Key path, such as `coils[0].center`; empty for the file as a whole.
     pub path: String,
@@ -66,6 +66,10 @@ pub(super) fn sort(faults: &mut [Fault]) {
     faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
 }
 
+/// Longest name that is compared letter by letter [characters]: the comparison takes time and memory by the product of the
+/// lengths, and a longer name is no slip of the pen.
+const LONGEST_COMPARED: usize = 64;
+
 /// The candidate that `name` was probably meant to be, if one is near enough.
 ///
 /// Near means at most one edit for every three letters (two at least for short names of four letters or
@@ -74,10 +78,17 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     let fold = |text: &str| text.to_lowercase().replace(['-', ' '], "_");
     let wanted = fold(name);
     let length = wanted.chars().count();
+    if length > LONGEST_COMPARED {
+        return None;
+    }
     let limit = if length >= 4 { (length / 3).max(2) } else { 1 };
     candidates
         .into_iter()
-        .map(|candidate| (strsim::damerau_levenshtein(&wanted, &fold(candidate)), candidate))
+        .filter(|candidate| candidate.chars().count() <= LONGEST_COMPARED + limit)
+        .map(|candidate| (fold(candidate), candidate))
+        // Every missing letter is an edit.
+        .filter(|(folded, _)| folded.chars().count().abs_diff(length) <= limit)
+        .map(|(folded, candidate)| (strsim::damerau_levenshtein(&wanted, &folded), candidate))
         .filter(|(distance, _)| *distance <= limit)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -95,5 +106,13 @@ mod tests {
         assert_eq!(nearest("x-min", names), Some("x_min"));
         assert_eq!(nearest("conductivity", names), None);
         assert_eq!(nearest("", names), None);
+    }
+
+    #[test]
+    fn long_names_are_not_compared() {
+        // Compared letter by letter, these two would take eight gigabytes.
+        let (name, other) = ("a".repeat(32_000), "b".repeat(32_000));
+        assert_eq!(nearest(&name, [other.as_str(), "x_min"]), None);
+        assert_eq!(nearest("x_mim", [other.as_str(), "x_min"]), Some("x_min"));
     }
 }

@@ -204,6 +204,18 @@ impl MeshConfig {
         }
         Some(refined)
     }
+
+    /// Tetrahedra that a generator makes; `None` for a file, and for parameters that the generator refuses.
+    pub fn tet_count(&self) -> Option<u64> {
+        let tets = match self {
+            Self::Shield(shield) => shield.parameters().tet_count(),
+            Self::Block(block) => block.parameters().tet_count(),
+            Self::Boxes(boxes) => boxes.parameters().tet_count(),
+            Self::Sphere(sphere) => sphere.parameters().tet_count(),
+            Self::File { .. } => return None,
+        };
+        tets.ok().map(|tets| tets as u64)
+    }
 }
 
 impl Default for ShieldMesh {

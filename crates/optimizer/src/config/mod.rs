@@ -8,6 +8,7 @@ mod analysis;
 mod boundary;
 mod choice;
 mod coil;
+mod confinement;
 mod constraint;
 mod design;
 mod fault;
@@ -29,10 +30,11 @@ mod source;
 mod tests;
 mod tree;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use fluxmorph_geometry::io::open_regular;
 use serde::Serialize;
 
 pub use analysis::{Analysis, ElementOrder, Frequencies};
@@ -41,6 +43,7 @@ pub use coil::{
     Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,
     RegionCoil, ShapeWord,
 };
+pub use confinement::OutputNamedBy;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use fault::{Fault, Place, nearest};
@@ -63,11 +66,19 @@ pub use quantity::{Dimension, QuantityError, parse_quantity};
 pub use remesh::{Motion, Remesh, RemeshExtent, StiffnessLaw, Subregion};
 pub use source::{ConfigError, Document, FaultReport, Source};
 
+use confinement::WrittenPaths;
 use fault::Faults;
 use section::Section;
 
 /// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
 const LARGEST_FILE: u64 = 1024 * 1024;
+
+/// Most values that the cases of a motion may repeat: every case is the whole configuration again, with the places of its
+/// values, and this many take a hundred megabytes.
+const MOST_REPEATED: usize = 500_000;
+
+/// Faults of a configuration from which on its cases are not read: each would find them again.
+const MANY_FAULTS: usize = 100;
 
 /// The tables that only mean something to a field problem.
 const OF_THE_FIELD: [&str; 6] = ["coils", "objective", "boundaries", "constraints", "materials", "regions"];
@@ -127,6 +138,9 @@ impl Config {
     /// When the file cannot be read, or with all faults of its content at once.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<(Self, Source), ConfigError> {
         let text = read_text(path)?;
+        if overrides.iter().map(String::len).sum::<usize>() as u64 > LARGEST_FILE {
+            return Err(ConfigError::TooManyOverrides { limit: LARGEST_FILE });
+        }
         let absolute = std::path::absolute(path)
             .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
         let directory = absolute.parent().map(Path::to_owned).unwrap_or_default();
@@ -216,7 +230,7 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
     let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     // One byte more than allowed tells a file that is too large, without trusting the size it reports.
-    let file = std::fs::File::open(path).map_err(unreadable)?;
+    let file = open_regular(path).map_err(unreadable)?;
     file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(ConfigError::TooLarge { path: path.to_owned(), limit: LARGEST_FILE });
@@ -239,15 +253,28 @@ fn read(
     let bare = Source {
         documents: documents.into(),
         places: BTreeMap::new(),
+        written: WrittenPaths::default(),
         directory,
         stem: stem.to_owned(),
         cases: [].into(),
     };
     let root = parse_documents(&bare).map_err(|faults| bare.error(faults))?;
-    let mut source = Source { places: tree::places(&root), ..bare.clone() };
+    let mut source = bare.of_tree(&root);
     let mut cases = Vec::new();
 
     let (mut config, mut faults) = read_tree(&root, &source);
+    let (count, values) = (morph::case_count(&root), tree::value_count(&root));
+    if count.saturating_mul(values) > MOST_REPEATED {
+        let message = format!("{count} cases repeat a configuration of {values} values");
+        let most = format!("at most {MOST_REPEATED} values in all cases together");
+        faults.push(source.fault("morph.case", message).expected(most));
+        fault::sort(&mut faults);
+        return Err(source.error(faults));
+    }
+    if faults.len() > MANY_FAULTS {
+        return Err(source.error(faults));
+    }
+    let mut known: HashSet<Fault> = faults.iter().cloned().collect();
     for (index, tree) in morph::case_trees(root).enumerate() {
         let (tree, overlay) = match tree {
             Ok(tree) => tree,
@@ -258,8 +285,8 @@ fn read(
         };
         let (case, own) = read_tree(&tree, &bare);
         // What is wrong without the case has been said.
-        faults.extend(own.into_iter().filter(|fault| !faults.contains(fault)).collect::<Vec<_>>());
-        cases.push(Source { places: tree::places(&tree), ..bare.clone() });
+        faults.extend(own.into_iter().filter(|fault| known.insert(fault.clone())));
+        cases.push(bare.of_tree(&tree));
         let slot = config.as_mut().and_then(|config| config.morph.as_mut()?.cases.get_mut(index));
         if let (Some(slot), Some(case)) = (slot, case) {
             slot.complete(overlay, case);

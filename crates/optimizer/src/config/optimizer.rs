@@ -59,6 +59,9 @@ impl Default for Optimizer {
 }
 
 impl Algorithm {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Mma, Self::Ccsaq, Self::Slsqp, Self::Lbfgs, Self::Tnewton, Self::Var2];
+
     /// Whether the method keeps inequality constraints.
     pub fn takes_constraints(self) -> bool {
         matches!(self, Self::Mma | Self::Ccsaq | Self::Slsqp)

@@ -3,6 +3,7 @@
 //! The unit is converted once, here; everything behind this module is in SI. A decimal prefix is applied to
 //! the exponent of the written number before it is parsed, so `"22 mm"` has the very bits of `0.022`.
 
+use super::tree::shown;
 use std::fmt;
 
 /// What a quantity measures, and so which units it may carry.
@@ -219,6 +220,7 @@ impl fmt::Display for QuantityError {
 /// dimension; the message names the accepted units.
 pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
     let trimmed = text.trim();
+    let written = shown(text);
     let (number, unit_text) = split_number(trimmed);
     let accepted = || {
         format!("write it like \"{}\"; accepted units: {}", dimension.example(), dimension.accepted_units())
@@ -226,10 +228,10 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     let fail = |message: String| Err(QuantityError { message, help: accepted() });
 
     let Some(number) = number else {
-        return fail(format!("`{text}` is not {}: it must start with a number", dimension.name()));
+        return fail(format!("`{written}` is not {}: it must start with a number", dimension.name()));
     };
     if unit_text.is_empty() {
-        return fail(format!("`{text}` has no unit"));
+        return fail(format!("`{written}` has no unit"));
     }
     if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
         let help = match number.scaled(0).filter(|rho| *rho > 0.0) {
@@ -237,7 +239,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             None => accepted(),
         };
         return Err(QuantityError {
-            message: format!("`{text}` is a resistivity, not a conductivity"),
+            message: format!("`{written}` is a resistivity, not a conductivity"),
             help,
         });
     }
@@ -249,16 +251,16 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             None => String::new(),
         };
         return Err(QuantityError {
-            message: format!("`{unit_text}` in `{text}` is not a unit of {}", dimension.noun()),
+            message: format!("`{}` in `{written}` is not a unit of {}", shown(unit_text), dimension.noun()),
             help: format!("{hint}{}", accepted()),
         });
     };
     if unit.dimension != dimension {
-        return fail(format!("`{text}` is {}, not {}", unit.dimension.name(), dimension.name()));
+        return fail(format!("`{written}` is {}, not {}", unit.dimension.name(), dimension.name()));
     }
     match number.scaled(unit.exponent).map(|value| value * unit.factor).filter(|value| value.is_finite()) {
         Some(value) => Ok(value),
-        None => fail(format!("`{text}` is too large for a number")),
+        None => fail(format!("`{written}` is too large for a number")),
     }
 }
 

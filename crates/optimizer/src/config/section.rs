@@ -7,16 +7,20 @@
 mod lists;
 
 use std::cell::RefCell;
+use std::collections::HashSet;
 
 use super::choice::Choice;
 use super::fault::{Fault, Faults, Place};
 use super::quantity::{Dimension, parse_quantity};
 use super::range::Range;
 use super::source::suggest;
-use super::tree::{Node, Table, Value, join};
+use super::tree::{Node, Table, Value, join, shown};
 
 /// Longest list that is read: far beyond any use, and small enough to keep messages and memory bounded.
 const LONGEST_LIST: usize = 100_000;
+
+/// Longest length and farthest coordinate of a device [m]: far beyond any use, and its powers stay far from overflow.
+const LONGEST_LENGTH: f64 = 1e6;
 
 /// What stands in for a required value that is missing or faulty.
 pub(super) trait Placeholder {
@@ -187,6 +191,11 @@ impl<'a> Section<'a> {
                 return None;
             }
         };
+        if dimension == Dimension::Length && value.is_finite() && value.abs() > LONGEST_LENGTH {
+            let message = format!("`{path}` is {value:e} m, which is out of range");
+            self.wrong_at(node, path, message, &format!("at most {LONGEST_LENGTH} m"), None);
+            return None;
+        }
         self.in_range(node, path, value, range, dimension.si_unit())
     }
 
@@ -236,10 +245,14 @@ impl<'a> Section<'a> {
 
     fn text_of(&self, node: &Node, path: &str) -> Option<String> {
         match &node.value {
-            Value::Text(text) if !text.trim().is_empty() => return Some(text.clone()),
-            Value::Text(_) => {
+            Value::Text(text) if text.trim().is_empty() => {
                 self.wrong_at(node, path, format!("`{path}` is empty"), "a text in quotes", None)
             }
+            Value::Text(text) if text.chars().any(char::is_control) => {
+                let message = format!("`{path}` is \"{}\", with a control character", shown(text));
+                self.wrong_at(node, path, message, "a text on one line without control characters", None);
+            }
+            Value::Text(text) => return Some(text.clone()),
             other => {
                 let message = format!("`{path}` is {}, not a text", other.describe());
                 self.wrong_at(node, path, message, "a text in quotes", None);
@@ -269,7 +282,7 @@ impl<'a> Section<'a> {
         let names: Vec<_> = T::CHOICES.iter().map(|(name, _)| *name).collect();
         let path = join(&self.path, key);
         self.fault(key, |fault| {
-            let message = format!("`{path}` cannot be `{}`", text.escape_debug());
+            let message = format!("`{path}` cannot be `{}`", shown(&text));
             suggest(Fault { message, ..fault }, &text, &names)
         });
         None
@@ -309,6 +322,12 @@ impl<'a> Section<'a> {
     pub(super) fn named_tables(&self, key: &'static str) -> Vec<(String, Section<'a>)> {
         let Some(section) = self.table(key) else { return Vec::new() };
         let named = |(name, node): (&'a String, &'a Node)| {
+            if name.trim().is_empty() || name.chars().any(char::is_control) {
+                let message = format!("`{}` cannot be the name of a table in `{key}`", shown(name));
+                let expected = "a name without control characters";
+                self.wrong_at(node, &join(&section.path, name), message, expected, None);
+                return None;
+            }
             let inner = section.section_of(node, join(&section.path, name))?;
             Some((name.clone(), inner))
         };
@@ -326,7 +345,7 @@ impl<'a> Section<'a> {
             let fault = Fault {
                 path: join(&self.path, key),
                 place: node.key_place.clone(),
-                message: format!("unknown key `{}`{table}", key.escape_debug()),
+                message: format!("unknown key `{}`{table}", shown(key)),
                 expected: None,
                 help: None,
             };
@@ -337,5 +356,6 @@ impl<'a> Section<'a> {
 
 /// The first name that comes a second time.
 pub(super) fn first_duplicate(names: &[String]) -> Option<&String> {
-    names.iter().enumerate().find(|(index, name)| names[..*index].contains(name)).map(|(_, name)| name)
+    let mut known = HashSet::with_capacity(names.len());
+    names.iter().find(|name| !known.insert(name.as_str()))
 }

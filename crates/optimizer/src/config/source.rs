@@ -8,7 +8,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::confinement::WrittenPaths;
 use super::fault::{Fault, Place};
+use super::tree::{self, Table};
 
 /// A text that keys were read from: the file, or one override of the command line.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,6 +26,8 @@ pub struct Document {
 pub struct Source {
     pub(super) documents: Arc<[Document]>,
     pub(super) places: BTreeMap<String, Place>,
+    /// The paths as they are written.
+    pub(super) written: WrittenPaths,
     pub(super) directory: PathBuf,
     pub(super) stem: String,
     /// The same texts with the places of every case of `[[morph.case]]`.
@@ -31,6 +35,11 @@ pub struct Source {
 }
 
 impl Source {
+    /// The same texts with the places and paths of one reading of them.
+    pub(super) fn of_tree(&self, tree: &Table) -> Self {
+        Self { places: tree::places(tree), written: WrittenPaths::of(tree), ..self.clone() }
+    }
+
     /// The file first, then the overrides in the order given.
     pub fn documents(&self) -> &[Document] {
         &self.documents
@@ -84,7 +93,7 @@ impl Source {
 
     /// A fault about a name that is not among the known ones: suggests the nearest and lists them.
     pub fn unknown_name(&self, path: &str, what: &str, name: &str, known: &[&str]) -> Fault {
-        let fault = self.fault(path, format!("there is no {what} `{name}`"));
+        let fault = self.fault(path, format!("there is no {what} `{}`", tree::shown(name)));
         suggest(fault, name, known)
     }
 
@@ -102,13 +111,21 @@ impl Source {
     }
 }
 
+/// Most names that a fault compares with and lists: a hostile mesh may have as many as it has bytes.
+const MOST_NAMES: usize = 100;
+
 /// The fault with the nearest known name as help and all known names as the expectation.
 pub(super) fn suggest(mut fault: Fault, name: &str, known: &[&str]) -> Fault {
-    if let Some(nearest) = super::nearest(name, known.iter().copied()) {
+    if let Some(nearest) = super::nearest(name, known.iter().copied().take(MOST_NAMES)) {
         fault = fault.help(format!("did you mean `{nearest}`?"));
     }
     match known {
         [] => fault.expected("none is known here"),
+        _ if known.len() > MOST_NAMES => fault.expected(format!(
+            "known: {} and {} more",
+            known[..MOST_NAMES].join(", "),
+            known.len() - MOST_NAMES
+        )),
         _ => fault.expected(format!("known: {}", known.join(", "))),
     }
 }
@@ -148,6 +165,14 @@ pub enum ConfigError {
     TooLarge {
         /// The path as given.
         path: PathBuf,
+        /// Largest size accepted [bytes].
+        limit: u64,
+    },
+    /// The overrides are too long.
+    #[error(
+        "the overrides are longer than {limit} bytes in all; write them into a configuration of their own"
+    )]
+    TooManyOverrides {
         /// Largest size accepted [bytes].
         limit: u64,
     },

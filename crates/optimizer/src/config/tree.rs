@@ -8,6 +8,10 @@ use toml::de::{DeTable, DeValue};
 use super::fault::{Fault, Place};
 use super::source::Document;
 
+/// Longest path of a key [bytes]. The place of every value is kept by its path: without a limit one long name of a table
+/// would be repeated for all that stands in it.
+const LONGEST_PATH: usize = 512;
+
 /// Keys and values of one table, sorted by key.
 pub(super) type Table = BTreeMap<String, Node>;
 
@@ -38,7 +42,7 @@ impl Value {
     /// What the value is and, where it is short, the value itself.
     pub(super) fn describe(&self) -> String {
         match self {
-            Self::Text(text) => format!("the text \"{}\"", text.escape_debug()),
+            Self::Text(text) => format!("the text \"{}\"", shown(text)),
             Self::Integer(value) => format!("the whole number {value}"),
             Self::Float(value) => format!("the number {value}"),
             Self::Boolean(value) => format!("`{value}`"),
@@ -49,14 +53,34 @@ impl Value {
     }
 }
 
+/// A text for a message: escaped, and not longer than a line.
+pub(super) fn shown(text: &str) -> String {
+    const LONGEST: usize = 60;
+    let cut = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
+    let dots = if cut < text.len() { "…" } else { "" };
+    format!("{}{dots}", text[..cut].escape_debug())
+}
+
 /// Parse one text.
 ///
 /// # Errors
-/// All syntax errors, each with its place.
+/// All syntax errors, each with its place; or the first key whose path is too long.
 pub(super) fn parse(document: usize, text: &str) -> Result<Table, Vec<Fault>> {
     let (table, errors) = DeTable::parse_recoverable(text);
     if errors.is_empty() {
-        return Ok(convert_table(document, table.get_ref()));
+        let table = convert_table(document, table.get_ref());
+        return match first_long_path(&table, 0) {
+            None => Ok(table),
+            Some(place) => Err(vec![Fault {
+                path: String::new(),
+                place: place.clone(),
+                message: format!(
+                    "the key and the tables around it have names of more than {LONGEST_PATH} bytes"
+                ),
+                expected: Some("shorter names".to_owned()),
+                help: None,
+            }]),
+        };
     }
     let fault = |error: &toml::de::Error| Fault {
         path: String::new(),
@@ -66,6 +90,35 @@ pub(super) fn parse(document: usize, text: &str) -> Result<Table, Vec<Fault>> {
         help: None,
     };
     Err(errors.iter().map(fault).collect())
+}
+
+/// The place of the first key whose path is too long, in a table whose own path has `length` bytes.
+fn first_long_path(table: &Table, length: usize) -> Option<&Place> {
+    table.iter().find_map(|(key, node)| {
+        let length = length + 1 + key.len();
+        if length > LONGEST_PATH { Some(&node.key_place) } else { first_long_path_in(node, length) }
+    })
+}
+
+fn first_long_path_in(node: &Node, length: usize) -> Option<&Place> {
+    match &node.value {
+        Value::Table(inner) => first_long_path(inner, length),
+        Value::Array(items) => items.iter().find_map(|item| first_long_path_in(item, length)),
+        _ => None,
+    }
+}
+
+/// Number of values in a table, those in tables and lists of it included.
+pub(super) fn value_count(table: &Table) -> usize {
+    table.values().map(value_count_of).sum()
+}
+
+fn value_count_of(node: &Node) -> usize {
+    match &node.value {
+        Value::Table(inner) => 1 + value_count(inner),
+        Value::Array(items) => 1 + items.iter().map(value_count_of).sum::<usize>(),
+        _ => 1,
+    }
 }
 
 fn convert_table(document: usize, table: &DeTable<'_>) -> Table {
@@ -166,8 +219,11 @@ pub(super) fn override_document(typed: &str) -> Document {
     } else {
         format!("{key} = {}", toml::Value::String(value.to_owned()))
     };
-    let shown: String = typed.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
-    Document { name: format!("--set '{shown}'"), text }
+    // Long enough for any key and value in use.
+    const LONGEST: usize = 200;
+    let cut = typed.chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c });
+    let dots = if typed.chars().nth(LONGEST).is_some() { "…" } else { "" };
+    Document { name: format!("--set '{}{dots}'", cut.collect::<String>()), text }
 }
 
 /// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.

@@ -15,8 +15,9 @@
 //! * A run that was broken off goes on by being told again: the recorder recalls its evaluations, and as long as the method
 //!   asks for the same designs to the last bit, in the same rounds on the same meshes, they are the answers. The method is
 //!   then in the state that it was in. Anything else is an error.
-//! * Limits of evaluations and time are checked before each evaluation but the first, and a signal too: what was
-//!   computed is kept, and there always is a best design.
+//! * Limits of evaluations and time are checked before each evaluation but the first, and before each remedy: what was
+//!   computed is kept, and there is a best design. A signal may come before the first evaluation, or while evaluations are
+//!   told again: then there is nothing new to keep.
 
 mod run;
 mod trust;
@@ -133,11 +134,12 @@ enum Stop {
 
 /// Runs the optimisation of a problem with a shape and an objective; it leaves the problem in its last round.
 ///
-/// `interrupted` is asked before each evaluation but the first.
+/// `interrupted` is asked before each evaluation and each remedy.
 ///
 /// # Errors
 /// [`Error`] of an evaluation that fails for another reason than its mesh, unless there is a best design to save: then
-/// the run ends with [`StopReason::NumericalFailure`]. What the recorder kept is whole.
+/// the run ends with [`StopReason::NumericalFailure`]; [`Error::InterruptedRun`] where a signal leaves no best design. What
+/// the recorder kept is whole.
 ///
 /// # Panics
 /// If the problem has no shape or no objective.
@@ -149,8 +151,10 @@ pub fn optimise(
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
     let mut run = Run::new(problem, settings, observer, recorder, interrupted);
-    for event in run.approach()? {
-        run.tell(event);
+    match run.approach() {
+        Ok(events) => events.into_iter().for_each(|event| run.tell(event)),
+        Err(Error::Interrupted) => return Err(Error::InterruptedRun),
+        Err(error) => return Err(error),
     }
     let mut search = Search {
         trust: TrustRegion::new(run.shape(), &run.centre(), 1.0)?,
@@ -304,6 +308,9 @@ impl Search {
         cause: &str,
         wanted: &[f64],
     ) -> Result<Option<StopReason>, Error> {
+        if let Some(reason) = run.told_to_end() {
+            return Ok(Some(reason));
+        }
         if gained {
             // Without rounds the reference stays, and so does what the mesh can carry: search nearer to the best.
             (self.shrinks, self.rung) = (0, Rung::Ground);

@@ -1,12 +1,14 @@
 //! One evaluation after another: limits, the mesh, objective and constraints, the row of the history, the best design.
 
+mod replay;
+
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fluxmorph_geometry::ElementId;
-use fluxmorph_remesh::{Motion, Moved, RemeshError};
+use fluxmorph_remesh::{Moved, RemeshError};
 
-use super::{Best, Optimised, Recorder, Stop};
+use super::{Optimised, Recorder, Stop};
 use crate::algorithm::{CONSTRAINT_TOLERANCE, Sample};
 use crate::config::Optimizer;
 use crate::constraint::Bound;
@@ -18,6 +20,7 @@ use crate::observer::{Evaluation, Observer, column};
 use crate::output::{RunStatus, StopReason};
 use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Want};
 use crate::rounds::RoundEvent;
+use replay::Setting;
 
 /// What the first evaluation fixes for the rest of the run.
 #[derive(Clone, Debug)]
@@ -46,9 +49,9 @@ impl Standing {
 /// What is known of the field of the best design.
 #[derive(Debug)]
 enum Field {
-    Computed(Analysis),
-    /// It was computed before the run was broken off, in this round.
-    Recalled(Box<Motion>),
+    Computed(Box<Analysis>),
+    /// It was computed before the run was broken off.
+    Recalled(Box<Setting>),
 }
 
 /// The best design so far.
@@ -136,7 +139,7 @@ impl<'a> Run<'a> {
     /// Takes the mesh near the first design.
     pub(super) fn approach(&mut self) -> Result<Vec<RoundEvent>, Error> {
         let first = self.shape().initial.clone();
-        self.problem.approach(&first)
+        self.problem.approach(&first, self.interrupted)
     }
 
     /// Whether another round may begin.
@@ -155,11 +158,12 @@ impl<'a> Run<'a> {
         let Some(best) = self.best.as_ref().filter(|_| !self.best_is_stale) else { return Ok(()) };
         let shape = self.shape();
         let motion = match &best.field {
-            Field::Computed(Analysis { mesh, displacement, .. }) => {
+            Field::Computed(analysis) => {
+                let Analysis { mesh, displacement, .. } = &**analysis;
                 shape.next_round(&best.values, mesh.clone(), displacement.clone())?
             }
-            Field::Recalled(motion) => {
-                let moved = motion.moved(&shape.displacement(&best.values))?;
+            Field::Recalled(setting) => {
+                let moved = setting.motion.moved(&shape.displacement(&best.values))?;
                 shape.next_round(&best.values, moved.mesh, moved.displacement)?
             }
         };
@@ -190,8 +194,8 @@ impl<'a> Run<'a> {
         {
             return Ok(best.sample.clone());
         }
-        if self.next.is_none() {
-            self.next = self.recorder.recall();
+        if self.is_recalling() && (self.interrupted)() {
+            return Err(Stop::Limit(StopReason::Interrupted));
         }
         match self.next.take() {
             Some(record) if self.is_of(&record, p) => self.recall(record),
@@ -204,51 +208,6 @@ impl<'a> Run<'a> {
             }
             None => self.compute(p),
         }
-    }
-
-    /// Whether a record is that of a design on this mesh, to the last bit.
-    fn is_of(&self, record: &Record, p: &[f64]) -> bool {
-        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
-        record.row.evaluation == self.evaluations
-            && record.row.round == self.shape().motion.round()
-            && record.design.len() == p.len()
-            && record.design.iter().zip(p).all(same)
-            && record.reference == reference_hash(self.shape().motion.reference())
-    }
-
-    /// Why a record is not the answer to what the method asks for.
-    fn difference(&self, record: &Record, p: &[f64]) -> Error {
-        let Record { row, design, .. } = record;
-        let round = self.shape().motion.round();
-        let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
-        let cause = match differing {
-            _ if row.evaluation != self.evaluations => {
-                format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations)
-            }
-            _ if row.round != round => format!("it was in round {}, now the mesh is in {round}", row.round),
-            Some(k) => format!("variable {k} was {:e} m, now the method asks for {:e} m", design[k], p[k]),
-            None => "the reference mesh of its round is another one".to_owned(),
-        };
-        Error::Replay { evaluation: row.evaluation, cause }
-    }
-
-    /// The answer to a design that was computed before the run was broken off.
-    fn recall(&mut self, record: Record) -> Result<Sample, Stop> {
-        let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
-        let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
-        let sample = self.sample(&initial, &record);
-        let field = Field::Recalled(Box::new(self.shape().motion.clone()));
-        self.memory = Memory::with_methods(&record.methods);
-        let standing = self.standing(record.row.objective, &sample);
-        if standing.is_improved() != record.improved
-            || self.iterations_after(standing) != record.row.iteration
-        {
-            let (evaluation, cause) = (record.row.evaluation, "its standing among the others is another one");
-            return Err(Stop::Error(Box::new(Error::Replay { evaluation, cause: cause.to_owned() })));
-        }
-        self.observer.evaluation(&record.row);
-        self.keep(record, sample.clone(), standing, field);
-        Ok(sample)
     }
 
     /// Computes a design.
@@ -264,6 +223,8 @@ impl<'a> Run<'a> {
         let initial = self.initial(objective, analysis.quality.worst, &values)?;
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
+        // Before anything of it is kept.
+        sample.check(p.len(), self.problem.constraints.len())?;
         let standing = self.standing(objective, &sample);
         record.improved = standing.is_improved();
         record.row.iteration = self.iterations_after(standing);
@@ -275,7 +236,7 @@ impl<'a> Run<'a> {
         }
         self.recorder.record(&record, &analysis, self.problem)?;
         self.observer.evaluation(&record.row);
-        self.keep(record, sample.clone(), standing, Field::Computed(analysis));
+        self.keep(record, sample.clone(), standing, Field::Computed(Box::new(analysis)));
         Ok(sample)
     }
 
@@ -398,19 +359,25 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn check_limits(&self) -> Result<(), Stop> {
-        // Without a first evaluation there would be nothing to keep.
-        if self.evaluations > 0 && (self.interrupted)() {
-            return Err(Stop::Limit(StopReason::Interrupted));
-        }
-        if self.evaluations == self.settings.max_evaluations {
-            return Err(Stop::Limit(StopReason::MaxEvaluations));
+    /// A signal or the time, where they end the run now.
+    pub(super) fn told_to_end(&mut self) -> Option<StopReason> {
+        if (self.interrupted)() {
+            return Some(StopReason::Interrupted);
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
-        if self.evaluations > 0 && self.settings.max_time.is_some_and(over) {
-            return Err(Stop::Limit(StopReason::MaxTime));
-        }
-        Ok(())
+        // Without a first evaluation there would be nothing to keep, and what was computed before is told to its end.
+        let is_over =
+            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_recalling();
+        is_over.then_some(StopReason::MaxTime)
+    }
+
+    fn check_limits(&mut self) -> Result<(), Stop> {
+        let reason = match self.told_to_end() {
+            Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
+            _ if self.evaluations >= self.settings.max_evaluations => Some(StopReason::MaxEvaluations),
+            reason => reason,
+        };
+        reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
     }
 
     /// Counts an evaluation, and remembers the best.
@@ -435,6 +402,10 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
+        let is_cut = stop_reason == StopReason::Interrupted && (self.is_recalling() || self.best.is_none());
+        if is_cut {
+            return Err(Error::InterruptedRun);
+        }
         if let Some(record) = self.next.take().or_else(|| self.recorder.recall()) {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
@@ -466,22 +437,6 @@ impl<'a> Run<'a> {
             timings: self.timings,
             rounds: self.rounds,
         })
-    }
-
-    /// The best design with its field: one that was recalled is computed in its own round, and comes out as it was.
-    fn analysed(&mut self, best: BestSoFar) -> Result<Best, Error> {
-        let BestSoFar { evaluation, values, objective, violation, field, .. } = best;
-        let analysis = match field {
-            Field::Computed(analysis) => analysis,
-            Field::Recalled(motion) => {
-                self.observer.phase("computing the field of the best design");
-                let own = std::mem::replace(&mut self.shape_mut().motion, *motion);
-                let analysis = self.problem.evaluate_with(&mut self.memory, &values, Want::Gradient);
-                self.shape_mut().motion = own;
-                analysis?
-            }
-        };
-        Ok(Best { evaluation, values, objective, violation, analysis })
     }
 }
 

@@ -9,7 +9,7 @@
 
 use fluxmorph_solver::linear::Method;
 
-use super::{Contents, Identity, JournalError, Record};
+use super::{Contents, Identity, JournalError, Record, Rest};
 use crate::observer::Evaluation;
 use crate::problem::Timings;
 
@@ -18,6 +18,9 @@ pub(super) const CHECKSUM: usize = 16;
 
 const MARK: &[u8; 8] = b"FLXMJRNL";
 const FORM: u32 = 1;
+
+/// Bytes of a record beside its designs and derivatives, about; most are the row of the history.
+const LIKELY_RECORD: usize = 1200;
 
 type Chain = [u8; CHECKSUM];
 
@@ -84,7 +87,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Contents, JournalError> {
     let body = cursor.sized().ok_or(JournalError::Header)?;
     let identity = parse_identity(body).ok_or(JournalError::Header)?;
     let mut chain = cursor.checked(0, &[0; CHECKSUM]).ok_or(JournalError::Header)?;
-    let (mut records, mut whole) = (Vec::new(), cursor.at);
+    let header = cursor.at;
+    let (mut records, mut whole) = (Vec::new(), header);
     while let Some(body) = cursor.sized()
         && let Some(next) = cursor.checked(whole, &chain)
         && let Some(record) = parse_record(body, &identity)
@@ -92,8 +96,25 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Contents, JournalError> {
         records.push(record);
         (chain, whole) = (next, cursor.at);
     }
-    let dropped = (bytes.len() - whole) as u64;
-    Ok(Contents { identity, records, length: whole as u64, dropped, chain })
+    let rest = rest(&bytes[whole..], &identity, [header, whole], records.len());
+    Ok(Contents { identity, records, length: whole as u64, rest, chain })
+}
+
+/// What is behind the whole records, which stand from `header` to `whole`.
+fn rest(rest: &[u8], identity: &Identity, [header, whole]: [usize; 2], records: usize) -> Rest {
+    let Identity { variables, constraints, .. } = *identity;
+    let numbers = (2 + constraints).saturating_mul(variables);
+    if rest.is_empty() {
+        return Rest::Nothing;
+    }
+    let length = Cursor { bytes: rest, at: 0 }.count();
+    let has_more = length.is_some_and(|length| length.saturating_add(4 + CHECKSUM) < rest.len());
+    // Records hardly differ in length: more than two are no torn one, whatever its own length says.
+    let usual = (whole - header)
+        .checked_div(records)
+        .unwrap_or(numbers.saturating_mul(8).saturating_add(LIKELY_RECORD));
+    let is_long = rest.len() / 2 > usual;
+    if has_more || is_long { Rest::Damaged(rest.len() as u64) } else { Rest::Torn(rest.len() as u64) }
 }
 
 fn parse_identity(body: &[u8]) -> Option<Identity> {

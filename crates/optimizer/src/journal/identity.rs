@@ -1,6 +1,6 @@
 //! What a journal belongs to: the version of the program, the configuration, the mesh.
 
-use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_geometry::Mesh;
 
 use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
 
@@ -114,17 +114,31 @@ pub fn configuration_hash(config: &Config) -> [u8; 32] {
     *blake3::hash(resolved_toml(&bare).as_bytes()).as_bytes()
 }
 
-/// BLAKE3 of points, tetrahedra and their regions.
+/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles.
 pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
     let topology = mesh.topology();
     let mut hasher = blake3::Hasher::new();
     hash_points(&mut hasher, mesh);
-    topology.tets().iter().flatten().for_each(|node| {
-        hasher.update(&node.0.to_le_bytes());
-    });
-    topology.region_of().iter().for_each(|RegionId(region)| {
-        hasher.update(&region.to_le_bytes());
-    });
+    let mut number = |n: usize| {
+        hasher.update(&(n as u64).to_le_bytes());
+    };
+    topology.tets().iter().flatten().for_each(|node| number(node.index()));
+    topology.region_of().iter().for_each(|region| number(region.index()));
+    for name in topology.region_names() {
+        number(name.len());
+        name.bytes().for_each(|byte| number(usize::from(byte)));
+        for cell in topology.given_cells(name).unwrap_or_default() {
+            number(cell.len());
+            cell.iter().for_each(|element| number(element.index()));
+        }
+    }
+    for name in topology.surface_names() {
+        number(name.len());
+        name.bytes().for_each(|byte| number(usize::from(byte)));
+        let triangles = topology.surface(name).unwrap_or_default();
+        number(triangles.len());
+        triangles.iter().flatten().for_each(|node| number(node.index()));
+    }
     *hasher.finalize().as_bytes()
 }
 

@@ -54,10 +54,31 @@ pub struct Contents {
     pub records: Vec<Record>,
     /// Bytes of header and whole records.
     pub length: u64,
-    /// Bytes behind them: a record that was cut short, or what a damaged disk left.
-    pub dropped: u64,
+    /// What is behind them.
+    pub rest: Rest,
     /// Checksum that the next record carries on.
     chain: [u8; codec::CHECKSUM],
+}
+
+/// What is behind the whole records of a journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rest {
+    /// Nothing.
+    Nothing,
+    /// The beginning of a record that a crash cut short, of so many bytes.
+    Torn(u64),
+    /// More than one record, of so many bytes: something in the first of them was changed.
+    Damaged(u64),
+}
+
+impl Rest {
+    /// Its length [bytes].
+    pub fn bytes(self) -> u64 {
+        match self {
+            Self::Nothing => 0,
+            Self::Torn(bytes) | Self::Damaged(bytes) => bytes,
+        }
+    }
 }
 
 /// Why bytes are no journal.
@@ -115,11 +136,24 @@ impl Journal {
         match directory.disk().read(&path, LARGEST) {
             Ok(bytes) => match parse(&bytes) {
                 Ok(contents) => Ok(Some(contents)),
-                Err(error) => Err(OutputError::Damaged { path, message: error.to_string() }),
+                Err(error) => {
+                    let message = format!("{error} (without the file all evaluations are computed anew)");
+                    Err(OutputError::Damaged { path, message })
+                }
             },
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(OutputError::io("read", path)(error)),
         }
+    }
+
+    /// Keeps a copy of a damaged journal beside it, before it is cut behind its whole records.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn keep_damaged(directory: &RunDirectory) -> Result<(), OutputError> {
+        let path = directory.journal();
+        let bytes = directory.disk().read(&path, LARGEST).map_err(OutputError::io("read", &path))?;
+        directory.write(&directory.damaged_journal(), &bytes)
     }
 
     /// A journal to go on with behind what was read of it.
@@ -146,5 +180,7 @@ impl Journal {
     }
 }
 
+#[cfg(test)]
+mod properties;
 #[cfg(test)]
 mod tests;

@@ -57,7 +57,7 @@ fn journal() -> (Vec<u8>, Vec<usize>) {
 fn what_is_written_is_read_to_the_last_bit() {
     let contents = parse(&journal().0).expect("a journal");
     assert_eq!(contents.identity, identity());
-    assert_eq!(contents.dropped, 0);
+    assert_eq!(contents.rest.bytes(), 0);
     let expected: Vec<Record> = (0..3).map(record).collect();
     assert_eq!(contents.records, expected);
     let bits = |record: &Record| record.design.iter().map(|p| p.to_bits()).collect::<Vec<_>>();
@@ -76,7 +76,7 @@ fn a_journal_cut_anywhere_keeps_its_whole_records() {
                 let whole = ends.iter().filter(|&&end| end <= cut).count() - 1;
                 assert_eq!(contents.records.len(), whole, "cut at {cut}");
                 assert_eq!(contents.length as usize, ends[whole]);
-                assert_eq!(contents.dropped as usize, cut - ends[whole]);
+                assert_eq!(contents.rest.bytes() as usize, cut - ends[whole]);
             }
             Err(_) => assert!(cut < ends[0], "cut at {cut}"),
         }
@@ -92,6 +92,11 @@ fn a_changed_bit_anywhere_is_found() {
         match parse(&changed) {
             Ok(contents) => {
                 let before = ends.iter().filter(|&&end| end <= at).count() - 1;
+                let is_last = before + 2 == ends.len();
+                // A length that is wrong may hide what follows: three small records are not enough to tell.
+                let is_length = (ends[before]..ends[before] + 4).contains(&at);
+                let is_torn = matches!(contents.rest, Rest::Torn(_));
+                assert!(is_torn == is_last || is_length, "byte {at}: {:?}", contents.rest);
                 assert_eq!(contents.records, (0..before).map(record).collect::<Vec<_>>(), "byte {at}");
             }
             Err(_) => assert!(at < ends[0], "byte {at}"),

@@ -1,7 +1,9 @@
 //! Reads a design: a `result.json`, or a JSON array of lengths in metres.
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use fluxmorph_geometry::io::open_regular;
 use serde_json::Value;
 
 /// Largest design file that is read [bytes]: a million variables with their points.
@@ -48,11 +50,11 @@ pub enum DesignFileError {
 pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileError> {
     let content = |message: String| DesignFileError::Content { path: path.to_owned(), message };
     let unreadable = |source| DesignFileError::Read { path: path.to_owned(), source };
-    let size = std::fs::metadata(path).map_err(unreadable)?.len();
-    if size > LARGEST {
-        return Err(content(format!("{size} bytes are more than {LARGEST}")));
+    let mut bytes = Vec::new();
+    open_regular(path).and_then(|file| file.take(LARGEST + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST {
+        return Err(content(format!("it has more than {LARGEST} bytes")));
     }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
     let value: Value = serde_json::from_slice(&bytes).map_err(|error| content(error.to_string()))?;
     let list = match &value {
         Value::Object(_) => value.pointer("/design/values_m"),

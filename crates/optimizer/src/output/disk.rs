@@ -9,6 +9,8 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 use std::sync::Arc;
 
+use fluxmorph_geometry::io::open_regular;
+
 /// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something.
 pub trait Disk: Debug + Send + Sync {
     /// Makes a folder and those above it; one that is there already is no error.
@@ -23,7 +25,7 @@ pub trait Disk: Debug + Send + Sync {
     /// When there is one already, be it a link, or the operating system refuses.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
 
-    /// Opens a file to write behind its first `length` bytes; what follows them is cut off.
+    /// Opens a file, and not a link to one, to write behind its first `length` bytes; what follows them is cut off.
     ///
     /// # Errors
     /// [`io::ErrorKind::ResourceBusy`] when another process holds it, or when the operating system refuses.
@@ -53,10 +55,10 @@ pub trait Disk: Debug + Send + Sync {
     /// When the operating system refuses.
     fn sync_dir(&self, path: &Path) -> io::Result<()>;
 
-    /// Reads a whole file.
+    /// Reads a whole regular file; a pipe or a device, which may never end, is refused.
     ///
     /// # Errors
-    /// [`io::ErrorKind::FileTooLarge`] beyond `most` bytes, or when the operating system refuses.
+    /// [`io::ErrorKind::FileTooLarge`] beyond `most` bytes, when it is a device or a pipe, or when the operating system refuses.
     fn read(&self, path: &Path, most: u64) -> io::Result<Vec<u8>>;
 
     /// Names in a folder, sorted.
@@ -65,8 +67,8 @@ pub trait Disk: Debug + Send + Sync {
     /// When the operating system refuses.
     fn names(&self, path: &Path) -> io::Result<Vec<String>>;
 
-    /// Whether a folder stands there itself, and not a link to one.
-    fn is_own_dir(&self, path: &Path) -> bool;
+    /// Whether a link stands there, wherever it leads.
+    fn is_link(&self, path: &Path) -> bool;
 }
 
 /// A file that is written.
@@ -104,6 +106,7 @@ impl Disk for SystemDisk {
     }
 
     fn append(&self, path: &Path, length: u64) -> io::Result<Box<dyn DiskFile>> {
+        plain(&fs::symlink_metadata(path)?)?;
         let mut file = OpenOptions::new().write(true).open(path)?;
         hold(&file)?;
         DiskFile::cut(&mut file, length)?;
@@ -111,6 +114,7 @@ impl Disk for SystemDisk {
     }
 
     fn hold(&self, path: &Path) -> io::Result<()> {
+        plain(&fs::symlink_metadata(path)?)?;
         hold(&OpenOptions::new().write(true).open(path)?)
     }
 
@@ -128,8 +132,11 @@ impl Disk for SystemDisk {
     }
 
     fn read(&self, path: &Path, most: u64) -> io::Result<Vec<u8>> {
+        if plain(&fs::metadata(path)?)? > most {
+            return Err(io::ErrorKind::FileTooLarge.into());
+        }
         let mut bytes = Vec::new();
-        File::open(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
+        open_regular(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
     }
 
@@ -143,9 +150,16 @@ impl Disk for SystemDisk {
         })
     }
 
-    fn is_own_dir(&self, path: &Path) -> bool {
-        fs::symlink_metadata(path).is_ok_and(|entry| entry.is_dir())
+    fn is_link(&self, path: &Path) -> bool {
+        fs::symlink_metadata(path).is_ok_and(|entry| entry.is_symlink())
     }
+}
+
+/// The length of a plain file [bytes]. A pipe would be waited for without end, a device may have none, and a link leads out
+/// of the run directory.
+fn plain(entry: &fs::Metadata) -> io::Result<u64> {
+    let refused = || io::Error::new(io::ErrorKind::InvalidInput, "it is no plain file");
+    if entry.is_file() { Ok(entry.len()) } else { Err(refused()) }
 }
 
 /// Holds a file against other processes until it is closed, where the file system can do so.
@@ -180,6 +194,20 @@ mod tests {
         assert_eq!(error.kind(), io::ErrorKind::ResourceBusy);
         drop(file);
         assert!(SystemDisk.append(&path, 0).is_ok());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_are_not_taken_for_files_of_a_run() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "theirs").expect("written");
+        std::os::unix::fs::symlink(&file, &link).expect("linked");
+        assert!(SystemDisk.append(&link, 0).is_err() && SystemDisk.hold(&link).is_err());
+        assert_eq!(SystemDisk.read(&link, 100).expect("read"), b"theirs");
+        // It would fill the memory to the limit.
+        let error = SystemDisk.read(Path::new("/dev/zero"), u64::MAX).expect_err("a device");
+        assert!(error.to_string().contains("no plain file"), "{error}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ mod disk;
 mod files;
 mod history;
 mod manifest;
+mod names;
 mod process;
 mod result;
 mod run_directory;
@@ -18,13 +19,14 @@ pub use disk::{Disk, DiskFile, system_disk};
 pub use files::SyncedLog;
 pub use history::History;
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
+pub use names::{resume_command, surface_files};
 pub use process::{hostname, peak_memory_bytes, utc_timestamp};
 pub(crate) use result::to_json;
 pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, StopReason, TermResult, Verification,
 };
-pub use run_directory::{OlderRun, RunDirectory, surface_files};
+pub use run_directory::{OlderRun, RunDirectory};
 
 /// Why something could not be written or read back.
 #[derive(Debug, thiserror::Error)]
@@ -68,6 +70,14 @@ pub enum OutputError {
     )]
     InUse {
         /// The file that it holds.
+        path: PathBuf,
+    },
+    /// A folder of a run is a link.
+    #[error(
+        "`{path}` is a link, and nothing is written through links; remove it, or choose another directory with --out"
+    )]
+    Linked {
+        /// The link.
         path: PathBuf,
     },
     /// A file of a run does not hold what it should.

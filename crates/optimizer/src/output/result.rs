@@ -16,7 +16,8 @@ pub struct RunResult {
     pub schema_version: u32,
     /// `run` or `solve`.
     pub command: String,
-    /// How it ended.
+    /// How it ended: that of the stop reason, or interrupted where the search ended by itself and the check of its result
+    /// did not.
     pub status: RunStatus,
     /// Why it ended.
     pub stop_reason: StopReason,

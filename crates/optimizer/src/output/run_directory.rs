@@ -8,6 +8,7 @@ use super::OutputError;
 use super::disk::Disk;
 use super::files::{SyncedLog, UNFINISHED, folder_of, write_whole};
 use super::manifest::Manifest;
+use super::names::{field_name, field_number, is_case, is_surface, morph_name};
 
 /// What to do with an earlier run in the same folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,10 +29,14 @@ pub struct RunDirectory {
 const MANIFEST: &str = "manifest.json";
 const FIELDS: &str = "fields";
 const JOURNAL: &str = "journal.bin";
+const CONFIG: &str = "config.toml";
+/// What a damaged journal is kept as.
+const DAMAGED_JOURNAL: &str = "journal.damaged.bin";
 /// The files of a run beside its manifest. The journal goes first: it must not be taken for that of a new run.
 const FILES: &[&str] = &[
     JOURNAL,
-    "config.toml",
+    DAMAGED_JOURNAL,
+    CONFIG,
     "resolved.toml",
     "history.csv",
     "history.jsonl",
@@ -44,9 +49,6 @@ const FILES: &[&str] = &[
     OPTIMUM,
 ];
 const OPTIMUM: &str = "optimum.msh";
-/// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
-const LONGEST_NAME: usize = 50;
-
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
     ///
@@ -56,9 +58,23 @@ impl RunDirectory {
     /// # Errors
     /// When the folder holds something else, or the operating system refuses.
     pub fn create(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        Self { disk: Arc::clone(disk), path: path.to_owned() }.refuse_link()?;
         let directory = Self::create_flat(disk, path, older)?;
-        directory.make(&directory.fields())?;
+        directory.make_fields()?;
         Ok(directory)
+    }
+
+    /// Makes the folder of the fields, if it is not there.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn make_fields(&self) -> Result<(), OutputError> {
+        self.make(&self.fields())
+    }
+
+    /// Whether the configuration of a run has been saved, without which it cannot be gone on with.
+    pub fn holds_configuration(&self) -> bool {
+        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| name == CONFIG))
     }
 
     /// The same without a folder for fields.
@@ -85,19 +101,38 @@ impl RunDirectory {
     /// When the folder does not hold one.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, OutputError> {
         let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
-        if directory.holds_run() { Ok(directory) } else { Err(OutputError::NoRun { path: path.to_owned() }) }
+        if !directory.holds_run() {
+            return Err(OutputError::NoRun { path: path.to_owned() });
+        }
+        directory.refuse_link()?;
+        Ok(directory)
     }
 
-    /// Makes a folder whose name is on the disk.
+    /// A link may lead anywhere, and what lies in an older folder may come from others.
+    fn refuse_link(&self) -> Result<(), OutputError> {
+        let path = self.fields();
+        if self.disk.is_link(&path) { Err(OutputError::Linked { path }) } else { Ok(()) }
+    }
+
+    /// Makes a folder, and those above it that are missing; their names are on the disk then.
     fn make(&self, path: &Path) -> Result<(), OutputError> {
+        let is_missing = |folder: &&Path| {
+            let names = self.disk.names(folder);
+            !folder.as_os_str().is_empty()
+                && names.is_err_and(|error| error.kind() == io::ErrorKind::NotFound)
+        };
+        let missing = path.ancestors().skip(1).take_while(is_missing).count();
         self.disk.create_dir(path).map_err(OutputError::io("create", path))?;
-        match self.disk.sync_dir(folder_of(path)) {
-            // Whoever may write into a folder may not always read it.
-            Err(error) if error.kind() != io::ErrorKind::PermissionDenied => {
-                Err(OutputError::io("create", path)(error))
+        for folder in path.ancestors().take(missing + 1) {
+            match self.disk.sync_dir(folder_of(folder)) {
+                // Whoever may write into a folder may not always read it.
+                Err(error) if error.kind() != io::ErrorKind::PermissionDenied => {
+                    return Err(OutputError::io("create", path)(error));
+                }
+                _ => {}
             }
-            _ => Ok(()),
         }
+        Ok(())
     }
 
     fn holds_run(&self) -> bool {
@@ -155,7 +190,7 @@ impl RunDirectory {
     fn remove_fields(&self, kept: &[usize]) -> Result<(), OutputError> {
         let fields = self.fields();
         // A link may lead to the fields of another run: those stay.
-        if !self.disk.is_own_dir(&fields) {
+        if self.disk.is_link(&fields) {
             return Ok(());
         }
         self.remove_unfinished(&fields)?;
@@ -260,7 +295,7 @@ impl RunDirectory {
 
     /// `config.toml`, the configuration as given.
     pub fn config(&self) -> PathBuf {
-        self.path.join("config.toml")
+        self.path.join(CONFIG)
     }
 
     /// `resolved.toml`, with every default.
@@ -281,6 +316,11 @@ impl RunDirectory {
     /// `journal.bin`, all evaluations with their raw bits.
     pub fn journal(&self) -> PathBuf {
         self.path.join(JOURNAL)
+    }
+
+    /// `journal.damaged.bin`, what a damaged journal is kept as.
+    pub fn damaged_journal(&self) -> PathBuf {
+        self.path.join(DAMAGED_JOURNAL)
     }
 
     /// `result.json`.
@@ -337,56 +377,6 @@ impl RunDirectory {
     pub fn collection(&self) -> PathBuf {
         self.path.join("fields.pvd")
     }
-}
-
-/// Names of the STL files of surfaces, in their order: letters, digits, `-` and `_` stay, all else becomes `_`.
-///
-/// Names that come out equal, in small letters or capitals, are numbered: some file systems see no difference.
-pub fn surface_files(surfaces: &[String]) -> Vec<String> {
-    let mut taken = std::collections::BTreeSet::new();
-    let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
-    let mut file = |surface: &String| {
-        let stem: String = surface.chars().take(LONGEST_NAME).map(safe).collect();
-        let numbered = (2..).map(|n| format!("{stem}_{n}"));
-        let free =
-            std::iter::once(stem.clone()).chain(numbered).find(|name| taken.insert(name.to_lowercase()));
-        format!("optimum_{}.stl", free.unwrap_or(stem))
-    };
-    surfaces.iter().map(&mut file).collect()
-}
-
-/// Whether a name is one of [`surface_files`].
-fn is_surface(name: &str) -> bool {
-    name.strip_prefix("optimum_")
-        .and_then(|rest| rest.strip_suffix(".stl"))
-        .is_some_and(|stem| stem.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_'))
-}
-
-fn morph_name(case: Option<usize>, what: &str) -> String {
-    match case {
-        None => format!("{what}.vtu"),
-        Some(case) => format!("case_{:02}_{what}.vtu", case + 1),
-    }
-}
-
-/// Whether a name is one that [`morph_name`] gives a case.
-fn is_case(name: &str) -> bool {
-    let number = |end| name.strip_prefix("case_").and_then(|rest| rest.strip_suffix(end));
-    ["_before.vtu", "_after.vtu"]
-        .into_iter()
-        .filter_map(number)
-        .any(|digits| digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit()))
-}
-
-fn field_name(evaluation: usize) -> String {
-    format!("eval_{evaluation:04}.vtu")
-}
-
-/// The evaluation of a field file.
-fn field_number(name: &str) -> Option<usize> {
-    let digits = name.strip_prefix("eval_")?.strip_suffix(".vtu")?;
-    let is_ours = digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit());
-    digits.parse().ok().filter(|_| is_ours)
 }
 
 #[cfg(test)]
@@ -466,25 +456,6 @@ mod tests {
     }
 
     #[test]
-    fn files_of_surfaces_have_safe_names_of_their_own() {
-        let names =
-            ["plate|air", "plate/air", "Top side", "top_SIDE", "../x", "Fläche", ""].map(str::to_owned);
-        let files = surface_files(&names);
-        let expected = [
-            "optimum_plate_air.stl",
-            "optimum_plate_air_2.stl",
-            "optimum_Top_side.stl",
-            "optimum_top_SIDE_2.stl",
-            "optimum____x.stl",
-            "optimum_Fläche.stl",
-            "optimum_.stl",
-        ];
-        assert_eq!(files, expected);
-        assert!(files.iter().all(|file| is_surface(file)));
-        assert!(surface_files(&["ä".repeat(500)])[0].len() < 255);
-    }
-
-    #[test]
     fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run =
@@ -511,7 +482,9 @@ mod tests {
         let run = started(&folder.path().join("run"));
         fs::remove_dir(run.fields()).expect("removed");
         std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
-        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        let error = RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect_err("a link");
+        assert!(matches!(error, OutputError::Linked { .. }), "{error}");
+        RunDirectory::create_flat(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
         assert!(other.field(0).exists());
     }
 }

@@ -8,6 +8,7 @@ mod recorder;
 mod resume;
 mod summary;
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -17,18 +18,20 @@ use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::driver;
 use crate::error::Error;
 use crate::exports;
-use crate::fresh_mesh::{Gain, Shapes};
+use crate::finite;
+use crate::fresh_mesh::{Check, Gain, Shapes};
 use crate::journal::{self, Identity};
+use crate::memory_limit;
 use crate::observer::{Observer, Started};
 use crate::output::{
     Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
-    StopReason, peak_memory_bytes, surface_files,
+    StopReason, peak_memory_bytes, resume_command, surface_files,
 };
 use crate::problem::{Problem, Want};
 use crate::rounds::RoundEvent;
 use crate::setup::{Purpose, Setup, set_up};
 use recorder::{DirectoryRecorder, write_collection, write_field};
-pub use resume::{Limits, resume};
+pub use resume::{Limits, SavedRun, resume};
 use summary::{constraints, linear_solver, terms};
 
 /// What a session is told beside the configuration.
@@ -40,7 +43,7 @@ pub struct Options<'a> {
     pub older_run: OlderRun,
     /// Threads in use, for the manifest.
     pub threads: usize,
-    /// Whether the user wants to stop; asked before each evaluation but the first.
+    /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
 }
 
@@ -57,9 +60,12 @@ pub fn run(
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
     let mut setup = set_up(config, source, Purpose::Optimisation)?;
+    memory_limit::check_problem(setup.problem.memory_estimate(), source, options.older_run)?;
+    Error::unless(options.interrupted)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial).map_err(|error| unreached(error, source))?;
+    let approach = setup.problem.approach(&initial, options.interrupted);
+    let approach = approach.map_err(|error| unreached(error, source))?;
     let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let directory = session.directory.clone();
@@ -84,6 +90,8 @@ pub fn solve(
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
     let mut setup = set_up(config, source, Purpose::Analysis)?;
+    memory_limit::check_problem(setup.problem.memory_estimate(), source, options.older_run)?;
+    Error::unless(options.interrupted)?;
     let values = match (&setup.problem.shape, design) {
         (Some(shape), given) => {
             let values = given.unwrap_or_else(|| shape.initial.clone());
@@ -100,7 +108,7 @@ pub fn solve(
     };
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    let approach = setup.problem.approach(p)?;
+    let approach = setup.problem.approach(p, options.interrupted)?;
     let moved = setup.problem.moved(p)?;
     let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
@@ -251,20 +259,35 @@ impl<'a> Session<'a> {
         self.verified(result, &shapes, interrupted, observer)
     }
 
-    /// Does the work, writes the result, and completes the manifest whatever happens.
+    /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
     fn conclude(
         mut self,
         observer: &mut dyn Observer,
         work: impl FnOnce(&mut Self, &mut dyn Observer) -> Result<RunResult, Error>,
     ) -> Result<RunResult, Error> {
-        let outcome =
-            self.write_configuration().and_then(|()| work(&mut self, observer)).and_then(|result| {
-                result.write(&self.directory)?;
-                Ok(result)
-            });
-        let status = outcome.as_ref().map_or(RunStatus::Failed, |result| result.status);
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            self.write_configuration()?;
+            let result = work(&mut self, observer)?;
+            finite::result(&result)?;
+            result.write(&self.directory)?;
+            Ok::<RunResult, Error>(result)
+        }));
+        let status = match &outcome {
+            Ok(Ok(result)) => result.status,
+            Ok(Err(Error::InterruptedRun)) => RunStatus::Interrupted,
+            _ => RunStatus::Failed,
+        };
         self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
         let completed = self.manifest.write(&self.directory);
+        let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
+        if let Err(error) = &outcome
+            && self.command == "run"
+            && error.leaves_a_run()
+            && self.directory.holds_configuration()
+        {
+            let command = resume_command(self.directory.path());
+            observer.warning(&format!("what was computed is kept: go on with `{command}`"));
+        }
         let result = outcome?;
         completed?;
         observer.finished(&result);
@@ -288,12 +311,16 @@ impl<'a> Session<'a> {
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
+        finite::result(&result)?;
         result.write(&self.directory)?;
         (self.setup.problem.states, self.setup.problem.shape) = (Vec::new(), None);
         let clock = Instant::now();
         let gain = Gain { config: self.config, source: self.source, stop_reason: result.stop_reason, shapes };
-        if let Some(objective) = &mut result.objective {
-            gain.verify(objective, interrupted, observer);
+        if let Some(objective) = &mut result.objective
+            && gain.verify(objective, interrupted, observer) == Check::CutShort
+        {
+            // It can be made up for: the search is whole, the run is not.
+            result.status = RunStatus::Interrupted;
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);

@@ -1,16 +1,19 @@
 //! Going on with a run that was broken off: its directory holds all that is needed.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session, constraint_names, unreached};
 use crate::config::{Config, Source};
 use crate::error::Error;
-use crate::journal::{Contents, Identity, Journal};
+use crate::journal::{Contents, Identity, Journal, Rest};
+use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{
-    LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
+    Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
+    surface_files,
 };
 use crate::setup::{Purpose, set_up};
 
@@ -26,41 +29,73 @@ pub struct Limits {
     pub max_time: Option<f64>,
 }
 
-/// Goes on with the run in a directory, as if it had not been broken off: history, fields, journal and result are those of
-/// a run without a break, but for times.
+/// A run as its directory holds it.
+#[derive(Debug)]
+pub struct SavedRun {
+    directory: RunDirectory,
+    manifest: Manifest,
+    config: Config,
+    source: Source,
+}
+
+impl SavedRun {
+    /// Reads manifest and configuration; nothing is written.
+    ///
+    /// # Errors
+    /// [`Error::NotResumable`] where there is no run to go on with, faults of the configuration, files that cannot be read.
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
+        let directory = RunDirectory::open(disk, path)?;
+        let manifest = Manifest::read(&directory)?;
+        if manifest.command != "run" {
+            let cause = format!("it holds a `{}`, which is done in one go: start it again", manifest.command);
+            return Err(not_resumable(&directory, cause));
+        }
+        let (mut config, source) = configuration(&directory, &manifest)?;
+        config.output.directory = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        Ok(Self { directory, manifest, config, source })
+    }
+
+    /// The configuration that the run was started with.
+    pub fn config(&self) -> (&Config, &Source) {
+        (&self.config, &self.source)
+    }
+}
+
+/// Goes on with a run as if it had not been broken off: history, fields, journal and result are those of a run without a
+/// break, but for times.
 ///
 /// A run that has ended by itself is left as it is, and its result returned; so is one that used up its evaluations, unless
 /// `limits` allows more.
 ///
 /// # Errors
-/// [`Error::NotResumable`], [`Error::OtherRun`] where configuration, mesh or program are others, [`Error::Replay`]; before
-/// anything is written. Afterwards as [`super::run`].
+/// [`Error::OtherRun`] where configuration, mesh or program are others, [`Error::Replay`]; before anything is written.
+/// Afterwards as [`super::run`].
 pub fn resume(
-    path: &Path,
+    saved: SavedRun,
     limits: Limits,
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
-    let directory = RunDirectory::open(options.disk, path)?;
-    let manifest = Manifest::read(&directory)?;
-    if manifest.command != "run" {
-        let cause = format!("it holds a `{}`, which is done in one go: start it again", manifest.command);
-        return Err(not_resumable(&directory, cause));
-    }
-    let (mut config, source) = configuration(&directory, &manifest)?;
+    let SavedRun { directory, manifest, mut config, source } = saved;
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
     config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
     config.optimizer.max_time = limits.max_time.or(in_force.max_time_s);
-    config.output.directory = path.to_owned();
     if let Some(result) = ended(&directory, &manifest, config.optimizer.max_evaluations) {
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(result);
     }
     observer.phase("setting up mesh and matrices");
     let mut setup = set_up(&config, &source, Purpose::Optimisation)?;
+    memory_limit::check_problem(setup.problem.memory_estimate(), &source, options.older_run)?;
+    if (options.interrupted)() {
+        return Err(Error::InterruptedRun);
+    }
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial).map_err(|error| unreached(error, &source))?;
+    let approach = setup.problem.approach(&initial, options.interrupted).map_err(|error| match error {
+        Error::Interrupted => Error::InterruptedRun,
+        other => unreached(other, &source),
+    })?;
     let setup_seconds = clock.elapsed().as_secs_f64();
     let mut session = Session {
         command: "run",
@@ -79,7 +114,16 @@ pub fn resume(
         LimitsInForce::of(&config.optimizer),
         options.threads,
     ));
+    for file in surface_files(&config.output.stl) {
+        if !session.manifest.surfaces.contains(&file) {
+            session.manifest.surfaces.push(file);
+        }
+    }
     session.announce(observer);
+    directory.make_fields()?;
+    if contents.is_none() {
+        observer.warning("there is no journal.bin: all evaluations are computed anew");
+    }
     let names: Vec<String> =
         constraint_names(&session.setup.problem).into_iter().map(str::to_owned).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -87,7 +131,11 @@ pub fn resume(
     // Before the manifest is touched: the journal holds the directory against other processes.
     let recorder = match contents {
         Some(contents) => DirectoryRecorder::reopen(&directory, contents, &names, kept)?,
-        None => DirectoryRecorder::create(&directory, identity, &names, kept)?,
+        None => {
+            directory.remove_leftovers(&[])?;
+            directory.remove(&directory.collection())?;
+            DirectoryRecorder::create(&directory, identity, &names, kept)?
+        }
     };
     session.manifest.write(&directory)?;
     session.conclude(observer, |session, observer| {
@@ -104,8 +152,14 @@ fn configuration(directory: &RunDirectory, manifest: &Manifest) -> Result<(Confi
     let path = directory.config();
     let bytes = match directory.disk().read(&path, LARGEST[0]) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let cause =
-                "it was broken off before its configuration was saved, and nothing is lost: start it again";
+            let cause = match Journal::read(directory) {
+                Ok(None) => {
+                    "it was broken off before its configuration was saved, and nothing is lost: start it again with --force"
+                }
+                _ => {
+                    "its config.toml is gone: restore it from the file that manifest.json names, and its evaluations are kept"
+                }
+            };
             return Err(not_resumable(directory, cause.to_owned()));
         }
         other => other.map_err(OutputError::io("read", &path))?,
@@ -153,13 +207,24 @@ fn journal(
     if let Err(cause) = contents.identity.check(now) {
         return Err(Error::OtherRun { path, cause });
     }
-    if contents.dropped > 0 {
-        observer.warning(&format!(
-            "`{}`: {} bytes behind evaluation {} are no whole record, as after a loss of power; they are dropped",
-            path.display(),
-            contents.dropped,
-            contents.records.len() as i64 - 1
-        ));
+    let (count, file) = (contents.records.len(), path.display());
+    let behind = match count.checked_sub(1) {
+        Some(last) => format!("behind evaluation {last}"),
+        None => "before the first evaluation".to_owned(),
+    };
+    match contents.rest {
+        Rest::Nothing => {}
+        Rest::Torn(bytes) => observer.warning(&format!(
+            "`{file}`: {bytes} bytes {behind} are no whole record, as after a loss of power; they are dropped"
+        )),
+        Rest::Damaged(bytes) => {
+            Journal::keep_damaged(directory)?;
+            observer.warning(&format!(
+                "`{file}` is damaged {behind}: what follows, {bytes} bytes, cannot be trusted and is computed again; the \
+                 file is kept as `{}`",
+                directory.damaged_journal().display()
+            ));
+        }
     }
     observer.note(&format!("going on behind {} evaluations of the journal", contents.records.len()));
     Ok(Some(contents))

@@ -118,6 +118,7 @@ pub fn smooth_points(
 
 /// Least measure of some elements of a mesh against those of a reference mesh of the same topology: the share of its
 /// shape that the worst one keeps, 1 for similar elements. 1 of no element.
+#[expect(clippy::disallowed_methods, reason = "the least of numbers has no order")]
 pub fn least_shape(mesh: &Mesh, reference: &Mesh, elements: &[ElementId]) -> f64 {
     let measure = |&e: &ElementId| Ideal::shape_of(reference.vertices(e)).measure(mesh.vertices(e));
     elements.par_iter().map(measure).reduce(|| 1.0, f64::min)

@@ -9,7 +9,7 @@ use fluxmorph_geometry::fem::{IncompleteAnalysis, LdltAnalysis, ordering};
 
 use super::SystemPattern;
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
-use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method};
+use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
 use super::two_level::{self, TwoLevelAnalysis};
 use crate::error::SolverError;
 use crate::space::Order;
@@ -111,6 +111,11 @@ impl SystemAnalysis {
     pub fn memory_estimate(&self) -> Result<usize, SolverError> {
         let matrix = self.structure.columns.len() * MATRIX_ENTRY;
         Ok(matrix + self.preconditioner_bytes(self.method)?)
+    }
+
+    /// Whether factors serve several designs.
+    pub fn reuse(&self) -> Reuse {
+        self.settings.reuse
     }
 
     /// The cheapest factor that fits, and its cost.

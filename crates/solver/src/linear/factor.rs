@@ -85,6 +85,8 @@ real_representation!(f32);
 #[derive(Debug)]
 pub(super) struct Scaled<T> {
     scale: Vec<f64>,
+    /// Brings the largest scale to between one and two: a power of two, which rounds nothing.
+    shift: f64,
     factor: Ldlt<T>,
 }
 
@@ -93,13 +95,16 @@ impl<T: Representation> Scaled<T> {
     pub(super) fn complete(analysis: &Arc<LdltAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
         let scale = scaling(matrix)?;
         let factor = Ldlt::new(analysis, |row, k| scaled_entry(matrix, &scale, row, k))?;
-        Ok(Self { scale, factor })
+        let largest = scale.iter().fold(0.0_f64, |largest, s| largest.max(*s));
+        let shift = if largest > 0.0 { (-largest.log2().floor()).exp2() } else { 1.0 };
+        Ok(Self { scale, shift, factor })
     }
 }
 
 impl<T: Representation> Precondition for Scaled<T> {
     fn apply(&self, r: &[c64], z: &mut [c64]) {
-        let factor = magnification(r);
+        // Where the matrix is far from one, so is the scale: its product with a residual must not leave single precision.
+        let factor = self.shift * magnification(r);
         let mut columns = T::columns(r, &self.scale, factor);
         self.factor.solve_in_place(&mut columns);
         T::read(&columns, &self.scale, factor, z);

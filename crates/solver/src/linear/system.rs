@@ -1,4 +1,16 @@
 //! One matrix with its preconditioner: solutions, and what is done when one does not come.
+//!
+//! What fails, and what follows:
+//!
+//! | cause | what happens |
+//! |---|---|
+//! | the right side has an entry that is not finite, or the square of its norm is out of range | an error, nothing is solved |
+//! | a diagonal entry is zero, negative or not finite; a pivot is zero, lost or not finite; no memory | the next method of the ladder |
+//! | the iteration breaks down, diverges to no number, or stops short of the residual | with an earlier factor: a factor of this matrix; with its own: the next method |
+//! | no method is left | an error with the last cause |
+//!
+//! A solution is given out only with its true residual, computed from matrix and right side in double precision: a residual
+//! that is a number has none but finite entries of the solution behind it, since every unknown has a diagonal entry.
 
 use std::sync::Arc;
 
@@ -14,6 +26,10 @@ use crate::error::SolverError;
 
 /// Iterations after which the speed of an iteration can be judged.
 const TRIAL: usize = 3;
+
+/// Norms of a right side that the iteration can work with: products of a residual, from there to far below the tolerance, with
+/// what the preconditioner makes of it are normal numbers, also where the matrix is some tens of digits from one.
+const RANGE: std::ops::RangeInclusive<f64> = 1e-130..=1e130;
 
 /// Solutions of a design of which nothing is known: state and adjoint.
 const USUAL_SOLUTIONS: usize = 2;
@@ -53,7 +69,7 @@ enum Origin {
 pub struct PreparedSystem {
     analysis: Arc<SystemAnalysis>,
     matrix: CsrMatrix<c64>,
-    /// None only while another is made: two at a time would take twice the memory.
+    /// None while another is made (two at a time would take twice the memory), and where none could be.
     preconditioner: Option<Arc<Preconditioner>>,
     origin: Origin,
     ledger: Ledger,
@@ -118,16 +134,12 @@ impl PreparedSystem {
 
     /// The method in use.
     pub fn method(&self) -> Method {
-        self.preconditioner().method
+        self.preconditioner.as_ref().map_or(self.analysis.method(), |own| own.method)
     }
 
     /// Bytes of the preconditioner.
     pub fn preconditioner_bytes(&self) -> usize {
-        self.preconditioner().bytes()
-    }
-
-    fn preconditioner(&self) -> &Preconditioner {
-        self.preconditioner.as_ref().expect("a system that failed to be refreshed is not used again")
+        self.preconditioner.as_ref().map_or(0, |own| own.bytes())
     }
 
     /// What the solver did beside solving.
@@ -153,11 +165,12 @@ impl PreparedSystem {
     ///
     /// # Errors
     /// [`SolverError::NotConverged`] when the true residual stays above the required one with every method that there is
-    /// memory for, [`SolverError::NotFinite`] for a right side with a value that is not finite.
+    /// memory for, [`SolverError::Mesh`] when none of them has a factor, [`SolverError::NotFinite`] and
+    /// [`SolverError::OutOfRange`] for a right side that cannot be solved for.
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
         let scale = norm(right_side);
-        if !scale.is_finite() {
-            return Err(SolverError::NotFinite { what: "norm of the right side", value: scale });
+        if !RANGE.contains(&scale) {
+            check_range(right_side)?;
         }
         if scale == 0.0 {
             let x = vec![c64::default(); right_side.len()];
@@ -206,6 +219,7 @@ impl PreparedSystem {
 
     /// Iterates until the tolerance, or until there is nothing more to be had.
     fn attempt(&self, right_side: &[c64], scale: f64, x: &mut [c64], iterations: &mut usize) -> Attempt {
+        let Some(preconditioner) = self.preconditioner.as_ref() else { return Attempt::Ended(f64::INFINITY) };
         let settings = &self.analysis.settings;
         let method = self.method();
         let most = settings.max_iterations.unwrap_or(10 * self.analysis.typical_iterations(method).max(30));
@@ -214,13 +228,13 @@ impl PreparedSystem {
         let (mut least, mut is_slow) = (f64::INFINITY, false);
         // The residual of the recurrence drifts from the true one: restart from the true one where they part.
         while done < most {
-            self.preconditioner().start(&self.matrix, right_side, x);
+            preconditioner.start(&self.matrix, right_side, x);
             let mut start = f64::INFINITY;
             let outcome = cocg::solve(
                 &self.matrix,
                 right_side,
                 x,
-                |r, z| self.preconditioner().apply(&self.matrix, r, z),
+                |r, z| preconditioner.apply(&self.matrix, r, z),
                 target,
                 most - done,
                 |count, now| {
@@ -305,6 +319,15 @@ impl PreparedSystem {
         }
         norm(&r)
     }
+}
+
+/// Refuses a right side that is not finite, or not zero and beyond [`RANGE`].
+fn check_range(right_side: &[c64]) -> Result<(), SolverError> {
+    if let Some(value) = right_side.iter().flat_map(|b| [b.re, b.im]).find(|b| !b.is_finite()) {
+        return Err(SolverError::NotFinite { what: "right side of the field problem", value });
+    }
+    let largest = right_side.iter().fold(0.0_f64, |largest, b| largest.max(b.re.abs()).max(b.im.abs()));
+    if largest == 0.0 { Ok(()) } else { Err(SolverError::OutOfRange { largest }) }
 }
 
 /// The preconditioner of a method, or of the first more robust one that can be made.

@@ -109,6 +109,7 @@ impl<T: Number> Incomplete<T> {
     }
 
     /// Factors once with the present diagonal factor; `false` where a pivot is bad.
+    #[expect(clippy::disallowed_methods, reason = "`and` of bools has no order")]
     fn attempt(&mut self, entry: &(impl Fn(usize, usize) -> T + Sync)) -> bool {
         let Self { analysis, scales, lower, inverse_pivots, diagonal_factor } = self;
         let rows = analysis.interior();

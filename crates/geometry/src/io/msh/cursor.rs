@@ -48,6 +48,11 @@ impl<'a> Cursor<'a> {
         self.position
     }
 
+    /// Bytes of the whole file.
+    pub(super) fn length(&self) -> usize {
+        self.bytes.len()
+    }
+
     /// Bytes that remain.
     pub(super) fn remaining(&self) -> usize {
         self.bytes.len() - self.position

@@ -32,6 +32,7 @@ pub use notices::MshNotices;
 pub use writer::{MshEncoding, msh_bytes};
 
 use crate::error::MeshError;
+use crate::io::regular::read_regular;
 use crate::mesh::Mesh;
 use scale::Scale;
 
@@ -58,12 +59,12 @@ pub fn read_msh(bytes: &[u8], metres_per_unit: f64) -> Result<MshMesh, MshError>
 /// Reads a file as [`read_msh`] does its bytes.
 ///
 /// # Errors
-/// [`MeshError::File`] when the file cannot be read, [`MeshError::Msh`] when its content is refused.
+/// [`MeshError::File`] when the file cannot be read or is no regular file, [`MeshError::Msh`] when its content is refused.
 ///
 /// # Panics
 /// If `metres_per_unit` is not positive and finite.
 pub fn read_msh_file(path: &Path, metres_per_unit: f64) -> Result<MshMesh, MeshError> {
-    let bytes = std::fs::read(path).map_err(|cause| MeshError::File { path: path.to_owned(), cause })?;
+    let bytes = read_regular(path).map_err(|cause| MeshError::File { path: path.to_owned(), cause })?;
     read_msh(&bytes, metres_per_unit)
         .map_err(|cause| MeshError::Msh { path: path.to_owned(), cause: Box::new(cause) })
 }

@@ -174,7 +174,7 @@ impl BoxOfRegion {
         let region = Self {
             size: section.length_per_axis("size", Range::POSITIVE),
             skin: section.length_per_axis("skin", Range::POSITIVE),
-            cells: section.integers("cells", 1, 10_000),
+            cells: section.integers("cells", 1, 1000),
             name: section.need("name", name, "\"plate\""),
             corners: section.need("box", corners, CORNERS),
         };

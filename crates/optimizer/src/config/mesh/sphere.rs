@@ -21,8 +21,8 @@ pub struct SphereMesh {
     pub divisions: usize,
     /// Depths of layers under the surface, or under both surfaces of a hollow sphere [m].
     pub skin: Vec<f64>,
-    /// Equal layers of the wall of a hollow sphere without skin.
-    pub wall_layers: usize,
+    /// Equal layers of the wall of a hollow sphere without skin; nothing for any other sphere, for which the key is refused.
+    pub wall_layers: Option<usize>,
     /// Thickness of the first layer outside [m]. Default: the length of the surface's cells.
     pub air_layer: Option<f64>,
     /// Ratio of neighbouring layers outside.
@@ -50,7 +50,7 @@ impl Default for SphereMesh {
             outer_radius,
             divisions,
             skin,
-            wall_layers,
+            wall_layers: inner_radius.map(|_| wall_layers),
             air_layer,
             growth,
             refinement,
@@ -67,7 +67,7 @@ impl SphereMesh {
             outer_radius: self.outer_radius,
             divisions: self.divisions,
             skin: self.skin.clone(),
-            wall_layers: self.wall_layers,
+            wall_layers: self.wall_layers.unwrap_or(SphereParameters::default().wall_layers),
             air_layer: self.air_layer,
             growth: self.growth,
             refinement: self.refinement,
@@ -88,13 +88,15 @@ impl SphereMesh {
                 "`inner_radius` and no `skin` beside it, or no `wall_layers`",
             );
         }
+        let has_plain_wall = inner_radius.is_some() && skin.is_empty();
+        let default_layers = has_plain_wall.then_some(SphereParameters::default().wall_layers);
         let sphere = Self {
             radius,
             inner_radius,
             outer_radius: length("outer_radius").unwrap_or(5.0 * radius),
             divisions: section.integer("divisions", 1, 1000).unwrap_or(default.divisions),
             skin,
-            wall_layers: wall_layers.unwrap_or(default.wall_layers),
+            wall_layers: wall_layers.or(default_layers),
             air_layer: length("air_layer"),
             growth: section.number("growth", Range::closed(1.0, 100.0)).unwrap_or(default.growth),
             refinement: section.number("refinement", Range::closed(0.25, 20.0)).unwrap_or(default.refinement),

@@ -168,6 +168,15 @@ impl Paper {
     }
 }
 
+/// The number of cases as written.
+pub(super) fn case_count(root: &Table) -> usize {
+    let Some(tree::Value::Table(morph)) = root.get("morph").map(|node| &node.value) else { return 0 };
+    match morph.get("case").map(|node| &node.value) {
+        Some(tree::Value::Array(cases)) => cases.len(),
+        _ => 0,
+    }
+}
+
 /// The trees of the cases, made one at a time: each the root with the tables of the case laid over it and without cases,
 /// with what was laid; the fault of a case that goes through something that is not a table.
 pub(super) fn case_trees(

@@ -419,3 +419,22 @@ fn odd_texts_never_panic() {
     let deep = format!("a = {}1{}", "[".repeat(5000), "]".repeat(5000));
     let _ = Config::from_str(&deep, "small.toml").map_err(|error| error.to_string());
 }
+
+#[test]
+fn a_name_that_is_too_long_is_refused_at_its_place() {
+    let long = "n".repeat(600);
+    let shown = report(&SMALL.replace("[materials.steel]", &format!("[materials.{long}]"))).to_string();
+    assert!(shown.contains("names of more than 512 bytes") && shown.contains("small.toml:7:1"), "{shown}");
+    // Region names in files of Gmsh have at most 127 bytes.
+    let allowed = SMALL.replace("steel", &"n".repeat(400));
+    assert!(Config::from_str(&allowed, "small.toml").is_ok());
+}
+
+#[test]
+fn cases_that_repeat_too_much_are_refused() {
+    let case = |n: usize| format!("[[morph.case]]\nname = \"{n}\"\n");
+    let cases: String = (0..1000).map(case).collect();
+    let text = format!("[mesh]\ngenerator = \"block\"\n[remesh]\nregion = \"block\"\n[morph]\n{cases}");
+    let shown = report(&text).to_string();
+    assert!(shown.contains("1000 cases repeat a configuration of 2006 values"), "{shown}");
+}

@@ -11,6 +11,15 @@ use crate::io::msh::shape::Shape;
 /// Element numbers leave two bits for the local face.
 const MOST_TETRAHEDRA: usize = 1 << 30;
 
+/// Longest name of a group [bytes]: that of a file on most systems.
+const LONGEST_NAME: usize = 255;
+
+/// Bytes of a file for each triangle of a physical surface: one that lies in many surfaces is kept many times.
+const BYTES_PER_TRIANGLE: usize = 8;
+
+/// Triangles of physical surfaces that any file may have.
+const ALWAYS_TRIANGLES: usize = 1000;
+
 const GROUP_TAG: &str = "the tag of a physical group, from 1";
 
 /// A tetrahedron of a physical volume.
@@ -126,6 +135,8 @@ pub(crate) fn name_problem(name: &str) -> Option<&'static str> {
         Some("is empty")
     } else if name.contains('"') {
         Some("holds a double quote")
+    } else if name.len() > LONGEST_NAME {
+        Some("is longer than 255 bytes")
     } else if name.chars().any(char::is_control) {
         Some("holds a control character")
     } else {
@@ -194,6 +205,11 @@ impl<'n> ElementList<'n> {
         next: impl Fn(&mut Cursor<'_>, &'static str) -> Result<u64, MshError>,
     ) -> Result<(), MshError> {
         let [a, b, c] = self.vertices(cursor, shape, next)?;
+        let most = ALWAYS_TRIANGLES.max(cursor.length() / BYTES_PER_TRIANGLE);
+        if self.triangles.len() + groups.len() > most {
+            let what = "triangles in physical surfaces, each counted in all of its surfaces";
+            return Err(cursor.fault(MshFault::TooLarge { what, most: most as u64 }));
+        }
         for &group in groups {
             let nodes = if group < 0 { [a, c, b] } else { [a, b, c] };
             self.triangles.push(Triangle { tag, nodes, group: group.saturating_abs() });

@@ -61,7 +61,7 @@ pub(super) fn read(bytes: &[u8], scale: Scale) -> Result<Contents<'_>, MshError>
             let fault = MshFault::Unexpected { expected: "the head of a section", found: shown(word) };
             return Err(cursor.fault_at(start, Subject::File, fault));
         };
-        cursor.subject = Subject::Section(name.to_owned().into());
+        cursor.subject = Subject::Section(shown(name.as_bytes()).into());
         cursor.end_line()?;
         let known = sections
             .read(name, version, &mut cursor, scale)
@@ -160,7 +160,7 @@ impl Sections {
 /// Goes behind the line `$EndNAME`.
 fn end_of_section(cursor: &mut Cursor<'_>, name: &str, body: Body) -> Result<(), MshError> {
     let mark = format!("$End{name}");
-    cursor.subject = Subject::Section(name.to_owned().into());
+    cursor.subject = Subject::Section(shown(name.as_bytes()).into());
     if body == Body::Skipped {
         let start = cursor.position();
         if !cursor.skip_behind(mark.as_bytes()) {

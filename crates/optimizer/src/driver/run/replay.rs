@@ -1,0 +1,98 @@
+//! What was computed before a run was broken off is told again, as long as the method asks for the same to the last bit.
+
+use std::time::Instant;
+
+use fluxmorph_remesh::Motion;
+
+use super::{BestSoFar, Field, Run};
+use crate::algorithm::Sample;
+use crate::driver::{Best, Stop};
+use crate::error::Error;
+use crate::journal::{Record, reference_hash};
+use crate::memory::Memory;
+use crate::problem::Want;
+
+/// In what an evaluation was computed: with both it comes out as it was.
+#[derive(Debug)]
+pub(super) struct Setting {
+    /// The mesh motion of its round.
+    pub(super) motion: Motion,
+    /// What the linear solvers remembered before it.
+    memory: Memory,
+}
+
+impl Run<'_> {
+    /// Whether a record is that of a design on this mesh, to the last bit.
+    pub(super) fn is_of(&self, record: &Record, p: &[f64]) -> bool {
+        let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        record.row.evaluation == self.evaluations
+            && record.row.round == self.shape().motion.round()
+            && record.design.len() == p.len()
+            && record.design.iter().zip(p).all(same)
+            && record.reference == reference_hash(self.shape().motion.reference())
+    }
+
+    /// Why a record is not the answer to what the method asks for.
+    pub(super) fn difference(&self, record: &Record, p: &[f64]) -> Error {
+        let Record { row, design, .. } = record;
+        let round = self.shape().motion.round();
+        let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
+        let cause = match differing {
+            _ if row.evaluation != self.evaluations => {
+                format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations)
+            }
+            _ if row.round != round => format!("it was in round {}, now the mesh is in {round}", row.round),
+            Some(k) => format!("variable {k} was {:e} m, now the method asks for {:e} m", design[k], p[k]),
+            None => "the reference mesh of its round is another one".to_owned(),
+        };
+        Error::Replay { evaluation: row.evaluation, cause }
+    }
+
+    /// The answer to a design that was computed before the run was broken off.
+    pub(super) fn recall(&mut self, record: Record) -> Result<Sample, Stop> {
+        let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
+        let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
+        let sample = self.sample(&initial, &record);
+        let field = Field::Recalled(Box::new(Setting {
+            motion: self.shape().motion.clone(),
+            memory: std::mem::replace(&mut self.memory, Memory::with_methods(&record.methods)),
+        }));
+        let standing = self.standing(record.row.objective, &sample);
+        if standing.is_improved() != record.improved
+            || self.iterations_after(standing) != record.row.iteration
+        {
+            let (evaluation, cause) = (record.row.evaluation, "its standing among the others is another one");
+            return Err(Stop::Error(Box::new(Error::Replay { evaluation, cause: cause.to_owned() })));
+        }
+        // The time of a resumed run begins where it has something to compute.
+        self.clock = Instant::now();
+        self.observer.evaluation(&record.row);
+        self.keep(record, sample.clone(), standing, field);
+        Ok(sample)
+    }
+
+    /// Whether there are evaluations of before that are still to be told.
+    pub(super) fn is_recalling(&mut self) -> bool {
+        if self.next.is_none() {
+            self.next = self.recorder.recall();
+        }
+        self.next.is_some()
+    }
+
+    /// The best design with its field: one that was recalled is computed in its own round, and comes out as it was.
+    pub(super) fn analysed(&mut self, best: BestSoFar) -> Result<Best, Error> {
+        let BestSoFar { evaluation, values, objective, violation, field, .. } = best;
+        let analysis = match field {
+            Field::Computed(analysis) => *analysis,
+            Field::Recalled(setting) => {
+                self.observer.phase("computing the field of the best design");
+                let Setting { motion, mut memory } = *setting;
+                let own = std::mem::replace(&mut self.shape_mut().motion, motion);
+                let analysis = self.problem.evaluate_with(&mut memory, &values, Want::Gradient);
+                self.shape_mut().motion = own;
+                analysis?
+            }
+        };
+        Ok(Best { evaluation, values, objective, violation, analysis })
+    }
+}

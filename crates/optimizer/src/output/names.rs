@@ -1,0 +1,110 @@
+//! Names: of the files of a run that depend on a number or on a surface, and of the run directory for a shell.
+
+use std::path::Path;
+
+/// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
+const LONGEST_NAME: usize = 50;
+
+/// Names of the STL files of surfaces, in their order: letters, digits, `-` and `_` stay, all else becomes `_`.
+///
+/// Names that come out equal, in small letters or capitals, are numbered: some file systems see no difference.
+pub fn surface_files(surfaces: &[String]) -> Vec<String> {
+    let mut taken = std::collections::BTreeSet::new();
+    let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+    let mut file = |surface: &String| {
+        let stem: String = surface.chars().take(LONGEST_NAME).map(safe).collect();
+        let numbered = (2..).map(|n| format!("{stem}_{n}"));
+        let free =
+            std::iter::once(stem.clone()).chain(numbered).find(|name| taken.insert(name.to_lowercase()));
+        format!("optimum_{}.stl", free.unwrap_or(stem))
+    };
+    surfaces.iter().map(&mut file).collect()
+}
+
+/// Whether a name is one of [`surface_files`].
+pub(super) fn is_surface(name: &str) -> bool {
+    name.strip_prefix("optimum_")
+        .and_then(|rest| rest.strip_suffix(".stl"))
+        .is_some_and(|stem| stem.chars().all(|c| c.is_alphanumeric() || c == '-' || c == '_'))
+}
+
+pub(super) fn morph_name(case: Option<usize>, what: &str) -> String {
+    match case {
+        None => format!("{what}.vtu"),
+        Some(case) => format!("case_{:02}_{what}.vtu", case + 1),
+    }
+}
+
+/// Whether a name is one that [`morph_name`] gives a case.
+pub(super) fn is_case(name: &str) -> bool {
+    let number = |end| name.strip_prefix("case_").and_then(|rest| rest.strip_suffix(end));
+    ["_before.vtu", "_after.vtu"]
+        .into_iter()
+        .filter_map(number)
+        .any(|digits| digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+pub(super) fn field_name(evaluation: usize) -> String {
+    format!("eval_{evaluation:04}.vtu")
+}
+
+/// The evaluation of a field file.
+pub(super) fn field_number(name: &str) -> Option<usize> {
+    let digits = name.strip_prefix("eval_")?.strip_suffix(".vtu")?;
+    let is_ours = digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit());
+    digits.parse().ok().filter(|_| is_ours)
+}
+
+/// The command that goes on with a run, as a shell takes it.
+pub fn resume_command(directory: &Path) -> String {
+    // A name that begins with a dash would be taken for an option.
+    let path = match directory.display().to_string() {
+        path if path.starts_with('-') => format!("./{path}"),
+        path if path.is_empty() => ".".to_owned(),
+        path => path,
+    };
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
+    if path.chars().all(is_plain) {
+        format!("fluxmorph resume {path}")
+    } else {
+        format!("fluxmorph resume '{}'", path.replace('\'', "'\\''"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_surfaces_have_safe_names_of_their_own() {
+        let names =
+            ["plate|air", "plate/air", "Top side", "top_SIDE", "../x", "Fläche", ""].map(str::to_owned);
+        let files = surface_files(&names);
+        let expected = [
+            "optimum_plate_air.stl",
+            "optimum_plate_air_2.stl",
+            "optimum_Top_side.stl",
+            "optimum_top_SIDE_2.stl",
+            "optimum____x.stl",
+            "optimum_Fläche.stl",
+            "optimum_.stl",
+        ];
+        assert_eq!(files, expected);
+        assert!(files.iter().all(|file| is_surface(file)));
+        assert!(surface_files(&["ä".repeat(500)])[0].len() < 255);
+    }
+
+    #[test]
+    fn the_command_to_go_on_is_one_that_a_shell_takes() {
+        for (path, expected) in [
+            ("runs/shield", "fluxmorph resume runs/shield"),
+            ("/a b/it's", r"fluxmorph resume '/a b/it'\''s'"),
+            ("two\nlines", "fluxmorph resume 'two\nlines'"),
+            ("$(rm)", "fluxmorph resume '$(rm)'"),
+            ("-out", "fluxmorph resume ./-out"),
+            ("", "fluxmorph resume ."),
+        ] {
+            assert_eq!(resume_command(Path::new(path)), expected);
+        }
+    }
+}

@@ -1,0 +1,1 @@
+../../../crates/optimizer/src/bobyqa.rs

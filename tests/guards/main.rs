@@ -1,0 +1,131 @@
+//! Numerical failures as a user meets them: the real binary, its exit code, its message, and what it leaves behind.
+
+#[allow(dead_code, reason = "the acceptance tests use all of it")]
+#[path = "../acceptance/program.rs"]
+mod program;
+#[path = "../support/mod.rs"]
+mod support;
+
+use std::path::Path;
+
+use fluxmorph_geometry::fem::{c64, norm};
+use program::{files_below, folder, on_quick, read_json};
+use serde_json::Value;
+
+/// Norm beyond which the right side of a linear system is refused.
+const LARGEST_NORM: f64 = 1e130;
+
+/// A weight of the objective at which the adjoint of the initial design can be solved for, and no longer once the
+/// objective has grown by a factor.
+fn weight(growth: f64) -> f64 {
+    let problem = support::setup("shield_quick.toml", &[]).problem;
+    let shape = problem.shape.as_ref().expect("a shape");
+    let mesh = problem.moved(&shape.initial).expect("the initial design has a mesh").mesh;
+    let model = &problem.states[0];
+    let state = model.solve(&mesh).expect("a sound case").0;
+    let functional = &problem.objective.as_ref().expect("an objective").terms[0].functional;
+    let derivative = functional.evaluate(model, &mesh, &state).expect("a sound case").derivative;
+    LARGEST_NORM / (norm::<c64>(&derivative) * growth.sqrt())
+}
+
+fn with_weight(growth: f64) -> [String; 6] {
+    let weight = format!("objective.weight={:e}", weight(growth));
+    ["--set".to_owned(), weight, "--set".to_owned(), "objective.goal=maximise".to_owned()]
+        .into_iter()
+        .chain(["--max-evaluations".to_owned(), "40".to_owned()])
+        .collect::<Vec<_>>()
+        .try_into()
+        .expect("six arguments")
+}
+
+/// Keys whose value may be missing: everything else in a published file is a number, a text, a list or a table of these.
+const MAY_BE_NULL: [&str; 10] = [
+    "verified_ratio",
+    "region",
+    "frequency",
+    "frequency_hz",
+    "admitted",
+    "min_thickness_m",
+    "max_thickness_m",
+    "step_to_inversion",
+    "inversion_element",
+    "inversion_region",
+];
+
+/// No `null` where a number belongs, which is how JSON would write NaN.
+fn no_null(value: &Value, key: &str) {
+    match value {
+        Value::Null => assert!(MAY_BE_NULL.contains(&key), "`{key}` is null"),
+        Value::Array(items) => items.iter().for_each(|item| no_null(item, key)),
+        Value::Object(map) => map.iter().for_each(|(key, value)| no_null(value, key)),
+        _ => {}
+    }
+}
+
+/// Everything that a run directory publishes is of numbers.
+fn holds_numbers_alone(out: &Path) {
+    for file in files_below(out) {
+        let path = out.join(&file);
+        if file == "result.json" {
+            no_null(&read_json(&path), "");
+        } else if file.ends_with(".jsonl") {
+            for line in std::fs::read_to_string(&path).expect("text").lines() {
+                no_null(&serde_json::from_str(line).expect("JSON"), "");
+            }
+        } else if file.ends_with(".csv") {
+            let text = std::fs::read_to_string(&path).expect("text").to_lowercase();
+            assert!(!text.contains("nan") && !text.contains("inf,") && !text.contains(",inf"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn a_run_that_overflows_after_some_evaluations_exits_with_4_and_saves_its_best_design() {
+    let folder = folder();
+    let out = folder.path().join("run");
+    let arguments = with_weight(1.1);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    on_quick("run", &out, &arguments).exits_with(4).says(&[
+        "the adjoint of the objective at 60 Hz",
+        "leave the range of numbers",
+        "weights",
+    ]);
+    assert_eq!(read_json(&out.join("manifest.json"))["status"], "failed");
+    let result = read_json(&out.join("result.json"));
+    assert_eq!(result["stop_reason"], "numerical_failure");
+    assert!(result["evaluations"].as_u64() >= Some(1), "{result}");
+    assert!(out.join("optimum.msh").exists(), "{:?}", files_below(&out));
+    holds_numbers_alone(&out);
+}
+
+#[test]
+fn a_run_whose_first_evaluation_fails_exits_with_4_and_publishes_no_result() {
+    let folder = folder();
+    let out = folder.path().join("run");
+    on_quick("run", &out, &["--set", "objective.weight=1e200"])
+        .exits_with(4)
+        .says(&["error: the adjoint of the objective at 60 Hz", "weights"]);
+    assert_eq!(read_json(&out.join("manifest.json"))["status"], "failed");
+    assert!(!out.join("result.json").exists());
+    holds_numbers_alone(&out);
+}
+
+#[test]
+fn an_analysis_that_fails_exits_with_4_and_publishes_no_result() {
+    let folder = folder();
+    let out = folder.path().join("solve");
+    on_quick("solve", &out, &["--set", "objective.weight=1e200"])
+        .exits_with(4)
+        .says(&["the adjoint of the objective"]);
+    assert_eq!(read_json(&out.join("manifest.json"))["status"], "failed");
+    assert!(!out.join("result.json").exists());
+}
+
+#[test]
+fn a_certificate_that_cannot_be_computed_exits_with_4() {
+    let folder = folder();
+    let out = folder.path().join("unused");
+    on_quick("gradient", &out, &["--set", "objective.weight=1e200"])
+        .exits_with(4)
+        .says(&["the adjoint of the objective at 60 Hz"]);
+}
