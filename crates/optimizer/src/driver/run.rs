@@ -236,7 +236,7 @@ impl<'a> Run<'a> {
         }
         self.recorder.record(&record, &analysis, self.problem)?;
         self.observer.evaluation(&record.row);
-        self.keep(record, sample.clone(), standing, Field::Computed(Box::new(analysis)));
+        self.keep(record, sample.clone(), standing, |_| Field::Computed(Box::new(analysis)));
         Ok(sample)
     }
 
@@ -380,8 +380,14 @@ impl<'a> Run<'a> {
         reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
     }
 
-    /// Counts an evaluation, and remembers the best.
-    fn keep(&mut self, record: Record, sample: Sample, standing: Standing, field: Field) {
+    /// Counts an evaluation, and remembers the best with its `field`, which is asked for only then.
+    fn keep(
+        &mut self,
+        record: Record,
+        sample: Sample,
+        standing: Standing,
+        field: impl FnOnce(&Self) -> Field,
+    ) {
         self.iterations = self.iterations_after(standing);
         self.evaluations += 1;
         self.worst_residual = self.worst_residual.max(record.worst_residual);
@@ -389,6 +395,7 @@ impl<'a> Run<'a> {
         self.best_is_stale = false;
         self.last.clone_from(&record.design);
         if standing.is_improved() {
+            let field = field(self);
             self.best = Some(BestSoFar {
                 evaluation: record.row.evaluation,
                 values: record.design,

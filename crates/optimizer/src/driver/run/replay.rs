@@ -53,10 +53,7 @@ impl Run<'_> {
         let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
         let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
         let sample = self.sample(&initial, &record);
-        let field = Field::Recalled(Box::new(Setting {
-            motion: self.shape().motion.clone(),
-            memory: std::mem::replace(&mut self.memory, Memory::with_methods(&record.methods)),
-        }));
+        let memory = std::mem::replace(&mut self.memory, Memory::with_methods(&record.methods));
         let standing = self.standing(record.row.objective, &sample);
         if standing.is_improved() != record.improved
             || self.iterations_after(standing) != record.row.iteration
@@ -67,6 +64,8 @@ impl Run<'_> {
         // The time of a resumed run begins where it has something to compute.
         self.clock = Instant::now();
         self.observer.evaluation(&record.row);
+        let field =
+            |run: &Self| Field::Recalled(Box::new(Setting { motion: run.shape().motion.clone(), memory }));
         self.keep(record, sample.clone(), standing, field);
         Ok(sample)
     }
