@@ -44,6 +44,10 @@ determinism:
 test-pyvista:
     cargo test --release --test acceptance -- --ignored --nocapture pyvista
 
+# Writes schema/fluxmorph.schema.json and the tables of docs/configuration.md, both from the types of the configuration
+generate:
+    cargo test --release --test schema -- --ignored write_the_files
+
 # The documentation of the code, warnings are errors
 doc:
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
@@ -60,6 +64,11 @@ bench-kernels:
 demo:
     cargo run --release -- run configs/shield_quick.toml --force || test $? -eq 1
 
+# The picture of a run on a terminal, docs/images/terminal.svg; needs python3
+screenshot-terminal:
+    cargo build --release
+    tools/terminal.py --svg docs/images/terminal.svg --at "3/5 [" -- target/release/fluxmorph run configs/shield_quick.toml --force || test $? -eq 1
+
 # Fuzz one reader (msh22, msh41_ascii, msh41_binary, config, quantity, journal); needs `cargo install cargo-fuzz`
 fuzz TARGET SECONDS="60":
     fuzz/run {{ TARGET }} {{ SECONDS }}
@@ -71,6 +80,22 @@ fuzz-all SECONDS="60":
 # The boundary to NLopt with address and undefined-behaviour sanitizers, C included; needs clang
 sanitize:
     fuzz/sanitize
+
+# Writes docs/commands.md from what the program says about its commands
+commands:
+    cargo test --release --test book -- --ignored --nocapture write_the_commands
+
+# Runs every command block of README.md and docs/, the long ones too
+book:
+    cargo test --release --test book -- --include-ignored --nocapture --skip write_the_commands
+
+# The release archive with checksum, licences and SBOM in target/dist; tries it out
+dist:
+    python3 tools/dist.py
+
+# Licences, advisories and versions of all dependencies; needs `cargo install cargo-deny --locked`
+deny:
+    cargo deny --locked check
 
 # What must be green before a change is taken
 ci:

@@ -7,6 +7,7 @@ mod determinism;
 mod folders;
 mod fresh_mesh;
 mod interruption;
+mod memory;
 mod mesh_files;
 mod morph;
 mod program;

@@ -6,7 +6,7 @@ use fluxmorph_geometry::MeshError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
-use crate::cli::ExitCode;
+use crate::cli::{ExitCode, InitError};
 use crate::config::ConfigError;
 use crate::design::Apart;
 use crate::geometric::GeometricError;
@@ -59,6 +59,9 @@ pub enum Error {
     /// A file cannot be written or read.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A starting configuration cannot be written.
+    #[error(transparent)]
+    Init(#[from] InitError),
     /// The optimisation method refuses or fails.
     #[error("the optimisation failed: {cause}")]
     Optimisation {
@@ -166,7 +169,7 @@ impl Error {
             Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
                 ExitCode::Files
             }
-            Self::Output(_) | Self::Replay { .. } => ExitCode::Files,
+            Self::Output(_) | Self::Replay { .. } | Self::Init(InitError::Exists { .. }) => ExitCode::Files,
             // Of a motion; a file's or a generator's is a wrong mesh.
             Self::Remesh(RemeshError::Mesh(MeshError::NotFinite { .. } | MeshError::Inverted { .. })) => {
                 ExitCode::Numerical
@@ -199,7 +202,7 @@ impl Error {
             | Self::Remesh(_)
             | Self::Geometric(_)
             | Self::Design(_) => ExitCode::Configuration,
-            Self::Threads { .. } => ExitCode::Usage,
+            Self::Threads { .. } | Self::Init(_) => ExitCode::Usage,
             Self::Interrupted | Self::InterruptedRun => ExitCode::Interrupted,
         }
     }

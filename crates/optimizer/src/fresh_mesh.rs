@@ -14,6 +14,7 @@ use crate::config::{Config, MeshConfig, Source};
 use crate::design::Triangulation;
 use crate::error::Error;
 use crate::memory::Memory;
+use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{ObjectiveResult, StopReason, Verification};
 use crate::problem::{Problem, Want};
@@ -97,6 +98,8 @@ pub struct Gain<'a> {
     pub stop_reason: StopReason,
     /// Its initial and its best shape.
     pub shapes: &'a Shapes,
+    /// Bytes that the check needs, about.
+    pub memory: usize,
 }
 
 impl Gain<'_> {
@@ -118,6 +121,11 @@ impl Gain<'_> {
             return Check::Finished;
         }
         let refined = self.config.mesh.refined(factor);
+        if let (Some(_), Some(shortage)) = (&refined, memory_limit::shortage(self.memory)) {
+            observer
+                .notice(&format!("the best shape is not checked on a fresh mesh, which takes {shortage}"));
+            return Check::Finished;
+        }
         let cut_short = matches!(self.stop_reason, StopReason::Interrupted | StopReason::MaxTime);
         let outcome = match refined {
             _ if cut_short || interrupted() => Ok(None),
@@ -282,7 +290,11 @@ mod tests {
             terms: Vec::new(),
         };
         let mut told = Told::default();
-        Gain { config, source, stop_reason, shapes }.verify(&mut objective, &|| interrupted, &mut told);
+        Gain { config, source, stop_reason, shapes, memory: 0 }.verify(
+            &mut objective,
+            &|| interrupted,
+            &mut told,
+        );
         (objective, told)
     }
 

@@ -17,6 +17,7 @@ pub mod fresh_mesh;
 pub mod geometric;
 pub mod journal;
 pub mod memory;
+pub mod memory_estimate;
 mod memory_limit;
 pub mod morph;
 pub mod objective;
@@ -24,8 +25,10 @@ pub mod observer;
 pub mod output;
 pub mod problem;
 pub mod rounds;
+pub mod schema;
 pub mod session;
 pub mod setup;
+pub mod stage;
 pub mod thickness;
 pub mod verify;
 

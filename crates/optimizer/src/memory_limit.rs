@@ -71,6 +71,15 @@ pub(crate) fn check_problem(estimate: usize, source: &Source, older: OlderRun) -
     }
 }
 
+/// Why so many bytes cannot be held; `None` where they can, or nothing is known.
+pub(crate) fn shortage(needed: usize) -> Option<String> {
+    room().filter(|room| needed as u64 > room.bytes).map(|room| beyond(room, needed as u64))
+}
+
+fn beyond(room: Room, needed: u64) -> String {
+    format!("about {} of memory, and there are {} ({})", mebibytes(needed), mebibytes(room.bytes), room.by)
+}
+
 fn refuse_beyond(
     room: Room,
     source: &Source,
@@ -80,12 +89,7 @@ fn refuse_beyond(
     if needed <= room.bytes {
         return Ok(());
     }
-    let message = format!(
-        "{what} needs about {} of memory, and there are {} ({})",
-        mebibytes(needed),
-        mebibytes(room.bytes),
-        room.by
-    );
+    let message = format!("{what} needs {}", beyond(room, needed));
     let fault = source
         .fault(key, message)
         .expected("a mesh that fits into memory")

@@ -13,7 +13,7 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
-use fluxmorph_solver::linear::{PreparedSystem, Reuse, SolverEvent};
+use fluxmorph_solver::linear::{PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, adjoint};
 
 use crate::constraint::{Bound, Constraint, Limit, Quantity};
@@ -22,13 +22,8 @@ use crate::error::Error;
 use crate::finite;
 use crate::memory::Memory;
 use crate::objective::{Term, WeightedSum};
+use crate::stage::{Lap, Stage, Told};
 use crate::thickness::Thickness;
-
-/// Connectivity, its places in the patterns, element derivatives and output arrays, per element.
-const BYTES_PER_ELEMENT: usize = 600;
-
-/// Coordinates, vectors of unknowns and output arrays, per node.
-const BYTES_PER_NODE: usize = 1000;
 
 /// What moves, how the mesh follows, and within which bounds.
 #[derive(Debug)]
@@ -167,24 +162,6 @@ impl Problem {
         self.shape.as_ref().map_or(&[], |shape| shape.motion.moving())
     }
 
-    /// Bytes that an evaluation needs, about: matrices, factors, and the arrays over nodes and elements.
-    pub fn memory_estimate(&self) -> usize {
-        let elements = self.original.topology().tets().len();
-        let nodes = self.original.points().len();
-        // Factors that serve the next design are held all at once, the others one after the other.
-        let (mut held, mut largest) = (0, 0);
-        for solver in self.states.iter().map(FieldModel::linear_solver) {
-            let bytes = solver.memory_estimate().unwrap_or_default();
-            match solver.reuse() {
-                Reuse::WhileItPays => held += bytes,
-                Reuse::Never => largest = bytes.max(largest),
-            }
-        }
-        let systems = held + largest;
-        let elastic = self.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
-        systems + elastic + elements * BYTES_PER_ELEMENT + nodes * BYTES_PER_NODE
-    }
-
     /// Quality of the elements that may move, or of all where nothing moves.
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
         match &self.shape {
@@ -234,8 +211,23 @@ impl Problem {
         moved: Moved,
         want: Want,
     ) -> Result<Analysis, Error> {
+        self.analyse_watched(memory, p, moved, want, &mut |_| ())
+    }
+
+    /// As [`Problem::analyse_with`]; `told` hears of every stage as it begins.
+    ///
+    /// # Errors
+    /// As [`Problem::analyse_with`].
+    pub fn analyse_watched(
+        &self,
+        memory: &mut Memory,
+        p: &[f64],
+        moved: Moved,
+        want: Want,
+        told: Told<'_>,
+    ) -> Result<Analysis, Error> {
         let Moved { mesh, displacement, inversion } = moved;
-        let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default() };
+        let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default(), told };
         let mut events = Vec::new();
         let shape = self.shape.as_ref().filter(|_| want == Want::Gradient);
         let mut solutions = Vec::with_capacity(self.states.len());
@@ -247,11 +239,14 @@ impl Problem {
             fields.iter().map(|_| Gathered::new(1, mesh.points().len())).collect();
         for (index, model) in self.states.iter().enumerate() {
             let mut clock = Lap::start();
+            (work.told)(Stage::Assembling);
             let (matrix, load) = (model.assemble(&mesh), model.load(&mesh));
             work.timings.assembly += clock.lap();
             let named = || finite::of_field("the state", model);
+            (work.told)(Stage::Factoring);
             let mut system = model.prepare_with(matrix, memory.of_state(index)).map_err(named())?;
             work.timings.factor += clock.lap();
+            (work.told)(Stage::State);
             let state = model.solve_prepared(&mut system, &load).map_err(named())?;
             finite::state(model, &mesh, &state)?;
             work.report.include(&state);
@@ -385,6 +380,7 @@ struct Work<'a> {
     mesh: &'a Mesh,
     timings: Timings,
     report: Worst,
+    told: Told<'a>,
 }
 
 /// One state with its factor.
@@ -437,9 +433,11 @@ impl Gathered {
         work.timings.gradient += clock.lap();
         let (Some(right_side), Some(shape)) = (right_side, shape) else { return Ok(()) };
         let named = finite::of_field(&format!("the adjoint of {owner}"), model);
+        (work.told)(Stage::Adjoint);
         let lambda = adjoint::solve(system, &right_side).map_err(named)?;
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
+        (work.told)(Stage::Differentiating);
         let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving());
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
@@ -483,21 +481,5 @@ impl Worst {
         let report = solution.report();
         self.iterations += report.iterations;
         self.residual = self.residual.max(report.residual);
-    }
-}
-
-/// A stop watch with intermediate times.
-struct Lap(Instant);
-
-impl Lap {
-    fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Seconds since the start or the last lap.
-    fn lap(&mut self) -> f64 {
-        let seconds = self.0.elapsed().as_secs_f64();
-        self.0 = Instant::now();
-        seconds
     }
 }

@@ -2,18 +2,22 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use super::exit;
+use super::template::Template;
+use super::{examples, exit};
 use crate::config::{Config, Dimension, OutputNamedBy, Source, parse_quantity};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::output::OlderRun;
 
-/// Finds the shape of an electromagnetic device from a TOML file.
+/// Finds the shape of an electromagnetic device from a TOML file
+///
+/// A coil, a plate, a pole face: the configuration says what may move, within which bounds, and what is to become small or
+/// large. The mesh keeps its topology; it is moved, with the exact gradient of the field's objective.
 #[derive(Debug, Parser)]
-#[command(name = "fluxmorph", version, after_help = exit::HELP, subcommand_required = true)]
-#[command(arg_required_else_help = true)]
+#[command(name = "fluxmorph", version, subcommand_required = true, arg_required_else_help = true)]
+#[command(after_help = examples::FLUXMORPH, after_long_help = overview())]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -24,17 +28,74 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Optimise, and write everything into the run directory
+    #[command(after_help = examples::RUN)]
     Run(RunArgs),
     /// Go on with a run that was interrupted or broken off, as if it had not been
+    #[command(after_help = examples::RESUME)]
     Resume(ResumeArgs),
     /// One field analysis of the initial design, or of a given one
+    #[command(after_help = examples::SOLVE)]
     Solve(SolveArgs),
     /// Move the mesh as [morph] prescribes, without a field; print the quality before and after
+    #[command(after_help = examples::MORPH)]
     Morph(MorphArgs),
     /// Read the configuration and build the mesh, without solving; print what they are
+    #[command(after_help = examples::CHECK)]
     Check(CheckArgs),
     /// Gradient certificate: Taylor remainders and central differences in random directions
+    #[command(after_help = examples::GRADIENT)]
     Gradient(GradientArgs),
+    /// Write one HTML page about a run, to read and to send
+    #[command(after_help = examples::REPORT)]
+    Report(ReportArgs),
+    /// Write a commented starting configuration
+    #[command(after_help = examples::INIT)]
+    Init(InitArgs),
+    /// Print the schema of the configuration, the man page or shell completions
+    #[command(after_help = examples::GENERATE)]
+    Generate(GenerateArgs),
+}
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Progress {
+    /// A bar on a terminal, plain lines elsewhere
+    #[default]
+    Auto,
+    /// A bar; plain lines where standard error is no terminal that can show one
+    Bar,
+    /// One line for each evaluation
+    Plain,
+    /// Errors and warnings only, as with --quiet
+    None,
+}
+
+/// Options of every command that computes.
+#[derive(Debug, Args)]
+pub struct WorkArgs {
+    /// Threads to use [default: all]; the results do not depend on it
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+
+    /// How progress is shown on standard error
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t = Progress::Auto)]
+    pub progress: Progress,
+
+    /// Show errors and warnings only
+    #[arg(long, short)]
+    pub quiet: bool,
+
+    /// Print the result as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+
+    /// Let the files that the configuration names lie outside of its folder
+    #[arg(long)]
+    pub allow_outside: bool,
+
+    /// Replace an earlier run in the output directory; go on where the memory seems too small
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of every command that reads a configuration.
@@ -48,29 +109,27 @@ pub struct CommonArgs {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
-    /// Threads to use [default: all]; the results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads)]
-    pub threads: Option<usize>,
-
-    /// Show errors and warnings only
-    #[arg(long, short)]
-    pub quiet: bool,
-
-    /// Print the result as JSON on standard output
-    #[arg(long)]
-    pub json: bool,
-
-    /// Replace an earlier run in the output directory; go on where the memory seems too small
-    #[arg(long)]
-    pub force: bool,
-
-    /// Let mesh.file and output.directory lead out of the folder of the configuration
-    #[arg(long)]
-    pub allow_outside: bool,
-
-    /// Set a key of the configuration, such as analysis.frequency="50 Hz" or coils[0].width="30 mm"; repeatable
+    /// Set a key of the configuration; repeatable
+    ///
+    /// Such as analysis.frequency="50 Hz" or coils[0].width="30 mm". The value is TOML or, when it is not, a text.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub overrides: Vec<String>,
+
+    /// What it has in common with `resume`.
+    #[command(flatten)]
+    pub work: WorkArgs,
+}
+
+/// Limits of an optimisation.
+#[derive(Debug, Args)]
+pub struct LimitArgs {
+    /// Most evaluations of the objective; `resume` counts those of before
+    #[arg(long, value_name = "N", value_parser = evaluations)]
+    pub max_evaluations: Option<usize>,
+
+    /// Longest time from now, such as "10 min" or 90 (seconds)
+    #[arg(long, value_name = "DURATION", value_parser = duration)]
+    pub max_time: Option<f64>,
 }
 
 /// Options of `run`.
@@ -80,13 +139,9 @@ pub struct RunArgs {
     #[command(flatten)]
     pub common: CommonArgs,
 
-    /// Most evaluations of the objective
-    #[arg(long, value_name = "N", value_parser = evaluations)]
-    pub max_evaluations: Option<usize>,
-
-    /// Longest time, such as "10 min" or 90 (seconds)
-    #[arg(long, value_name = "DURATION", value_parser = duration)]
-    pub max_time: Option<f64>,
+    /// The limits.
+    #[command(flatten)]
+    pub limits: LimitArgs,
 }
 
 /// Options of `resume`.
@@ -96,33 +151,13 @@ pub struct ResumeArgs {
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
 
-    /// Most evaluations of the objective, those of before counted in [default: as the run was started]
-    #[arg(long, value_name = "N", value_parser = evaluations)]
-    pub max_evaluations: Option<usize>,
+    /// The limits; those in force when the run was started or last resumed hold where none is given.
+    #[command(flatten)]
+    pub limits: LimitArgs,
 
-    /// Longest time from now, such as "10 min" or 90 (seconds) [default: as the run was started]
-    #[arg(long, value_name = "DURATION", value_parser = duration)]
-    pub max_time: Option<f64>,
-
-    /// Threads to use [default: all]; the results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads)]
-    pub threads: Option<usize>,
-
-    /// Show errors and warnings only
-    #[arg(long, short)]
-    pub quiet: bool,
-
-    /// Print the result as JSON on standard output
-    #[arg(long)]
-    pub json: bool,
-
-    /// Let mesh.file lead out of the folder of the configuration
-    #[arg(long)]
-    pub allow_outside: bool,
-
-    /// Go on where the memory seems too small
-    #[arg(long)]
-    pub force: bool,
+    /// What it has in common with `run`.
+    #[command(flatten)]
+    pub work: WorkArgs,
 }
 
 /// Options of `solve`.
@@ -169,6 +204,79 @@ pub struct GradientArgs {
     pub design: Option<PathBuf>,
 }
 
+/// Options of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The run directory
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+
+    /// File to write [default: report.html in the run directory]
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+
+    /// Show errors and warnings only
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Options of `init`.
+#[derive(Debug, Args)]
+pub struct InitArgs {
+    /// Name of the configuration, with or without `.toml`, in a folder or not [default: that of the template]
+    #[arg(value_name = "NAME")]
+    pub name: Option<PathBuf>,
+
+    /// What to start from [default: the template that is called NAME, or shield]
+    #[arg(long, value_name = "TEMPLATE", value_enum)]
+    pub template: Option<Template>,
+
+    /// Folder to write into; made if it is not there
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+
+    /// Replace files that are there
+    #[arg(long)]
+    pub force: bool,
+
+    /// Show errors and warnings only
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Options of `generate`.
+#[derive(Debug, Args)]
+pub struct GenerateArgs {
+    /// What to print.
+    #[command(subcommand)]
+    pub what: Generated,
+}
+
+/// What `generate` prints.
+#[derive(Debug, Subcommand)]
+pub enum Generated {
+    /// The JSON schema of the configuration
+    Schema,
+    /// The man pages: all in one on standard output, or one for each command into a folder
+    #[command(after_help = examples::MAN)]
+    Man {
+        /// Folder to write one page for each command into; made if it is not there
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+    /// Completions for a shell
+    #[command(after_help = examples::COMPLETIONS)]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// The end of the long help: examples and exit codes.
+fn overview() -> String {
+    format!("{}\n\n{}", examples::FLUXMORPH, exit::HELP)
+}
+
 impl CommonArgs {
     /// The configuration with `--set` and `--out` applied. A relative `--out` is relative to the working directory.
     ///
@@ -176,11 +284,11 @@ impl CommonArgs {
     /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
     pub fn load(&self) -> Result<(Config, Source), Error> {
         let (mut config, source) = Config::from_file(&self.config, &self.overrides)?;
-        if !self.allow_outside {
+        if !self.work.allow_outside {
             let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
             source.confined(by)?;
         }
-        if !self.force {
+        if !self.work.force {
             memory_limit::check_mesh(&config, &source)?;
         }
         if let Some(out) = &self.out {
@@ -191,7 +299,19 @@ impl CommonArgs {
 
     /// What `--force` says about an earlier run.
     pub fn older_run(&self) -> OlderRun {
+        self.work.older_run()
+    }
+}
+
+impl WorkArgs {
+    /// What `--force` says about an earlier run.
+    pub fn older_run(&self) -> OlderRun {
         if self.force { OlderRun::Replace } else { OlderRun::Keep }
+    }
+
+    /// How progress is shown; `--quiet` wins.
+    pub fn progress(&self) -> Progress {
+        if self.quiet { Progress::None } else { self.progress }
     }
 }
 
@@ -202,10 +322,10 @@ impl RunArgs {
     /// When the configuration cannot be read or is wrong.
     pub fn load(&self) -> Result<(Config, Source), Error> {
         let (mut config, source) = self.common.load()?;
-        if let Some(evaluations) = self.max_evaluations {
+        if let Some(evaluations) = self.limits.max_evaluations {
             config.optimizer.max_evaluations = evaluations;
         }
-        if let Some(seconds) = self.max_time {
+        if let Some(seconds) = self.limits.max_time {
             config.optimizer.max_time = Some(seconds);
         }
         Ok((config, source))
@@ -256,13 +376,15 @@ mod tests {
     #[test]
     fn options_are_read() {
         let line = "fluxmorph run a.toml --out o --threads 2 -q --json --force --set a.b=1 --set c=d \
-                    --max-evaluations 5 --max-time 90";
+                    --max-evaluations 5 --max-time 90 --progress bar";
         let cli = Cli::try_parse_from(line.split_whitespace()).expect("a good command line");
         let Command::Run(run) = cli.command else { panic!("run") };
-        assert_eq!((run.max_evaluations, run.max_time), (Some(5), Some(90.0)));
+        assert_eq!((run.limits.max_evaluations, run.limits.max_time), (Some(5), Some(90.0)));
         assert_eq!(run.common.overrides, ["a.b=1", "c=d"]);
-        assert_eq!(run.common.threads, Some(2));
+        assert_eq!(run.common.work.threads, Some(2));
         assert_eq!(run.common.older_run(), OlderRun::Replace);
+        // Whoever wants quiet has it.
+        assert_eq!((run.common.work.progress, run.common.work.progress()), (Progress::Bar, Progress::None));
         assert_eq!(duration("10 min"), Ok(600.0));
     }
 
@@ -283,6 +405,11 @@ mod tests {
             "fluxmorph run a.toml --set =5",
             "fluxmorph check a.toml --max-time 5",
             "fluxmorph run a.toml --quiet=maybe",
+            "fluxmorph run a.toml --progress",
+            "fluxmorph run a.toml --progress often",
+            "fluxmorph resume runs/a --set a=1",
+            "fluxmorph init a --template walk",
+            "fluxmorph generate completions ksh",
         ] {
             assert!(Cli::try_parse_from(line.split_whitespace()).is_err(), "{line}");
         }

@@ -5,9 +5,10 @@ use super::exit::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::config::FactorReuse;
 use crate::error::Error;
+use crate::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::output::read_design;
-use crate::setup::{Purpose, set_up};
+use crate::setup::{Purpose, set_up_watched};
 use crate::verify::{Certificate, Settings, certify_until};
 
 /// Do what the command line says.
@@ -19,12 +20,13 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     let (mut config, source) = args.common.load()?;
     // The differences are between designs so near to each other that one factor serves them all.
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
-    let outcome = with_threads(args.common.threads, |_| {
+    let outcome = with_threads(args.common.work.threads, |_| {
         let interrupted = || signal.received().is_some();
-        let mut observer = observer(args.common.quiet);
+        let mut observer = observer(&args.common.work);
         observer.phase("setting up mesh and matrices");
-        let mut setup = set_up(&config, &source, Purpose::Optimisation)?;
-        memory_limit::check_problem(setup.problem.memory_estimate(), &source, args.common.older_run())?;
+        let told = &mut |stage| observer.stage(stage);
+        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, told)?;
+        memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.older_run())?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
@@ -50,7 +52,9 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
         let all: Vec<(&Certificate, &str)> =
             std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
-        if args.common.json {
+        // No bar may stand where the table goes.
+        drop(observer);
+        if args.common.work.json {
             stdout::print_json(&certificates)?;
         } else {
             let tables: Vec<String> =

@@ -13,6 +13,7 @@ use signal_hook::iterator::Signals;
 
 use super::ExitCode;
 use crate::error::Error;
+use crate::observer::take_down;
 
 /// What is shown at the first signal of a run.
 pub(super) const FINISHES_EVALUATION: &str =
@@ -63,6 +64,8 @@ pub(super) fn watch(message: &'static str) -> Signal {
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
         std::thread::spawn(move || {
             if signals.forever().next().is_some() {
+                // A second signal ends the process where it stands: from here on nothing is left to tidy up.
+                take_down();
                 let _ = writeln!(std::io::stderr(), "{message}");
             }
         });

@@ -2,26 +2,32 @@
 
 pub mod args;
 mod check;
+mod examples;
 mod exit;
+mod generate;
 mod gradient;
+mod init;
 mod interrupt;
 mod morph;
 mod panic;
+mod report;
 mod run;
 mod solve;
 pub mod stdout;
+mod template;
 
 use std::io::Write;
 
 use clap::Parser;
 
 pub use exit::ExitCode;
+pub use init::InitError;
 
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
-use crate::observer::{Console, Observer, Quiet};
-use args::{Cli, Command};
+use crate::observer::{Bar, Console, Observer, Quiet};
+use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
 pub fn main() -> std::process::ExitCode {
@@ -47,6 +53,9 @@ fn done(cli: &Cli) -> ExitCode {
         Command::Morph(args) => morph::morph(args),
         Command::Check(args) => check::check(args),
         Command::Gradient(args) => gradient::gradient(args),
+        Command::Report(args) => report::report(args),
+        Command::Init(args) => init::init(args),
+        Command::Generate(args) => generate::generate(args),
     };
     outcome.unwrap_or_else(|error| {
         let _ = writeln!(std::io::stderr(), "{}", message(&error));
@@ -63,8 +72,15 @@ fn message(error: &Error) -> String {
 }
 
 /// Who shows the progress.
-fn observer(quiet: bool) -> Box<dyn Observer> {
-    if quiet { Box::new(Quiet(std::io::stderr())) } else { Box::new(Console::stderr()) }
+fn observer(args: &WorkArgs) -> Box<dyn Observer> {
+    match args.progress() {
+        Progress::None => Box::new(Quiet(std::io::stderr())),
+        Progress::Plain => Box::new(Console::stderr()),
+        Progress::Auto | Progress::Bar => match Bar::stderr() {
+            Some(bar) => Box::new(bar),
+            None => Box::new(Console::stderr()),
+        },
+    }
 }
 
 /// Works on as many threads as asked for, or as the machine has; `work` is told how many.

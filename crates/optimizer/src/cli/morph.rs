@@ -16,13 +16,13 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (config, source) = args.common.load()?;
     let parameters = if args.tune { Parameters::Tuned } else { Parameters::Given };
-    with_threads(args.common.threads, |threads| {
+    with_threads(args.common.work.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let older_run = args.common.older_run();
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
-        let report = morph::morph(&config, &source, parameters, options, &mut *observer(args.common.quiet))?;
-        if args.common.json {
+        let report = morph::morph(&config, &source, parameters, options, &mut *observer(&args.common.work))?;
+        if args.common.work.json {
             stdout::print_json(&report)?;
         } else {
             stdout::print(&morph::text(&report))?;

@@ -10,7 +10,7 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::Observer;
-use crate::output::{OlderRun, RunResult, RunStatus, StopReason, resume_command, system_disk};
+use crate::output::{RunResult, RunStatus, StopReason, resume_command, system_disk};
 use crate::session::{self, Limits, Options, SavedRun};
 
 /// Do what the command line says.
@@ -20,14 +20,14 @@ use crate::session::{self, Limits, Options, SavedRun};
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let (config, source) = args.load()?;
-    let outcome = with_threads(args.common.threads, |threads| {
+    let outcome = with_threads(args.common.work.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let older_run = args.common.older_run();
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
-        let mut observer = observer(args.common.quiet);
+        let mut observer = observer(&args.common.work);
         let result = session::run(&config, &source, options, &mut *observer);
-        concluded(result, &config.output.directory, args.common.json, &signal, &mut *observer)
+        concluded(result, &config.output.directory, args.common.work.json, &signal, &mut *observer)
     });
     signal.ended(outcome)
 }
@@ -38,23 +38,23 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 /// As [`run`].
 pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
-    let outcome = with_threads(args.threads, |threads| {
+    let outcome = with_threads(args.work.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let saved = SavedRun::open(&disk, &args.directory)?;
         let (config, source) = saved.config();
-        if !args.allow_outside {
+        if !args.work.allow_outside {
             source.confined(OutputNamedBy::User)?;
         }
-        if !args.force {
+        if !args.work.force {
             memory_limit::check_mesh(config, source)?;
         }
-        let older_run = if args.force { OlderRun::Replace } else { OlderRun::Keep };
+        let older_run = args.work.older_run();
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
-        let limits = Limits { max_evaluations: args.max_evaluations, max_time: args.max_time };
-        let mut observer = observer(args.quiet);
+        let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
+        let mut observer = observer(&args.work);
         let result = session::resume(saved, limits, options, &mut *observer);
-        concluded(result, &args.directory, args.json, &signal, &mut *observer)
+        concluded(result, &args.directory, args.work.json, &signal, &mut *observer)
     });
     signal.ended(outcome)
 }

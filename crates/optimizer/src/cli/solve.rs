@@ -15,7 +15,7 @@ use crate::setup::variable_count;
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (config, source) = args.common.load()?;
-    let outcome = with_threads(args.common.threads, |threads| {
+    let outcome = with_threads(args.common.work.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let design = match &args.design {
             Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
@@ -24,8 +24,8 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
         let disk = system_disk();
         let older_run = args.common.older_run();
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
-        let result = session::solve(&config, &source, design, options, &mut *observer(args.common.quiet))?;
-        if args.common.json {
+        let result = session::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
+        if args.common.work.json {
             stdout::print_json(&result)?;
         }
         // An analysis that has begun is finished and saved; then the signal decides the exit code.

@@ -1,25 +1,66 @@
 //! `[analysis]`: which field problems are solved, and how exactly.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 
 use super::Dimension;
 use super::linear_solver::LinearSolver;
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{each_once, integer, not_empty, number, quantity};
+use crate::schema::rules::Rules;
 
-/// The field analysis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Which field problem is solved, and how exactly. Every frequency is a problem of its own, and all share one mesh.
+///
+/// The table is required, but for a motion alone: with `[morph]` it may be left out where there is none of `[[coils]]`,
+/// `[objective]`, `[boundaries]`, `[[constraints]]`, `[materials]` and `[regions]`.
+///
+/// ```toml
+/// [analysis]
+/// frequency = "60 Hz"
+/// order = 1
+/// linear_solver = { method = "automatic", factor_gib = 4 }
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Analysis {
-    /// Required: no value fits most devices.
+    /// One frequency or several.
     #[serde(flatten)]
+    #[schemars(with = "FrequencyKeys")]
     pub frequencies: Frequencies,
-    /// Penalty reluctivity over reluctivity, ν_p / ν. Default 1: the penalised operator then is the Laplacian in
-    /// uniform material, which is what iterative solvers like best.
+    /// Penalty reluctivity over reluctivity, ν_p / ν. With 1 the penalised operator is the Laplacian in uniform material,
+    /// which is what iterative solvers like best.
+    #[schemars(transform = number(Range::POSITIVE), extend("default" = 1))]
     pub penalty: f64,
-    /// Polynomial degree of the elements, 1 or 2. Default 1; 2 has about eight times the unknowns and is far more exact on the same mesh.
+    /// Polynomial degree of A and ψ in an element. 2 gives about eight times the unknowns, and far smaller errors on the
+    /// same mesh.
+    #[schemars(with = "usize", transform = integer(1, 2), extend("default" = 1))]
     pub order: ElementOrder,
     /// How the linear systems are solved.
+    #[schemars(default)]
     pub linear_solver: LinearSolver,
+}
+
+/// The frequency as it is written.
+#[derive(JsonSchema)]
+#[schemars(transform = one_of_both)]
+#[allow(dead_code, reason = "stands for the keys of `Frequencies` in the schema")]
+struct FrequencyKeys {
+    /// The one frequency that is analysed; 0: magnetostatics. It has no default, since none fits most devices. Either this
+    /// or `frequencies`.
+    #[schemars(transform = quantity(Dimension::Frequency, Range::NOT_NEGATIVE))]
+    frequency: Option<f64>,
+    /// Several frequencies, each once: one field problem each, all on the same mesh. The first is the one whose fields and
+    /// results have plain names. Instead of `frequency`.
+    #[schemars(
+        transform = quantity(Dimension::Frequency, Range::NOT_NEGATIVE),
+        transform = not_empty,
+        transform = each_once,
+    )]
+    frequencies: Option<Vec<f64>>,
+}
+
+fn one_of_both(schema: &mut Schema) {
+    Rules::of(schema).exactly_one(&["frequency", "frequencies"]);
 }
 
 /// The degree of the potentials in an element, written as its number.

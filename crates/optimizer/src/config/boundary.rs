@@ -1,31 +1,54 @@
 //! `[boundaries]`: what the field does at the outer faces and symmetry planes.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Dimension;
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{length, name_or_names, names, not_all_zero, quantity};
 
-/// Surfaces with a boundary condition, by name. All lists are empty by default.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+/// What the field does at the outer faces and symmetry planes, by name of the surface. Each surface has at most one
+/// condition.
+///
+/// ```toml
+/// [boundaries]
+/// flux_parallel = ["x_min", "y_min", "z_max"]
+/// flux_normal = ["z_min"]
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(default)]
 pub struct Boundaries {
-    /// No flux crosses these: `n × A = 0`.
+    /// No flux crosses these surfaces: n × A = 0.
+    #[schemars(transform = names)]
     pub flux_parallel: Vec<String>,
-    /// The flux crosses these at right angles: `n · A = 0`.
+    /// The flux crosses these surfaces at right angles: n · A = 0.
+    #[schemars(transform = names)]
     pub flux_normal: Vec<String>,
-    /// A uniform field applied from outside. Default none.
+    /// A uniform field applied from outside.
     pub uniform_field: Option<UniformField>,
 }
 
-/// A uniform applied field: `A = ½ B × (x − center)` is prescribed on surfaces.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A uniform field applied from outside: A = ½ B × (x − `center`) is prescribed on some surfaces. Where planes with a
+/// condition touch these surfaces, the field must agree with it: parallel to flux-parallel planes, at right angles to
+/// flux-normal ones.
+///
+/// ```toml
+/// [boundaries.uniform_field]
+/// surfaces = ["outer"]
+/// b = ["0 T", "0 T", "1 mT"]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct UniformField {
-    /// The surfaces, by name.
+    /// The surfaces on which A is given.
+    #[schemars(transform = name_or_names)]
     pub surfaces: Vec<String>,
-    /// Flux density far away, amplitude [T].
+    /// Amplitude of the flux density far away [T], not zero.
+    #[schemars(transform = quantity(Dimension::FluxDensity, Range::FINITE), transform = not_all_zero)]
     pub b: [f64; 3],
-    /// Where the prescribed `A` is zero [m]; `B` does not depend on it, but a flux-parallel plane that touches the surfaces
-    /// must hold it. Default: on these planes, and at the origin in the directions without one.
+    /// Where the given A is zero [m]; B does not depend on it, but flux-parallel planes that touch the surfaces must pass
+    /// through it. Default: on these planes, and at 0 in the directions without one.
+    #[schemars(transform = length(Range::FINITE))]
     pub center: Option<[f64; 3]>,
 }
 

@@ -6,11 +6,11 @@ pub(super) trait Choice: Copy + 'static {
     const CHOICES: &'static [(&'static str, Self)];
 }
 
-/// Declares such an enum: the word, the variant, and its form in `resolved.toml` stay together.
+/// Declares such an enum: the word, the variant, its form in `resolved.toml` and in the schema stay together.
 macro_rules! choice {
     ($(#[$meta:meta])* $vis:vis enum $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+ }) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
         $vis enum $name {
             $($(#[$variant_meta])* #[serde(rename = $word)] $variant,)+
         }

@@ -1,25 +1,140 @@
 //! `[[coils]]`: sources given by their analytic shape, or by a region of the mesh.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
 use super::Dimension;
 use super::choice::choice;
 use super::range::Range;
 use super::section::{Section, first_duplicate};
+use crate::schema::form::{each_once, length as length_form, not_all_zero, not_zero, number, quantity};
+use crate::schema::rules::{Rules, Then};
 
-/// A coil.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A source of current: either with a `shape`, of uniform current density and given by it alone, so that the mesh need not
+/// follow it, or a `region` of the mesh. A coil must lie outside of the part of the mesh that moves.
+///
+/// Where the outside of the mesh cuts a coil, it must cut straight sides at right angles, on a flux-parallel surface; a
+/// flux-normal plane may halve a coil's height, but no current may cross it. Anything else is an error that says where and
+/// why.
+///
+/// A `region` without `terminals` closes on itself: `center` and `axis` give any line through its hole, and positive
+/// current runs counter-clockwise about it. The current has the direction of conduction and the same magnitude everywhere,
+/// as in a stranded winding, less what is needed to free it of divergence; what is left of that, and the current through
+/// cross-sections, is printed.
+///
+/// ```toml
+/// [[coils]]
+/// name = "coil"
+/// shape = "racetrack"
+/// ampere_turns = "40 kA"
+/// center = ["0 mm", "0 mm", "60 mm"]
+/// half_window = ["60 mm", "160 mm"]
+/// width = "20 mm"
+/// height = "40 mm"
+///
+/// [[coils]]
+/// name = "winding"
+/// region = "winding"
+/// ampere_turns = "500 A"
+/// phase = "90 deg"
+/// terminals = ["y_min", "x_min"]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Coil {
-    /// Its name in messages and results.
+    /// What the coil is called in messages and results; each name once.
     pub name: String,
-    /// Current times turns, amplitude [A]; positive is counter-clockwise about the axis, or from the first terminal to
-    /// the second.
+    /// Amplitude of current times turns [A], not 0; positive is counter-clockwise about the axis, or from the first terminal
+    /// to the second.
+    #[schemars(transform = quantity(Dimension::Current, Range::FINITE), transform = not_zero)]
     pub ampere_turns: f64,
-    /// Phase of the current [rad]. Default 0.
+    /// Phase of the current [rad].
+    #[schemars(transform = quantity(Dimension::Angle, Range::FINITE), extend("default" = 0))]
     pub phase: f64,
     /// Where the current flows.
     #[serde(flatten)]
+    #[schemars(with = "ShapeKeys")]
     pub shape: CoilShape,
+}
+
+/// The keys that say where the current flows, for all shapes together.
+#[derive(JsonSchema)]
+#[schemars(transform = keys_of_the_shape)]
+#[allow(dead_code, reason = "stands for the keys of `CoilShape` in the schema")]
+struct ShapeKeys {
+    /// The shape of the winding. Either this or `region`.
+    shape: Option<ShapeWord>,
+    /// Instead of `shape`: the region of the mesh that is the winding. It must not conduct at a frequency above 0.
+    region: Option<String>,
+    /// Centre of the coil [m]; required with `shape`. Of a `region` without `terminals`: a point of a line through its hole.
+    #[schemars(transform = length_form(Range::FINITE))]
+    center: Option<[f64; 3]>,
+    /// Axis of the winding; the length of a vector does not matter.
+    #[schemars(extend("default" = AxisWord::Z))]
+    axis: Axis,
+    /// Racetrack and rectangular: direction of the first half size of the window, of which the part across the axis counts;
+    /// the second is at right angles to it, counter-clockwise. Default: the coordinate that follows the axis cyclically (x
+    /// for z), or its part across a slanted axis.
+    #[schemars(transform = number(Range::FINITE), transform = not_all_zero)]
+    direction: Option<[f64; 3]>,
+    /// Racetrack and rectangular, required: inner half sizes along `direction` and across it [m].
+    #[schemars(transform = length_form(Range::POSITIVE))]
+    half_window: Option<[f64; 2]>,
+    /// Circular, required: inner radius [m].
+    #[schemars(transform = length_form(Range::POSITIVE))]
+    radius: Option<f64>,
+    /// Radial width of the winding [m]; required with `shape`.
+    #[schemars(transform = length_form(Range::POSITIVE))]
+    width: Option<f64>,
+    /// Axial height of the winding [m]; required with `shape`.
+    #[schemars(transform = length_form(Range::POSITIVE))]
+    height: Option<f64>,
+    /// Racetrack: how the straight sides meet. Default `"mitred"`.
+    corner: Option<CornerWord>,
+    /// Racetrack, instead of `corner`: concentric round corners with this inner radius [m], at most the smaller half size of
+    /// the window.
+    #[schemars(transform = length_form(Range::POSITIVE))]
+    inner_radius: Option<f64>,
+    /// With `region`: the surface where the current comes in, and the one where it goes out; both flux-parallel. Only
+    /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of the region are
+    /// in series: each carries all ampere-turns.
+    #[schemars(transform = each_once)]
+    terminals: Option<[String; 2]>,
+}
+
+/// Which keys go with which shape.
+fn keys_of_the_shape(schema: &mut Schema) {
+    const SIDES: [&str; 2] = ["direction", "half_window"];
+    const CORNERS: [&str; 2] = ["corner", "inner_radius"];
+    const BODY: [&str; 4] = ["center", "width", "height", "half_window"];
+    Rules::of(schema)
+        .exactly_one(&["shape", "region"])
+        .not_both(CORNERS)
+        .when("shape", &["racetrack"], Then { required: &BODY, refused: &["radius", "terminals"] })
+        .when(
+            "shape",
+            &["rectangular"],
+            Then { required: &BODY, refused: &["radius", "terminals", CORNERS[0], CORNERS[1]] },
+        )
+        .when(
+            "shape",
+            &["circular"],
+            Then {
+                required: &["center", "width", "height", "radius"],
+                refused: &["terminals", SIDES[0], SIDES[1], CORNERS[0], CORNERS[1]],
+            },
+        )
+        .with(
+            "region",
+            Then {
+                required: &[],
+                refused: &["radius", "width", "height", SIDES[0], SIDES[1], CORNERS[0], CORNERS[1]],
+            },
+        )
+        .with("terminals", Then { required: &[], refused: &["center", "axis"] })
+        .add(json!({ "anyOf": [
+            { "required": ["shape"] }, { "required": ["terminals"] }, { "required": ["center"] },
+        ] }));
 }
 
 /// Where a coil's current flows.
@@ -117,7 +232,7 @@ pub enum CoilPath {
 choice! {
     /// Words for `shape`.
     pub enum ShapeWord {
-        /// Four straight sides.
+        /// Four straight sides with corners of choice.
         Racetrack = "racetrack",
         /// Four straight sides with mitred corners.
         Rectangular = "rectangular",
@@ -149,14 +264,15 @@ impl AxisWord {
     }
 }
 
-/// The axis of a coil.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// The axis of a coil or of a rotation: the name of a coordinate, or a vector.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(inline)]
 pub enum Axis {
     /// A coordinate axis.
     Coordinate(AxisWord),
-    /// Along a vector of any length.
-    Vector([f64; 3]),
+    /// Along a vector of any length but zero.
+    Vector(#[schemars(transform = number(Range::FINITE), transform = not_all_zero)] [f64; 3]),
 }
 
 impl Axis {

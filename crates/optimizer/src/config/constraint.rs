@@ -1,21 +1,129 @@
 //! `[[constraints]]`: what must stay below a bound while the objective is optimised.
 
+use schemars::transform::Transform;
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
 use super::Dimension;
 use super::choice::choice;
-use super::functional::{Functional, ObjectiveKind};
+use super::design::COMPONENTS;
+use super::functional::{Functional, ObjectiveKind, Weighting, keys_of_the_kind};
 use super::range::Range;
 use super::section::{Section, first_duplicate};
+use crate::schema::form::{column_name, length, not_all_zero, number, of_some_dimension, quantity};
+use crate::schema::rules::{Rules, Then, is};
 
-/// A constraint.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// What must keep within a bound while the objective is optimised; with the algorithms `mma`, `ccsaq` and `slsqp`, and
+/// with a `[design]`. A constraint counts as kept when it is beyond its bound by no more than a millionth of it. The best
+/// design of a run is the best one that keeps all constraints; if none does, the one that is least beyond a bound, with a
+/// warning.
+///
+/// The bounds on a thickness are smooth ones on the safe side: the true least thickness is a little greater, the greatest a
+/// little smaller. Where the flat body is to be limited, `design.lower` and `design.upper` do the same at no cost. With
+/// both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their names.
+///
+/// ```toml
+/// [[constraints]]
+/// kind = "mass"
+/// region = "plate"
+/// upper = "2.5 kg"
+///
+/// [[constraints]]
+/// kind = "loss"
+/// region = "plate"
+/// upper_ratio = 0.9
+///
+/// [[constraints]]
+/// kind = "thickness"
+/// minimum = "6 mm"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Constraint {
-    /// Its name in the results. Default: its kind and region.
+    /// What the constraint is called in the results, a column of the history: letters, digits, `_` and `-`; each name once.
+    /// Default: its kind and region, such as `loss_plate`.
+    #[schemars(with = "Option<String>", transform = column_name)]
     pub name: String,
     /// What is kept within what.
     #[serde(flatten)]
+    #[schemars(with = "LimitKeys")]
     pub limit: Limit,
+}
+
+/// The keys that say what is limited, for all kinds together.
+#[derive(JsonSchema)]
+#[schemars(transform = keys_of_the_limit)]
+#[allow(dead_code, reason = "stands for the keys of `Limit` in the schema")]
+struct LimitKeys {
+    /// What is limited: a quantity of the field, a volume or mass, or the thickness of the body.
+    kind: Kind,
+    /// The region it is measured in. Required, but for `energy` and `thickness`.
+    region: Option<String>,
+    /// As in `[objective]`.
+    weighting: Option<Weighting>,
+    /// As in `[objective]`.
+    #[schemars(transform = quantity(Dimension::FluxDensity, Range::FINITE))]
+    target: Option<[f64; 3]>,
+    /// As in `[objective]`.
+    #[schemars(transform = number(COMPONENTS), transform = not_all_zero)]
+    direction: Option<[f64; 3]>,
+    /// As in `[objective]`.
+    #[schemars(transform = quantity(Dimension::Frequency, Range::NOT_NEGATIVE))]
+    frequency: Option<f64>,
+    /// The greatest value, in the unit of the kind: `"20 W"`, `"2.5 kg"`. Either this or `upper_ratio`.
+    #[schemars(transform = of_some_dimension)]
+    upper: Option<f64>,
+    /// The greatest value as a multiple of that of the initial design, which must be positive.
+    #[schemars(transform = number(Range::POSITIVE))]
+    upper_ratio: Option<f64>,
+    /// For `thickness`: the least thickness at every place [m]. At least one of `minimum` and `maximum` is needed.
+    #[schemars(transform = length(Range::POSITIVE))]
+    minimum: Option<f64>,
+    /// For `thickness`: the greatest thickness [m].
+    #[schemars(transform = length(Range::POSITIVE))]
+    maximum: Option<f64>,
+}
+
+/// Which keys go with which kind, and the unit of the bound.
+fn keys_of_the_limit(schema: &mut Schema) {
+    const OF_A_FIELD: [&str; 4] = ["weighting", "target", "direction", "frequency"];
+    const BOUNDS: [&str; 2] = ["upper", "upper_ratio"];
+    const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
+    let [weighting, target, direction, frequency] = OF_A_FIELD;
+    let thickness = Then {
+        required: &[],
+        refused: &["region", weighting, target, direction, frequency, BOUNDS[0], BOUNDS[1]],
+    };
+    let body = Then { required: &["region"], refused: &OF_A_FIELD };
+    let mut of_a_field = Schema::default();
+    keys_of_the_kind(&mut of_a_field);
+    let any_of = |keys: [&str; 2]| keys.map(|key| json!({ "required": [key] }));
+    let mut rules = Rules::of(schema)
+        .when("kind", &["thickness"], thickness)
+        .unless("kind", &["thickness"], Then { required: &[], refused: &THICKNESSES })
+        .when("kind", &["volume", "mass"], body)
+        .add(json!({ "if": is("kind", &["volume", "mass", "thickness"]), "else": of_a_field }))
+        .add(json!({
+            "if": is("kind", &["thickness"]),
+            "then": { "anyOf": any_of(THICKNESSES) },
+            "else": { "oneOf": any_of(BOUNDS) },
+        }));
+    let by_volume = is("weighting", &["volume"]);
+    let sums = is("kind", &["flux_density_squared", "uniformity"]);
+    let units = [
+        (json!({ "allOf": [sums, by_volume] }), Dimension::FluxDensityIntegral, Range::POSITIVE),
+        (json!({ "allOf": [sums, { "not": by_volume }] }), Dimension::FluxDensitySquared, Range::POSITIVE),
+        (is("kind", &["field_component"]), Dimension::FluxDensity, Range::FINITE),
+        (is("kind", &["loss"]), Dimension::Power, Range::POSITIVE),
+        (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
+        (is("kind", &["volume"]), Dimension::Volume, Range::POSITIVE),
+        (is("kind", &["mass"]), Dimension::Mass, Range::POSITIVE),
+    ];
+    for (condition, dimension, range) in units {
+        let mut upper = Schema::default();
+        quantity(dimension, range).transform(&mut upper);
+        rules = rules.add(json!({ "if": condition, "then": { "properties": { "upper": upper } } }));
+    }
 }
 
 /// What is kept within which bounds.
@@ -73,21 +181,21 @@ choice! {
 choice! {
     /// Every word that `kind` may be.
     enum Kind {
-        /// See [`ObjectiveKind`].
+        /// As in `[objective]`.
         FluxDensitySquared = "flux_density_squared",
-        /// See [`ObjectiveKind`].
+        /// As in `[objective]`.
         Uniformity = "uniformity",
-        /// See [`ObjectiveKind`].
+        /// As in `[objective]`.
         FieldComponent = "field_component",
-        /// See [`ObjectiveKind`].
+        /// As in `[objective]`.
         Loss = "loss",
-        /// See [`ObjectiveKind`].
+        /// As in `[objective]`.
         Energy = "energy",
-        /// See [`BodyKind`].
+        /// Volume of a region [m³], meshed or replaced by its impedance surface.
         Volume = "volume",
-        /// See [`BodyKind`].
+        /// Mass of a region [kg], by the `density` of its material.
         Mass = "mass",
-        /// See [`ThicknessKind`].
+        /// Thickness of the designed body along the direction of the design [m].
         Thickness = "thickness",
     }
 }

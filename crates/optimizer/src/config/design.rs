@@ -1,5 +1,6 @@
 //! `[design]`: which surface moves, which way, and how far.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 
 use super::Dimension;
@@ -8,37 +9,84 @@ use super::coil::AxisWord;
 use super::initial::InitialDesign;
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{integer, length, name_or_names, not_all_zero, number};
+use crate::schema::rules::Rules;
 
-/// The design variables: displacements of a surface, every node along its direction.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Components of a vector whose length does not matter: their squares stay numbers.
+pub(super) const COMPONENTS: Range = Range::closed(-1e100, 1e100);
+
+/// Which surface moves, which way, and how far; needed by `run` and `gradient`, with `[remesh]`. `morph` can move the mesh
+/// by it.
+///
+/// Every node of the surface is a variable, in ascending order of the nodes, but for nodes that cannot move (on a fixed
+/// rim, in the corner of three planes); `design.points_m` of the result says where each variable sits. With `grid` the
+/// points of the control grid are the variables.
+///
+/// `direction = "normal"` moves every node along the area-weighted normal of the undeformed surface, out of the body, so
+/// that a positive displacement makes the body thicker. The body is the side with a `[regions]` table; where both sides
+/// have one, or neither, it is the first region of a surface named `first|second`. Behind an outer face of air lies a body
+/// that is not meshed. A node on a surface of `[boundaries]` or of `remesh.slide` moves within that surface's plane; where
+/// two such planes meet, along their edge.
+///
+/// Symmetry planes, for `rim` and `filter_radius`, are the outer faces named in `[boundaries]` or `remesh.slide`: the model
+/// ends there, the device does not. The filter sees the mirror images of the nodes across them, so that a quarter model
+/// gives the surface of the whole.
+///
+/// ```toml
+/// [design]
+/// surface = "plate_bottom"
+/// direction = [0, 0, -1]
+/// grid = [7, 13]
+/// lower = "-5 mm"
+/// upper = "20 mm"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(transform = smooth_in_one_way)]
 pub struct Design {
-    /// Names of the surfaces whose nodes move.
+    /// The nodes of these surfaces move.
+    #[schemars(transform = name_or_names)]
     pub surface: Vec<String>,
-    /// Direction of a positive displacement.
+    /// Direction of a positive displacement: a vector, whose length does not matter, or `"normal"`.
     pub direction: DesignDirection,
-    /// Points of the control grid along the two coordinates of the surface, bilinear in between. Default
-    /// `None`: every node of the surface is a variable.
+    /// Points of the control grid along the two coordinates of the surface, bilinear in between; the first is slow in the
+    /// order of the variables. With `direction = "normal"` the grid lies across the axis that the normals follow most, and
+    /// the surface must not turn back over it. Default: every node of the surface is a variable.
+    #[schemars(transform = integer(2, 300))]
     pub grid: Option<[usize; 2]>,
-    /// Radius over which the variables at the nodes are averaged [m]. Default `None`: a node follows its own variable.
+    /// The displacement of a node is the mean of the variables at the nodes around it, with the weight (1 − distance /
+    /// radius) × area: shapes stay smooth, and the same on a finer mesh. Two to four sizes of a cell are a good start. Not
+    /// with `grid`, which is smooth already. Default: a node follows its own variable.
+    #[schemars(transform = length(Range::POSITIVE))]
     pub filter_radius: Option<f64>,
-    /// What the nodes on the free rim do. Default `free`: the shape is not held where nothing holds it.
+    /// What the nodes on the edge of the surface do.
+    #[schemars(extend("default" = RimMotion::Free))]
     pub rim: RimMotion,
-    /// Least displacement [m].
+    /// Least displacement [m]; below `upper`.
+    #[schemars(transform = length(Range::FINITE))]
     pub lower: f64,
     /// Greatest displacement [m].
+    #[schemars(transform = length(Range::FINITE))]
     pub upper: f64,
-    /// Where the optimisation starts.
+    /// Where the optimisation starts, between `lower` and `upper`: all variables alike, each with its own value in the order
+    /// of `design.points_m` of the result, or each anywhere between its bounds. The default is the mesh as it is.
+    #[schemars(extend("default" = 0))]
     pub initial: InitialDesign,
-    /// Planes over which mirrored variables are tied. Default none.
+    /// Planes over which mirrored variables are tied.
+    #[schemars(default)]
     pub symmetry: Vec<SymmetryPlane>,
 }
 
+fn smooth_in_one_way(schema: &mut Schema) {
+    Rules::of(schema).not_both(["grid", "filter_radius"]);
+}
+
 /// Direction of a positive displacement.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(inline)]
 pub enum DesignDirection {
     /// The same for every node, of length 1.
-    Vector([f64; 3]),
+    Vector(#[schemars(transform = number(COMPONENTS), transform = not_all_zero)] [f64; 3]),
     /// One for each node.
     Word(DirectionWord),
 }
@@ -46,7 +94,7 @@ pub enum DesignDirection {
 choice! {
     /// Words for `direction`.
     pub enum DirectionWord {
-        /// The normal of the surface at the node, out of the body.
+        /// Every node along the normal of the surface there, out of the body.
         Normal = "normal",
     }
 }
@@ -54,19 +102,28 @@ choice! {
 choice! {
     /// What the nodes on the free rim of the design surface do.
     pub enum RimMotion {
-        /// They move like all others.
+        /// They move like all others: the shape is not held where nothing holds it.
         Free = "free",
-        /// They stay.
+        /// They stay, but for those on a symmetry plane.
         Fixed = "fixed",
     }
 }
 
-/// A symmetry plane of the design.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// Variables that are mirror images of each other across a plane become one: for a mesh of the whole device whose shape is
+/// to stay symmetric. Every node (of a control grid: every point) needs a partner within 1e-6 of the surface's size. A
+/// `design.direction` of three numbers must lie in the plane; normals become mirror images of each other.
+///
+/// ```toml
+/// [[design.symmetry]]
+/// axis = "x"
+/// at = "40 mm"
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct SymmetryPlane {
-    /// Its normal.
+    /// Normal of the plane; each axis once.
     pub axis: AxisWord,
-    /// Its place on that axis [m]. Default 0.
+    /// Place of the plane on that axis [m].
+    #[schemars(transform = length(Range::FINITE), extend("default" = 0))]
     pub at: f64,
 }
 
@@ -148,7 +205,7 @@ fn read_direction(section: &Section<'_>) -> Option<DesignDirection> {
 
 /// The vector `direction` of a table, scaled to length one.
 pub(super) fn read_vector(section: &Section<'_>) -> Option<[f64; 3]> {
-    let vector = section.numbers::<3>("direction", Range::closed(-1e100, 1e100))?;
+    let vector = section.numbers::<3>("direction", COMPONENTS)?;
     let largest = vector.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
     if largest < 1e-100 {
         section.wrong(

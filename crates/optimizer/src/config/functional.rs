@@ -1,42 +1,64 @@
 //! What is measured of the field: the keys that `[objective]`, its terms and `[[constraints]]` share.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 
 use super::Dimension;
 use super::choice::choice;
-use super::design::read_vector;
+use super::design::{COMPONENTS, read_vector};
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{not_all_zero, number, quantity};
+use crate::schema::rules::{Rules, Then};
 
 /// A real quantity of the field.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Functional {
-    /// What is measured. Default: the paper's objective.
+    /// What is measured. The default is the paper's objective.
+    #[schemars(extend("default" = ObjectiveKind::FluxDensitySquared))]
     pub kind: ObjectiveKind,
-    /// The region it is taken over; `None`, for the energy alone: everything that is meshed.
+    /// The region it is measured in. Required, but for `energy`: without it the energy is that of everything that is
+    /// meshed.
     pub region: Option<String>,
-    /// How the cells of the region are weighted; for the two sums over cells alone. Default `point`: the paper's.
+    /// For `flux_density_squared` and `uniformity`: how the cells of the region are weighted. Default `"point"`, as in the
+    /// paper.
     pub weighting: Option<Weighting>,
-    /// Flux density that a uniform field is to have [T]; for `uniformity` alone.
+    /// For `uniformity`, required: the flux density wished for [T].
+    #[schemars(transform = quantity(Dimension::FluxDensity, Range::FINITE))]
     pub target: Option<[f64; 3]>,
-    /// Unit vector; for `field_component` alone.
+    /// For `field_component`, required: a vector along the component; its length does not matter.
+    #[schemars(transform = number(COMPONENTS), transform = not_all_zero)]
     pub direction: Option<[f64; 3]>,
-    /// The one frequency it is taken at [Hz]. Default: the sum over all of the analysis.
+    /// The one frequency it is taken at [Hz], one of `[analysis]`. Default: the values at all frequencies are added.
+    #[schemars(transform = quantity(Dimension::Frequency, Range::NOT_NEGATIVE))]
     pub frequency: Option<f64>,
+}
+
+/// Which keys go with which kind.
+pub(super) fn keys_of_the_kind(schema: &mut Schema) {
+    Rules::of(schema)
+        .unless("kind", &["energy"], Then { required: &["region"], refused: &[] })
+        .when("kind", &["field_component", "loss", "energy"], Then { required: &[], refused: &["weighting"] })
+        .when("kind", &["uniformity"], Then { required: &["target"], refused: &[] })
+        .unless("kind", &["uniformity"], Then { required: &[], refused: &["target"] })
+        .when("kind", &["field_component"], Then { required: &["direction"], refused: &[] })
+        .unless("kind", &["field_component"], Then { required: &[], refused: &["direction"] });
 }
 
 choice! {
     /// Kinds of functionals.
     pub enum ObjectiveKind {
-        /// `Σ w B·B*` [T²], or [T² m³] when weighted by volume.
+        /// Σ w B·B* [T²; by volume T² m³]. The region must not move.
         FluxDensitySquared = "flux_density_squared",
-        /// `Σ w |B − B_target|²` [T²], or [T² m³] when weighted by volume.
+        /// Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is to vanish. The region must not move.
         Uniformity = "uniformity",
-        /// Volume mean of `B·d` [T]; its magnitude in harmonics.
+        /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. The region must not move.
         FieldComponent = "field_component",
-        /// Eddy-current loss [W].
+        /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
+        /// impedance surface, and may move.
         Loss = "loss",
-        /// Energy of the magnetic field [J], its time average in harmonics.
+        /// Energy of the magnetic field [J]: ½ ∫ ν |B|² dV in statics, its time average ¼ ∫ ν |B|² dV in harmonics. The region
+        /// is meshed and may move.
         Energy = "energy",
     }
 }
@@ -44,7 +66,7 @@ choice! {
 choice! {
     /// Weights of the cells of a region.
     pub enum Weighting {
-        /// One term for each observation cell.
+        /// One term for each observation cell, as in the paper.
         Point = "point",
         /// The integral over the region.
         Volume = "volume",

@@ -1,22 +1,26 @@
 //! `design.initial`: where an optimisation starts.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Dimension;
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{integer, length};
 
 /// The design an optimisation starts from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(inline)]
 pub enum InitialDesign {
     /// All variables alike [m]. Default 0: the mesh as it is.
-    Uniform(f64),
+    Uniform(#[schemars(transform = length(Range::FINITE))] f64),
     /// Every variable [m], in the order of `design.points_m` in `result.json`.
-    Values(Vec<f64>),
+    Values(#[schemars(transform = length(Range::FINITE))] Vec<f64>),
     /// Every variable anywhere between its bounds, all equally likely.
     Random {
         /// Seed: the same number gives the same design.
+        #[schemars(transform = integer(0, u32::MAX as usize))]
         random: usize,
     },
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Dimension;
@@ -10,36 +11,57 @@ use super::fault::Fault;
 use super::range::Range;
 use super::section::Section;
 use super::source::suggest;
+use crate::schema::form::{not_all_zero, number, quantity};
 
-/// A linear, isotropic material.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A linear, isotropic material. Any number of them, each with a name of its own. A list or table in place of a number, an
+/// anisotropic material, is refused.
+///
+/// ```toml
+/// [materials.steel]
+/// relative_permeability = 800
+/// conductivity = "7e6 S/m"
+/// density = "7850 kg/m3"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Material {
-    /// Permeability over that of vacuum. Default 1: most conductors are not magnetic.
+    /// Permeability over that of vacuum; below 1 too. Most conductors are not magnetic.
+    #[schemars(transform = number(Range::POSITIVE), extend("default" = 1))]
     pub relative_permeability: f64,
-    /// Conductivity [S/m]. Default 0: a material conducts only when it is told to.
+    /// Electric conductivity [S/m]. A material conducts only when it is told to.
+    #[schemars(transform = quantity(Dimension::Conductivity, Range::NOT_NEGATIVE), extend("default" = 0))]
     pub conductivity: f64,
-    /// Mass density [kg/m³]; needed where a mass is limited.
+    /// Mass density [kg/m³]; needed where `[[constraints]]` limit a mass.
+    #[schemars(transform = quantity(Dimension::MassDensity, Range::POSITIVE))]
     pub density: Option<f64>,
 }
 
 choice! {
     /// How a conducting region is modelled.
     pub enum RegionModel {
-        /// Meshed: A–ψ inside the conductor.
+        /// Meshed, with eddy currents inside where it conducts.
         Volume = "volume",
-        /// Replaced by its surface impedance; nothing inside is solved for.
+        /// Replaced by its surface impedance, for conductors of several skin depths; needs a frequency and a conductivity above 0.
         Impedance = "impedance",
     }
 }
 
-/// What a region of the mesh is made of.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// What a region of the mesh is made of, by the name of the region. A region without a table is air.
+///
+/// ```toml
+/// [regions.plate]
+/// material = "steel"
+/// model = "volume"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Region {
-    /// Name of a material of the configuration.
+    /// Name of a material of `[materials]`.
     pub material: String,
-    /// Default `volume`: right for every conductor whose mesh resolves the skin depth.
+    /// How a region that conducts is modelled. The default is right for every conductor whose mesh resolves the skin depth.
+    #[schemars(extend("default" = RegionModel::Volume))]
     pub model: RegionModel,
-    /// Remanence `B_r` of a permanent magnet [T]: `B = μ H + B_r`. Default none.
+    /// Remanence B_r of a permanent magnet [T]: B = μ H + B_r, with the permeability of `material`. Not zero, and for
+    /// magnetostatics only.
+    #[schemars(transform = quantity(Dimension::FluxDensity, Range::FINITE), transform = not_all_zero)]
     pub remanence: Option<[f64; 3]>,
 }
 

@@ -2,22 +2,39 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::generate::{BlockParameters, ObservationBox, ShieldParameters};
+use fluxmorph_geometry::generate::BlockParameters;
+use schemars::{JsonSchema, Schema};
 use serde::{Serialize, Serializer};
+use serde_json::json;
 
 mod boxes;
+mod shield;
 mod sphere;
 
 pub use boxes::{BoxOfRegion, BoxesMesh, Patch, SizeAlong};
+pub use shield::ShieldMesh;
 pub use sphere::SphereMesh;
 
-use super::Dimension;
-use super::choice::choice;
+use super::choice::{Choice, choice};
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{integer, length};
+use crate::schema::rules::{Rules, is};
 
-/// Where the mesh comes from.
-#[derive(Debug, Clone, PartialEq)]
+/// Ratios of neighbouring cells.
+const GROWTHS: Range = Range::closed(1.0, 100.0);
+/// Factors that all sizes of a mesh are divided by.
+const REFINEMENTS: Range = Range::closed(0.25, 20.0);
+
+/// Where the mesh comes from: a built-in generator with its parameters, or a file. Either `generator` or `file`.
+///
+/// ```toml
+/// [mesh]
+/// file = "device.msh"
+/// unit = "mm"
+/// ```
+#[derive(Debug, Clone, PartialEq, JsonSchema)]
+#[schemars(rename = "Mesh", with = "WrittenMesh")]
 pub enum MeshConfig {
     /// The shield plate of the paper's second example.
     Shield(Box<ShieldMesh>),
@@ -65,69 +82,36 @@ impl LengthUnit {
 choice! {
     /// The built-in meshes.
     pub enum Generator {
-        /// The shield plate.
+        /// The paper's plate under a coil, with its parameters in `[mesh.shield]`.
         Shield = "shield",
-        /// The block.
+        /// A box of equal cells, with its parameters in `[mesh.block]`.
         Block = "block",
-        /// Boxes.
+        /// Regions with faces along the axes, which `[mesh.boxes]` describes.
         Boxes = "boxes",
-        /// The sphere.
+        /// A solid or hollow sphere, with its parameters in `[mesh.sphere]`.
         Sphere = "sphere",
     }
 }
 
-/// Dimensions of the shield's mesh, as in [`ShieldParameters`], whose defaults they take.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ShieldMesh {
-    /// Half length in x, half length in y, and thickness of the plate [m].
-    pub plate: [f64; 3],
-    /// Distance of the design nodes [m].
-    pub pitch: f64,
-    /// Depths of the mesh lines below both faces of the plate [m]; empty: no lines. Default: those of the generator
-    /// down to the middle of the plate, so that another thickness needs no other lines.
-    pub skin: Vec<f64>,
-    /// Depths of the mesh lines behind the free sides of the plate [m]; empty: no lines.
-    pub side_skin: Vec<f64>,
-    /// Inner half sizes of the coil, on which mesh lines are laid [m].
-    pub coil_half_window: [f64; 2],
-    /// Radial width of the coil [m].
-    pub coil_width: f64,
-    /// Lower and upper end of the coil [m].
-    pub coil_z: [f64; 2],
-    /// Observation region in x [m].
-    pub observation_x: [f64; 2],
-    /// Observation region in y [m].
-    pub observation_y: [f64; 2],
-    /// Observation region in z [m].
-    pub observation_z: [f64; 2],
-    /// Observation cells along x and y; one along z.
-    pub observation_cells: [usize; 2],
-    /// Upper end of the remesh region in x and y [m].
-    pub remesh_upper: [f64; 2],
-    /// Lower and upper end of the remesh region in z [m].
-    pub remesh_z: [f64; 2],
-    /// Upper end of the outer box in x and y [m].
-    pub outer: [f64; 2],
-    /// Lower and upper end of the outer box in z [m].
-    pub outer_z: [f64; 2],
-    /// Size of the cells over the plate, the coil and the observation region [m].
-    pub in_plane_size: f64,
-    /// Height of the air layers of the remesh region [m].
-    pub air_layer: f64,
-    /// First air cell beside the free sides of the plate, where they have a skin [m].
-    pub side_air: f64,
-    /// Ratio of neighbouring cells of growing air.
-    pub growth: f64,
-    /// All sizes are divided by it.
-    pub refinement: f64,
-}
-
-/// Dimensions of the block's mesh, as in [`BlockParameters`], whose defaults they take.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A box of equal cells with one corner in the origin, as in the paper's first example. Region `block`; surfaces `x_min`,
+/// `x_max`, `y_min`, `y_max`, `z_min` and `z_max`.
+///
+/// ```toml
+/// [mesh]
+/// generator = "block"
+///
+/// [mesh.block]
+/// size = ["80 mm", "80 mm", "80 mm"]
+/// cells = [8, 8, 8]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default)]
 pub struct BlockMesh {
     /// Edge lengths of the block [m].
+    #[schemars(transform = length(Range::POSITIVE))]
     pub size: [f64; 3],
-    /// Cells along x, y and z.
+    /// Cells along x, y and z, six tetrahedra each.
+    #[schemars(transform = integer(1, 1000))]
     pub cells: [usize; 3],
 }
 
@@ -218,116 +202,6 @@ impl MeshConfig {
     }
 }
 
-impl Default for ShieldMesh {
-    fn default() -> Self {
-        let ShieldParameters {
-            plate,
-            pitch,
-            skin,
-            side_skin,
-            coil_half_window,
-            coil_width,
-            coil_z,
-            observation,
-            remesh_upper,
-            remesh_z,
-            outer,
-            outer_z,
-            in_plane_size,
-            air_layer,
-            side_air,
-            growth,
-            refinement,
-        } = ShieldParameters::default();
-        Self {
-            plate,
-            pitch,
-            skin,
-            side_skin,
-            coil_half_window,
-            coil_width,
-            coil_z,
-            observation_x: observation.x,
-            observation_y: observation.y,
-            observation_z: observation.z,
-            observation_cells: observation.cells,
-            remesh_upper,
-            remesh_z,
-            outer,
-            outer_z,
-            in_plane_size,
-            air_layer,
-            side_air,
-            growth,
-            refinement,
-        }
-    }
-}
-
-impl ShieldMesh {
-    /// The same for the generator.
-    pub fn parameters(&self) -> ShieldParameters {
-        ShieldParameters {
-            plate: self.plate,
-            pitch: self.pitch,
-            skin: self.skin.clone(),
-            side_skin: self.side_skin.clone(),
-            coil_half_window: self.coil_half_window,
-            coil_width: self.coil_width,
-            coil_z: self.coil_z,
-            observation: ObservationBox {
-                x: self.observation_x,
-                y: self.observation_y,
-                z: self.observation_z,
-                cells: self.observation_cells,
-            },
-            remesh_upper: self.remesh_upper,
-            remesh_z: self.remesh_z,
-            outer: self.outer,
-            outer_z: self.outer_z,
-            in_plane_size: self.in_plane_size,
-            air_layer: self.air_layer,
-            side_air: self.side_air,
-            growth: self.growth,
-            refinement: self.refinement,
-        }
-    }
-
-    fn read(section: Section<'_>) -> Self {
-        let default = Self::default();
-        let length = |key| section.quantity(key, Dimension::Length, Range::POSITIVE);
-        let plate = section.lengths("plate", Range::POSITIVE).unwrap_or(default.plate);
-        let shield = Self {
-            plate,
-            pitch: length("pitch").unwrap_or(default.pitch),
-            skin: layers(&section, "skin").unwrap_or_else(|| down_to_the_middle(default.skin, plate[2])),
-            side_skin: layers(&section, "side_skin").unwrap_or(default.side_skin),
-            coil_half_window: section
-                .lengths("coil_half_window", Range::POSITIVE)
-                .unwrap_or(default.coil_half_window),
-            coil_width: length("coil_width").unwrap_or(default.coil_width),
-            coil_z: section.interval("coil_z").unwrap_or(default.coil_z),
-            observation_x: section.interval("observation_x").unwrap_or(default.observation_x),
-            observation_y: section.interval("observation_y").unwrap_or(default.observation_y),
-            observation_z: section.interval("observation_z").unwrap_or(default.observation_z),
-            observation_cells: section
-                .integers("observation_cells", 1, 10_000)
-                .unwrap_or(default.observation_cells),
-            remesh_upper: section.lengths("remesh_upper", Range::POSITIVE).unwrap_or(default.remesh_upper),
-            remesh_z: section.interval("remesh_z").unwrap_or(default.remesh_z),
-            outer: section.lengths("outer", Range::POSITIVE).unwrap_or(default.outer),
-            outer_z: section.interval("outer_z").unwrap_or(default.outer_z),
-            in_plane_size: length("in_plane_size").unwrap_or(default.in_plane_size),
-            air_layer: length("air_layer").unwrap_or(default.air_layer),
-            side_air: length("side_air").unwrap_or(default.side_air),
-            growth: section.number("growth", Range::closed(1.0, 100.0)).unwrap_or(default.growth),
-            refinement: section.number("refinement", Range::closed(0.25, 20.0)).unwrap_or(default.refinement),
-        };
-        section.finish();
-        shield
-    }
-}
-
 impl Default for BlockMesh {
     fn default() -> Self {
         let BlockParameters { size, cells } = BlockParameters::default();
@@ -352,15 +226,6 @@ impl BlockMesh {
     }
 }
 
-/// The depths of default skin lines that fit into both halves of a plate of this thickness [m].
-///
-/// A line in the very middle stays: it is the one where both skins meet.
-fn down_to_the_middle(depths: Vec<f64>, thickness: f64) -> Vec<f64> {
-    // Room for rounding: 5 mm is half of 10 mm, whatever the binary form of both.
-    let deepest = 0.5 * thickness * (1.0 + 1e-9);
-    depths.into_iter().filter(|depth| *depth <= deepest).collect()
-}
-
 /// Depths of layers, each below the one before.
 fn layers(section: &Section<'_>, key: &'static str) -> Option<Vec<f64>> {
     let depths = section.length_list(key, Range::POSITIVE)?;
@@ -373,6 +238,40 @@ fn layers(section: &Section<'_>, key: &'static str) -> Option<Vec<f64>> {
         return None;
     }
     Some(depths)
+}
+
+/// The keys of `[mesh]` in the schema.
+#[derive(JsonSchema)]
+#[schemars(transform = keys_of_the_mesh)]
+#[allow(dead_code, reason = "stands for the keys of `MeshConfig` in the schema")]
+struct WrittenMesh {
+    /// A built-in mesh, with its parameters in the table of its name, such as `[mesh.shield]`. Either this or `file`.
+    generator: Option<Generator>,
+    /// Path of a Gmsh file, relative to the folder of the configuration. The section on mesh files in
+    /// `docs/configuration.md` says what it may hold. Instead of `generator`.
+    file: Option<String>,
+    /// Unit of the coordinates in the file, which does not say it itself. Required with `file`.
+    unit: Option<LengthUnit>,
+    /// Parameters of the generator `shield`.
+    shield: Option<ShieldMesh>,
+    /// Parameters of the generator `block`.
+    block: Option<BlockMesh>,
+    /// Regions and sizes for the generator `boxes`; required with it.
+    boxes: Option<BoxesMesh>,
+    /// Parameters of the generator `sphere`.
+    sphere: Option<SphereMesh>,
+}
+
+/// A generator has its own table, a file its unit.
+fn keys_of_the_mesh(schema: &mut Schema) {
+    let mut rules = Rules::of(schema)
+        .exactly_one(&["generator", "file"])
+        .needs("file", &["unit"])
+        .needs("unit", &["file"])
+        .add(json!({ "if": is("generator", &[Generator::Boxes.name()]), "then": { "required": ["boxes"] } }));
+    for (table, _) in Generator::CHOICES {
+        rules = rules.add(json!({ "dependentSchemas": { (*table): is("generator", &[table]) } }));
+    }
 }
 
 /// The keys of `[mesh]` as they are written.

@@ -22,9 +22,9 @@ mod objective;
 mod optimizer;
 mod output;
 mod quantity;
-mod range;
+pub(crate) mod range;
 mod remesh;
-mod section;
+pub(crate) mod section;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -35,7 +35,9 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::open_regular;
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
 pub use analysis::{Analysis, ElementOrder, Frequencies};
 pub use boundary::{Boundaries, UniformField};
@@ -70,6 +72,9 @@ use confinement::WrittenPaths;
 use fault::Faults;
 use section::Section;
 
+use crate::schema::form::a_text;
+use crate::schema::rules::Rules;
+
 /// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
 const LARGEST_FILE: u64 = 1024 * 1024;
 
@@ -84,38 +89,61 @@ const MANY_FAULTS: usize = 100;
 const OF_THE_FIELD: [&str; 6] = ["coils", "objective", "boundaries", "constraints", "materials", "regions"];
 
 /// A complete configuration in SI, every default filled in.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(
+    description = "The configuration of a run of Fluxmorph. A quantity is a text with a unit, such as \"10 mm\", or a bare number in SI.",
+    transform = tables_together
+)]
 pub struct Config {
-    /// What the run is called. Default: the name of the file.
+    /// What the run is called in messages. Default: the name of the file.
+    #[schemars(with = "Option<String>")]
     pub title: String,
     /// The mesh.
     pub mesh: MeshConfig,
     /// The field problem.
+    #[schemars(with = "Option<Analysis>")]
     pub analysis: Analysis,
     /// Materials by name.
+    #[schemars(default, extend("propertyNames" = a_text()))]
     pub materials: BTreeMap<String, Material>,
     /// Regions of the mesh by name; a region that is not here is air.
+    #[schemars(default, extend("propertyNames" = a_text()))]
     pub regions: BTreeMap<String, Region>,
     /// The sources.
+    #[schemars(default)]
     pub coils: Vec<Coil>,
     /// The boundary conditions.
+    #[schemars(default)]
     pub boundaries: Boundaries,
     /// What is optimised; needed by `run` and `gradient`.
     pub objective: Option<Objective>,
     /// What must keep within bounds meanwhile.
+    #[schemars(default)]
     pub constraints: Vec<Constraint>,
     /// What moves; needed by `run` and `gradient`.
     pub design: Option<Design>,
-    /// How the mesh follows; given when `design` or `morph` is.
+    /// How the mesh follows; needed with `[design]` and with `[morph]`.
     pub remesh: Option<Remesh>,
     /// A prescribed motion; needed by `morph`.
     pub morph: Option<Morph>,
     /// The algorithm.
+    #[schemars(default)]
     pub optimizer: Optimizer,
     /// Points at which the flux density is reported.
+    #[schemars(default)]
     pub probes: Vec<Probe>,
     /// Where results go.
+    #[schemars(default)]
     pub output: Output,
+}
+
+/// What moves needs a body to move in, and what belongs to a field needs the field.
+fn tables_together(schema: &mut Schema) {
+    let of_the_field = OF_THE_FIELD.map(|table| json!({ "required": [table] }));
+    Rules::of(schema).needs("design", &["remesh"]).needs("morph", &["remesh"]).add(json!({
+        "if": { "required": ["morph"], "not": { "anyOf": of_the_field } },
+        "else": { "required": ["analysis"] },
+    }));
 }
 
 /// The tables an optimisation needs.

@@ -1,20 +1,72 @@
 //! `[objective]` and `[[probes]]`: what is made small or large, and what is looked at.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
 use super::choice::choice;
-use super::functional::Functional;
+use super::functional::{Functional, keys_of_the_kind};
 use super::range::Range;
 use super::section::{Section, first_duplicate};
+use crate::schema::form::{length, not_empty, not_zero, number};
+use crate::schema::rules::{Rules, Then};
 
-/// The function to be optimised: one functional, or a weighted sum of several.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The keys that belong to a term.
+const OF_A_TERM: [&str; 7] = ["kind", "region", "weighting", "target", "direction", "frequency", "weight"];
+
+/// What is made small or large; needed by `run` and `gradient`. Either one functional, with its keys in `[objective]`
+/// itself, or a weighted sum of several, each in `[[objective.terms]]`: the objective is then Σ `weight` · value, and only
+/// `goal` stays in `[objective]`.
+///
+/// The objective of the initial design must not be zero: a method sees the objective over its size there.
+///
+/// ```toml
+/// [objective]
+/// kind = "flux_density_squared"
+/// region = "observation"
+/// weighting = "point"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Objective {
-    /// Which way is better. Default `minimise`: most objectives are errors, fields or losses.
+    /// Which way is better. Most objectives are errors, fields or losses.
+    #[schemars(extend("default" = Goal::Minimise))]
     pub goal: Goal,
     /// What is summed.
     #[serde(flatten)]
+    #[schemars(with = "SumKeys")]
     pub sum: Sum,
+}
+
+/// The keys of one term, or `terms`.
+#[derive(JsonSchema)]
+#[schemars(transform = one_term_or_several)]
+#[allow(dead_code, reason = "stands for the keys of `Sum` in the schema")]
+struct SumKeys {
+    #[serde(flatten)]
+    one: TermKeys,
+    /// The terms of a weighted sum, instead of the other keys.
+    #[schemars(transform = not_empty)]
+    terms: Option<Vec<Term>>,
+}
+
+/// The keys of a term, without their rules.
+#[derive(JsonSchema)]
+#[allow(dead_code, reason = "stands for the keys of `Term` in the schema")]
+struct TermKeys {
+    #[serde(flatten)]
+    functional: Functional,
+    /// Factor on the value in SI, not 0.
+    #[schemars(transform = number(Range::FINITE), transform = not_zero, extend("default" = 1))]
+    weight: f64,
+}
+
+fn one_term_or_several(schema: &mut Schema) {
+    let mut one = Schema::default();
+    keys_of_the_kind(&mut one);
+    let none = Then { required: &[], refused: &OF_A_TERM };
+    Rules::of(schema)
+        .with("terms", none)
+        .add(json!({ "if": { "not": { "required": ["terms"] } }, "then": one }));
 }
 
 choice! {
@@ -40,22 +92,46 @@ pub enum Sum {
     },
 }
 
-/// One term of an objective.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// One term of the objective.
+///
+/// ```toml
+/// [[objective.terms]]
+/// kind = "loss"
+/// region = "plate"
+/// weight = 0.2
+///
+/// [[objective.terms]]
+/// kind = "field_component"
+/// region = "observation"
+/// direction = [0, 0, 1]
+/// weight = 1000
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(transform = keys_of_the_kind)]
 pub struct Term {
     /// What is measured.
     #[serde(flatten)]
     pub functional: Functional,
-    /// Its factor. Default 1: the value in SI as it is.
+    /// Factor on the value in SI, not 0.
+    #[schemars(transform = number(Range::FINITE), transform = not_zero, extend("default" = 1))]
     pub weight: f64,
 }
 
 /// Points at which the flux density is reported.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+///
+/// ```toml
+/// [[probes]]
+/// name = "behind the plate"
+/// points = [["0 mm", "0 mm", "-50 mm"], ["20 mm", "60 mm", "-50 mm"]]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Probe {
-    /// Its name in the results.
+    /// What the points are called in the results; each name once.
     pub name: String,
-    /// The points [m].
+    /// The points [m], at least one. The flux density is recovered from the potentials around a point, within one material
+    /// (`docs/theory.md`, section 3). A point outside the mesh at the start is a fault; one that the moving mesh leaves behind
+    /// is `null` in the result, with a warning.
+    #[schemars(transform = length(Range::FINITE), transform = not_empty)]
     pub points: Vec<[f64; 3]>,
 }
 
@@ -73,7 +149,7 @@ impl Objective {
                     term
                 })
                 .collect();
-            for key in ["kind", "region", "weighting", "target", "direction", "frequency", "weight"] {
+            for key in OF_A_TERM {
                 if section.skip(key) {
                     let message = format!("`objective` has both `terms` and `{key}`");
                     section.wrong(key, message, format!("`{key}` inside [[objective.terms]]"));

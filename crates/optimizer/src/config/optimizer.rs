@@ -1,29 +1,49 @@
 //! `[optimizer]`: the algorithm and when it stops.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::Dimension;
 use super::choice::choice;
 use super::range::Range;
 use super::section::Section;
+use crate::schema::form::{integer, number, quantity};
 
-/// Options of the optimisation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Fractions of a whole.
+const FRACTIONS: Range = Range::half_open(0.0, 1.0);
+
+/// The algorithm and when it stops.
+///
+/// ```toml
+/// [optimizer]
+/// algorithm = "mma"
+/// max_evaluations = 20
+/// max_time = "2 h"
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default)]
 pub struct Optimizer {
-    /// Default `mma`: it keeps to the bounds, needs no line search and suits many variables.
+    /// Method of NLopt. The default keeps to the bounds, needs no line search and suits many variables. With
+    /// `[[constraints]]`: `mma`, `ccsaq` or `slsqp`.
     pub algorithm: Algorithm,
-    /// Most evaluations of the objective with its gradient. Default 30: the shield needs 13.
+    /// Most evaluations of the objective with its gradient.
+    #[schemars(transform = integer(1, 1_000_000))]
     pub max_evaluations: usize,
-    /// Longest time [s]; no evaluation is started after it. Default none.
+    /// No evaluation is started after this time [s]. Default: no limit.
+    #[schemars(transform = quantity(Dimension::Duration, Range::POSITIVE))]
     pub max_time: Option<f64>,
-    /// Stop when the objective changes by less than this fraction between iterations. Default 1e-3: well
-    /// below the error of the mesh; 0 switches it off.
+    /// Stop when the objective changes by less than this fraction between iterations; 0: off. The default is well below the
+    /// error of the mesh.
+    #[schemars(transform = number(FRACTIONS))]
     pub ftol_rel: f64,
-    /// Stop when all variables change by less than this fraction. Default 0, off: the variables of a
-    /// bang-bang design reach their bounds long before the rest has settled.
+    /// Stop when all variables change by less than this fraction; 0: off. It is off by default, since the variables of a
+    /// design at its bounds get there long before the rest has settled.
+    #[schemars(transform = number(FRACTIONS))]
     pub xtol_rel: f64,
-    /// Least quality (Eq. 4) of an element that a design may have, 0 to 1. Default: a twentieth of the worst quality of
-    /// the undeformed mesh, since layered meshes start with a low one.
+    /// Least quality (Eq. 4) of an element that a design may have, and so of the reference mesh that a round starts from. A
+    /// design below it is not evaluated: a round ends. Default: a twentieth of the worst quality of the undeformed mesh,
+    /// since layered meshes start with a low one.
+    #[schemars(transform = number(FRACTIONS))]
     pub minimum_quality: Option<f64>,
 }
 
@@ -72,7 +92,7 @@ impl Optimizer {
     /// Reads the table of a configuration with so many constraints.
     pub(super) fn read(section: Section<'_>, constraints: usize) -> Self {
         let default = Self::default();
-        let tolerance = |key| section.number(key, Range::half_open(0.0, 1.0));
+        let tolerance = |key| section.number(key, FRACTIONS);
         let optimizer = Self {
             algorithm: section.choice("algorithm").unwrap_or(default.algorithm),
             max_evaluations: section

@@ -190,11 +190,32 @@ impl Dimension {
         }
     }
 
+    /// All of them.
+    pub(crate) const ALL: [Self; 14] = [
+        Length,
+        Frequency,
+        Conductivity,
+        MassDensity,
+        Current,
+        FluxDensity,
+        Angle,
+        Duration,
+        FluxDensitySquared,
+        FluxDensityIntegral,
+        Power,
+        Energy,
+        Volume,
+        Mass,
+    ];
+
+    /// The accepted units.
+    pub(crate) fn units(self) -> impl Iterator<Item = &'static str> {
+        UNITS.iter().filter(move |unit| unit.dimension == self).map(|unit| unit.name)
+    }
+
     /// The accepted units in one line, for messages.
     pub fn accepted_units(self) -> String {
-        let names: Vec<_> =
-            UNITS.iter().filter(|unit| unit.dimension == self).map(|unit| unit.name).collect();
-        names.join(", ")
+        self.units().collect::<Vec<_>>().join(", ")
     }
 }
 
@@ -265,7 +286,8 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
 }
 
 impl Dimension {
-    fn noun(self) -> &'static str {
+    /// The name of the dimension without its article.
+    pub(crate) fn noun(self) -> &'static str {
         self.name().split_once(' ').map_or(self.name(), |(_, noun)| noun)
     }
 }

@@ -2,44 +2,57 @@
 
 /// One end of a [`Range`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum End {
+pub(crate) enum End {
+    /// The bound itself is left out.
     Open(f64),
+    /// The bound itself is allowed.
     Closed(f64),
+    /// No bound.
     None,
 }
 
 /// An interval of numbers; every interval holds finite numbers only.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Range {
+pub(crate) struct Range {
     lower: End,
     upper: End,
 }
 
 impl Range {
     /// Every finite number.
-    pub(super) const FINITE: Self = Self { lower: End::None, upper: End::None };
+    pub(crate) const FINITE: Self = Self { lower: End::None, upper: End::None };
     /// `> 0`.
-    pub(super) const POSITIVE: Self = Self { lower: End::Open(0.0), upper: End::None };
+    pub(crate) const POSITIVE: Self = Self { lower: End::Open(0.0), upper: End::None };
     /// `>= 0`.
-    pub(super) const NOT_NEGATIVE: Self = Self { lower: End::Closed(0.0), upper: End::None };
+    pub(crate) const NOT_NEGATIVE: Self = Self { lower: End::Closed(0.0), upper: End::None };
 
     /// `lower < x < upper`.
-    pub(super) const fn open(lower: f64, upper: f64) -> Self {
+    pub(crate) const fn open(lower: f64, upper: f64) -> Self {
         Self { lower: End::Open(lower), upper: End::Open(upper) }
     }
 
     /// `lower <= x <= upper`.
-    pub(super) const fn closed(lower: f64, upper: f64) -> Self {
+    pub(crate) const fn closed(lower: f64, upper: f64) -> Self {
         Self { lower: End::Closed(lower), upper: End::Closed(upper) }
     }
 
     /// `lower <= x < upper`.
-    pub(super) const fn half_open(lower: f64, upper: f64) -> Self {
+    pub(crate) const fn half_open(lower: f64, upper: f64) -> Self {
         Self { lower: End::Closed(lower), upper: End::Open(upper) }
     }
 
+    /// The lower end.
+    pub(crate) fn lower(&self) -> End {
+        self.lower
+    }
+
+    /// The upper end.
+    pub(crate) fn upper(&self) -> End {
+        self.upper
+    }
+
     /// Whether the number lies inside.
-    pub(super) fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         let above = match self.lower {
             End::Open(bound) => value > bound,
             End::Closed(bound) => value >= bound,
@@ -54,7 +67,7 @@ impl Range {
     }
 
     /// In words: `greater than 0 m and at most 1 m`.
-    pub(super) fn describe(&self, unit: &str) -> String {
+    pub(crate) fn describe(&self, unit: &str) -> String {
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let lower = match self.lower {
             End::Open(bound) => Some(format!("greater than {bound}{unit}")),

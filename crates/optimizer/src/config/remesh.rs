@@ -1,45 +1,85 @@
 //! `[remesh]`: the fictitious elastic body that carries the motion into the mesh (Eq. 3).
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 
 use super::choice::choice;
 use super::range::Range;
 use super::section::{Section, first_duplicate};
+use crate::schema::form::{integer, length, name_or_names, names, number};
+use crate::schema::rules::Rules;
 
 /// Poisson's ratio of a stable body.
-const POISSON: Range = Range::open(-1.0, 0.5);
+pub(super) const POISSON: Range = Range::open(-1.0, 0.5);
 
-/// The elastic body.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// The fictitious elastic body that carries the motion of the design into the mesh (Eq. 3). Either `region` or `box` says
+/// which part of the mesh moves.
+///
+/// ```toml
+/// [remesh]
+/// region = ["plate", "remesh"]
+/// poisson = 0.0
+/// stiffness = "inverse_volume"
+/// slide = ["x_min", "y_min"]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Remesh {
     /// The part of the mesh that moves.
     #[serde(flatten)]
+    #[schemars(with = "ExtentKeys")]
     pub extent: RemeshExtent,
-    /// Poisson's ratio. Default 0.3, the paper's.
+    /// Poisson's ratio of the body. The default is the paper's.
+    #[schemars(transform = number(POISSON), extend("default" = 0.3))]
     pub poisson: f64,
-    /// Young's modulus, before it is weighted by `stiffness`. Default 1: without forces its unit cancels.
+    /// Young's modulus of the body, before `stiffness` weights it. Without forces its unit cancels.
+    #[schemars(transform = number(Range::POSITIVE), extend("default" = 1))]
     pub young: f64,
-    /// Fictitious force on every node that is free to move, in units of `young` times square metres. Default none.
+    /// Fictitious force on every node that is free to move, in units of `young` times square metres.
+    #[schemars(transform = number(Range::FINITE), extend("default" = [0, 0, 0]))]
     pub force: [f64; 3],
-    /// How the modulus depends on the element. Default `inverse_size`: small elements keep their shape and
-    /// large ones take the motion.
+    /// How the modulus depends on the element: small elements stay stiff and keep their shape, large ones take the motion.
+    #[schemars(extend("default" = StiffnessLaw::InverseSize))]
     pub stiffness: StiffnessLaw,
-    /// Which way the nodes may move. Default `free`: the paper's elasticity.
+    /// Which way nodes may move. The default is the paper's elasticity.
+    #[schemars(extend("default" = Motion::Free))]
     pub motion: Motion,
-    /// Most rounds of an optimisation, each with a new reference mesh. Default 20; 0 keeps the undeformed mesh as the
-    /// only reference.
+    /// Most rounds of an optimisation: in each the mesh moves from a reference mesh of its own (`docs/theory.md`, section
+    /// 5.5). 0: all designs move from the undeformed mesh, and bounds that it does not reach in one step are refused.
+    #[schemars(transform = integer(0, 1000), extend("default" = 20))]
     pub rounds: usize,
-    /// Largest share of the way to the first inverted element that a design may lie from the reference of its round, 0
-    /// to 1. Default 0.9.
+    /// How far a design may lie from the reference of its round: largest share of the way to the first inverted element.
+    #[schemars(transform = number(Range::open(0.0, 1.0)), extend("default" = 0.9))]
     pub inversion_share: f64,
-    /// Surfaces whose nodes stay in their plane. Default none.
+    /// Surfaces whose nodes stay in their plane.
+    #[schemars(default, transform = names)]
     pub slide: Vec<String>,
-    /// Surfaces whose nodes stay. Default none; the outside of the body is fixed unless it is named elsewhere.
+    /// Surfaces whose nodes stay. The body's outside, and faces between two regions inside it, are fixed where nothing else
+    /// is said.
+    #[schemars(default, transform = names)]
     pub fixed: Vec<String>,
-    /// Surfaces of the body's outside whose nodes move freely. Default none.
+    /// Such surfaces whose nodes move freely, for example along the side of a core whose end face moves.
+    #[schemars(default, transform = names)]
     pub free: Vec<String>,
-    /// Parts with their own constants. Default none.
+    /// Regions of the body with their own constants.
+    #[schemars(default)]
     pub subregions: Vec<Subregion>,
+}
+
+/// The part of the mesh that moves, as it is written.
+#[derive(JsonSchema)]
+#[schemars(transform = one_extent)]
+#[allow(dead_code, reason = "stands for the keys of `RemeshExtent` in the schema")]
+struct ExtentKeys {
+    /// The regions of the mesh that move. Either this or `box`.
+    #[schemars(transform = name_or_names)]
+    region: Option<Vec<String>>,
+    /// Instead of `region`: all elements with their centroid between these two corners [m], the lower one first.
+    #[schemars(transform = length(Range::FINITE))]
+    r#box: Option<[[f64; 3]; 2]>,
+}
+
+fn one_extent(schema: &mut Schema) {
+    Rules::of(schema).exactly_one(&["region", "box"]);
 }
 
 /// The part of the mesh that moves.
@@ -62,7 +102,7 @@ choice! {
         InverseSize = "inverse_size",
         /// Proportional to 1 / volume.
         InverseVolume = "inverse_volume",
-        /// Each principal direction of an element stiffer the shorter the element is along it.
+        /// Each principal direction of an element stiffer the shorter the element is along it: for thin layers that cross.
         Directional = "directional",
     }
 }
@@ -72,21 +112,31 @@ choice! {
     pub enum Motion {
         /// Every way.
         Free = "free",
-        /// Along `design.direction` only, which must then be x, y or z.
+        /// Along `design.direction` only, which must then be a vector along x, y or z. It keeps thin columns of cells from
+        /// inverting sideways.
         AlongDesign = "along_design",
     }
 }
 
-/// A region with its own elastic constants; what is `None` is as in the rest of the body.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A region of the body with its own constants; what is left out is as in the rest of the body.
+///
+/// ```toml
+/// [[remesh.subregions]]
+/// name = "plate"
+/// young = 100
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Subregion {
-    /// Name of the region.
+    /// Name of the region; each once.
     pub name: String,
-    /// Young's modulus.
+    /// Young's modulus. Default: `remesh.young`.
+    #[schemars(transform = number(Range::POSITIVE))]
     pub young: Option<f64>,
-    /// Poisson's ratio.
+    /// Poisson's ratio. Default: `remesh.poisson`.
+    #[schemars(transform = number(POISSON))]
     pub poisson: Option<f64>,
-    /// Fictitious force on every node.
+    /// Fictitious force on every node. Default: `remesh.force`.
+    #[schemars(transform = number(Range::FINITE))]
     pub force: Option<[f64; 3]>,
 }
 

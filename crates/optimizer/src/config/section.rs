@@ -17,10 +17,10 @@ use super::source::suggest;
 use super::tree::{Node, Table, Value, join, shown};
 
 /// Longest list that is read: far beyond any use, and small enough to keep messages and memory bounded.
-const LONGEST_LIST: usize = 100_000;
+pub(crate) const LONGEST_LIST: usize = 100_000;
 
 /// Longest length and farthest coordinate of a device [m]: far beyond any use, and its powers stay far from overflow.
-const LONGEST_LENGTH: f64 = 1e6;
+pub(crate) const LONGEST_LENGTH: f64 = 1e6;
 
 /// What stands in for a required value that is missing or faulty.
 pub(super) trait Placeholder {

@@ -20,6 +20,7 @@ use crate::observer::{Evaluation, Observer, column};
 use crate::output::{RunStatus, StopReason};
 use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Want};
 use crate::rounds::RoundEvent;
+use crate::stage::Stage;
 use replay::Setting;
 
 /// What the first evaluation fixes for the rest of the run.
@@ -214,9 +215,12 @@ impl<'a> Run<'a> {
     fn compute(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         self.check_limits()?;
         let clock = Instant::now();
+        self.observer.stage(Stage::Moving);
         let moved = self.mesh(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.problem.analyse_with(&mut self.memory, p, moved, Want::Gradient)?;
+        let Self { problem, memory, observer, .. } = self;
+        let told = &mut |stage| observer.stage(stage);
+        let mut analysis = problem.analyse_watched(memory, p, moved, Want::Gradient, told)?;
         analysis.timings.remesh += remesh;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
@@ -234,6 +238,7 @@ impl<'a> Run<'a> {
         for event in &analysis.solver_events {
             self.observer.notice(&event.to_string());
         }
+        self.observer.stage(Stage::Writing);
         self.recorder.record(&record, &analysis, self.problem)?;
         self.observer.evaluation(&record.row);
         self.keep(record, sample.clone(), standing, |_| Field::Computed(Box::new(analysis)));

@@ -17,7 +17,7 @@ pub(super) const UNFINISHED: &str = ".fluxmorph-";
 ///
 /// # Errors
 /// When the operating system refuses; the older file then is as it was, or the new one is whole in its place.
-pub(super) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub(crate) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let folder = folder_of(path);
     let unfinished = unfinished(path);
     let aside = || -> io::Result<()> {

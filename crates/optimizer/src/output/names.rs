@@ -57,18 +57,19 @@ pub(super) fn field_number(name: &str) -> Option<usize> {
 
 /// The command that goes on with a run, as a shell takes it.
 pub fn resume_command(directory: &Path) -> String {
+    format!("fluxmorph resume {}", shell_word(directory))
+}
+
+/// A path as one word of a shell's command line.
+pub(crate) fn shell_word(path: &Path) -> String {
     // A name that begins with a dash would be taken for an option.
-    let path = match directory.display().to_string() {
+    let path = match path.display().to_string() {
         path if path.starts_with('-') => format!("./{path}"),
         path if path.is_empty() => ".".to_owned(),
         path => path,
     };
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
-    if path.chars().all(is_plain) {
-        format!("fluxmorph resume {path}")
-    } else {
-        format!("fluxmorph resume '{}'", path.replace('\'', "'\\''"))
-    }
+    if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }
 
 #[cfg(test)]

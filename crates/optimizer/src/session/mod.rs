@@ -21,6 +21,8 @@ use crate::exports;
 use crate::finite;
 use crate::fresh_mesh::{Check, Gain, Shapes};
 use crate::journal::{self, Identity};
+use crate::memory::Memory;
+use crate::memory_estimate::{of_evaluation, of_fresh_mesh};
 use crate::memory_limit;
 use crate::observer::{Observer, Started};
 use crate::output::{
@@ -29,7 +31,8 @@ use crate::output::{
 };
 use crate::problem::{Problem, Want};
 use crate::rounds::RoundEvent;
-use crate::setup::{Purpose, Setup, set_up};
+use crate::setup::{Purpose, Setup, set_up_watched};
+use crate::stage::Stage;
 use recorder::{DirectoryRecorder, write_collection, write_field};
 pub use resume::{Limits, SavedRun, resume};
 use summary::{constraints, linear_solver, terms};
@@ -59,8 +62,9 @@ pub fn run(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let mut setup = set_up(config, source, Purpose::Optimisation)?;
-    memory_limit::check_problem(setup.problem.memory_estimate(), source, options.older_run)?;
+    let told = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(config, source, Purpose::Optimisation, told)?;
+    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     Error::unless(options.interrupted)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
@@ -89,8 +93,9 @@ pub fn solve(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let mut setup = set_up(config, source, Purpose::Analysis)?;
-    memory_limit::check_problem(setup.problem.memory_estimate(), source, options.older_run)?;
+    let told = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(config, source, Purpose::Analysis, told)?;
+    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     Error::unless(options.interrupted)?;
     let values = match (&setup.problem.shape, design) {
         (Some(shape), given) => {
@@ -116,7 +121,9 @@ pub fn solve(
         approach.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
-        let analysis = problem.analyse(p, moved, Want::Gradient)?;
+        let told = &mut |stage| observer.stage(stage);
+        let analysis = problem.analyse_watched(&mut Memory::default(), p, moved, Want::Gradient, told)?;
+        observer.stage(Stage::Writing);
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
         }
@@ -193,7 +200,8 @@ impl<'a> Session<'a> {
         let mesh = setup.problem.original.topology();
         observer.started(&Started {
             title: &config.title,
-            algorithm: (*command == "run").then(|| config.optimizer.algorithm.name()),
+            optimizer: (*command == "run").then_some(&config.optimizer),
+            objective: config.objective.as_ref(),
             variables: setup.problem.shape.as_ref().map_or(0, |s| s.surface.variable_count()),
             nodes: mesh.node_count(),
             tets: mesh.tets().len(),
@@ -313,9 +321,11 @@ impl<'a> Session<'a> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
         finite::result(&result)?;
         result.write(&self.directory)?;
+        let memory = of_fresh_mesh(self.config, &self.setup.problem).unwrap_or(0);
         (self.setup.problem.states, self.setup.problem.shape) = (Vec::new(), None);
         let clock = Instant::now();
-        let gain = Gain { config: self.config, source: self.source, stop_reason: result.stop_reason, shapes };
+        let (config, source) = (self.config, self.source);
+        let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
         if let Some(objective) = &mut result.objective
             && gain.verify(objective, interrupted, observer) == Check::CutShort
         {

@@ -9,13 +9,14 @@ use super::{Options, Session, constraint_names, unreached};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
+use crate::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::setup::{Purpose, set_up};
+use crate::setup::{Purpose, set_up_watched};
 
 /// Largest configuration and largest result that are read [bytes].
 const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
@@ -86,8 +87,9 @@ pub fn resume(
         return Ok(result);
     }
     observer.phase("setting up mesh and matrices");
-    let mut setup = set_up(&config, &source, Purpose::Optimisation)?;
-    memory_limit::check_problem(setup.problem.memory_estimate(), &source, options.older_run)?;
+    let told = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, told)?;
+    memory_limit::check_problem(of_evaluation(&setup.problem), &source, options.older_run)?;
     if (options.interrupted)() {
         return Err(Error::InterruptedRun);
     }

@@ -23,6 +23,7 @@ use fluxmorph_solver::{FieldModel, Material};
 use crate::config::{self, Config, Fault, RegionModel, Source};
 use crate::error::Error;
 use crate::problem::Problem;
+use crate::stage::{Stage, Told};
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]
@@ -81,9 +82,23 @@ pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
 /// # Errors
 /// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
 pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setup, Error> {
+    set_up_watched(config, source, purpose, &mut |_| ())
+}
+
+/// As [`set_up`]; `told` hears of every stage as it begins.
+///
+/// # Errors
+/// As [`set_up`].
+pub fn set_up_watched(
+    config: &Config,
+    source: &Source,
+    purpose: Purpose,
+    told: Told<'_>,
+) -> Result<Setup, Error> {
     if purpose == Purpose::Optimisation {
         config.optimisation(source)?;
     }
+    told(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;
 
@@ -102,6 +117,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
         return Err(source.error(vec![fault]).into());
     }
+    told(Stage::Unknowns);
     let states = field::field_models(config, &mesh, &conductors)?;
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
@@ -115,10 +131,12 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
     if let (Some(design), Some(remesh)) = (&config.design, &config.remesh) {
         let inputs = shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh };
         let observed = functional::observed(config, &mesh, &states)?;
+        told(Stage::Elasticity);
         let made = shape::shape(&inputs, config, &states[0], &observed, &mut warnings)?;
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
         shape = Some(made);
     }
+    told(Stage::Other);
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }

@@ -104,13 +104,29 @@ impl SystemAnalysis {
         self.method
     }
 
-    /// Bytes that a solution needs: the matrix and the preconditioner.
+    /// Unknowns of the system.
+    pub fn unknown_count(&self) -> usize {
+        self.structure.row_count()
+    }
+
+    /// Bytes of the matrix.
+    pub fn matrix_bytes(&self) -> usize {
+        self.structure.columns.len() * MATRIX_ENTRY
+    }
+
+    /// Bytes of the preconditioner of a method on this pattern; of two levels only where that is the method.
     ///
     /// # Errors
-    /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
-    pub fn memory_estimate(&self) -> Result<usize, SolverError> {
-        let matrix = self.structure.columns.len() * MATRIX_ENTRY;
-        Ok(matrix + self.preconditioner_bytes(self.method)?)
+    /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
+    pub fn preconditioner_bytes(&self, method: Method) -> Result<usize, MeshError> {
+        let entries = |bytes: usize| Ok(self.complete()?.factor_entries() * bytes);
+        match method {
+            Method::Direct => entries(16),
+            Method::DirectSingle | Method::RealFactor => entries(8),
+            Method::RealFactorSingle => entries(4),
+            Method::Incomplete => Ok(self.structure.columns.len() / 2 * SINGLE_ENTRY),
+            Method::TwoLevel => Ok(self.two_level.as_ref().map_or(0, |levels| levels.bytes())),
+        }
     }
 
     /// Whether factors serve several designs.
@@ -143,17 +159,6 @@ impl SystemAnalysis {
     /// Whether the preconditioner of a method stays within the settings' bytes; not where it cannot be made at all.
     pub(super) fn fits(&self, method: Method) -> bool {
         self.preconditioner_bytes(method).is_ok_and(|bytes| bytes <= self.settings.factor_bytes)
-    }
-
-    fn preconditioner_bytes(&self, method: Method) -> Result<usize, MeshError> {
-        let entries = |bytes: usize| Ok(self.complete()?.factor_entries() * bytes);
-        match method {
-            Method::Direct => entries(16),
-            Method::DirectSingle | Method::RealFactor => entries(8),
-            Method::RealFactorSingle => entries(4),
-            Method::Incomplete => Ok(self.structure.columns.len() / 2 * SINGLE_ENTRY),
-            Method::TwoLevel => Ok(self.two_level.as_ref().map_or(0, |levels| levels.bytes())),
-        }
     }
 
     /// Costs of a method on this pattern.
@@ -214,4 +219,4 @@ fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, Solv
 }
 
 /// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper.
-const TWO_LEVELS_FROM: usize = 60_000;
+pub const TWO_LEVELS_FROM: usize = 60_000;

@@ -25,7 +25,7 @@ use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::SolverError;
-pub use analysis::SystemAnalysis;
+pub use analysis::{SystemAnalysis, TWO_LEVELS_FROM};
 pub use memory::SolverMemory;
 pub(crate) use method::FieldKind;
 pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};

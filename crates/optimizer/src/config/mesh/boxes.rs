@@ -3,72 +3,123 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::generate::{AxisSize, BoxRegion, BoxesParameters, SizeLimit, SurfacePatch};
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::config::Dimension;
 use crate::config::coil::AxisWord;
 use crate::config::range::Range;
 use crate::config::section::Section;
+use crate::schema::form::{integer, length, length_per_axis, number};
+
+use super::REFINEMENTS;
 
 /// Default ratio of neighbouring cells.
 const GROWTH: f64 = 1.6;
+/// Ratios that end: cells that do not grow would fill the air.
+const GROWTHS: Range = Range::closed(1.01, 100.0);
 
-/// A graded box with regions, as in [`BoxesParameters`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Any device with faces along the axes: boxes of regions, laid one over the other on a graded grid. Every face of every
+/// box lies on mesh lines. Sizes are upper limits; away from the places that have one, cells grow by a constant ratio, so
+/// that the outer air needs no size. The grid is a product of lines along x, y and z: a size along one axis holds across
+/// the whole mesh.
+///
+/// Regions: `air`, and those of `[[mesh.boxes.regions]]`. Surfaces: `x_min`, `x_max`, `y_min`, `y_max`, `z_min`, `z_max`,
+/// and those of `[[mesh.boxes.surfaces]]`.
+///
+/// ```toml
+/// [mesh]
+/// generator = "boxes"
+///
+/// [mesh.boxes]
+/// box = [["-1 m", "-1 m", "-1 m"], ["1 m", "1 m", "1 m"]]
+///
+/// [[mesh.boxes.regions]]
+/// name = "plate"
+/// box = [["-100 mm", "-100 mm", "0 mm"], ["100 mm", "100 mm", "10 mm"]]
+/// size = ["20 mm", "20 mm", "5 mm"]
+/// skin = "2 mm"
+///
+/// [[mesh.boxes.sizes]]
+/// axis = "z"
+/// from = "10 mm"
+/// to = "60 mm"
+/// size = "10 mm"
+///
+/// [[mesh.boxes.surfaces]]
+/// name = "plate_top"
+/// box = [["-100 mm", "-100 mm", "10 mm"], ["100 mm", "100 mm", "10 mm"]]
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct BoxesMesh {
-    /// Lower and upper corner of the whole [m].
+    /// Lower and upper corner of the whole mesh [m].
     #[serde(rename = "box")]
+    #[schemars(transform = length(Range::FINITE))]
     pub corners: [[f64; 3]; 2],
-    /// Ratio of neighbouring cells away from the places that have a size. Default 1.6.
+    /// Ratio of neighbouring cells away from the places that have a size.
+    #[schemars(transform = number(GROWTHS), extend("default" = GROWTH))]
     pub growth: f64,
-    /// All sizes are divided by it. Default 1.
+    /// All sizes are divided by it, and the growth becomes its root.
+    #[schemars(transform = number(REFINEMENTS), extend("default" = 1))]
     pub refinement: f64,
     /// Regions; later ones lie over earlier ones.
+    #[schemars(default)]
     pub regions: Vec<BoxOfRegion>,
-    /// Further sizes along the axes.
+    /// Sizes along the axes beside those of the regions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub sizes: Vec<SizeAlong>,
     /// Named surfaces beside the six outer faces.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(default)]
     pub surfaces: Vec<Patch>,
 }
 
-/// A region, or a part of one.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A region, or a part of one: boxes may share a name. Later boxes lie over earlier ones; one named `air` is a hole.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct BoxOfRegion {
     /// Name of the region; `air` is a hole.
     pub name: String,
-    /// Lower and upper corner [m].
+    /// Lower and upper corner [m], within the whole mesh.
     #[serde(rename = "box")]
+    #[schemars(transform = length(Range::FINITE))]
     pub corners: [[f64; 3]; 2],
-    /// Largest cell within along x, y and z [m].
+    /// Largest cell within the box, along x, y and z [m]. Default: no limit.
+    #[schemars(transform = length_per_axis)]
     pub size: Option<[f64; 3]>,
-    /// Largest first cell on either side of the faces across x, y and z [m].
+    /// Largest first cell on either side of the box's faces, across x, y and z [m]. Default: no limit.
+    #[schemars(transform = length_per_axis)]
     pub skin: Option<[f64; 3]>,
-    /// Observation cells along x, y and z.
+    /// Observation cells along x, y and z; a mesh cell lies in one of them. Default: every element is one.
+    #[schemars(transform = integer(1, 1000))]
     pub cells: Option<[usize; 3]>,
 }
 
-/// A size along a part of one axis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A size along a part of one axis, such as a coil or a line of probes.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct SizeAlong {
     /// The axis.
     pub axis: AxisWord,
-    /// First coordinate [m].
+    /// First coordinate, within the whole mesh [m]; a mesh line lies there.
+    #[schemars(transform = length(Range::FINITE))]
     pub from: f64,
-    /// Last coordinate [m].
+    /// Last coordinate, at least `from`, within the whole mesh [m]; a mesh line lies there. Default: `from`.
+    #[schemars(with = "Option<f64>", transform = length(Range::FINITE))]
     pub to: f64,
-    /// Largest cell there [m]; without it there are only lines at both ends.
+    /// Largest cell in between [m]. Default: no limit, and there are only the lines at both ends.
+    #[schemars(transform = length(Range::POSITIVE))]
     pub size: Option<f64>,
 }
 
-/// A named surface: all faces between regions, or outside, within a box.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A named surface: all faces between two regions, and outer faces, within a box. They point outwards, and between two
+/// regions out of the later one.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Patch {
-    /// Name of the surface.
+    /// Name of the surface; each once.
     pub name: String,
-    /// Lower and upper corner [m], equal along an axis for a plane.
+    /// Lower and upper corner [m], within the whole mesh; both are equal along an axis for a plane patch.
     #[serde(rename = "box")]
+    #[schemars(transform = length(Range::FINITE))]
     pub corners: [[f64; 3]; 2],
 }
 
@@ -116,8 +167,8 @@ impl BoxesMesh {
         let default = Self::default();
         let corners = section.corners("box");
         let boxes = Self {
-            growth: section.number("growth", Range::closed(1.01, 100.0)).unwrap_or(default.growth),
-            refinement: section.number("refinement", Range::closed(0.25, 20.0)).unwrap_or(default.refinement),
+            growth: section.number("growth", GROWTHS).unwrap_or(default.growth),
+            refinement: section.number("refinement", REFINEMENTS).unwrap_or(default.refinement),
             regions: section.tables("regions").into_iter().map(|s| BoxOfRegion::read(s, corners)).collect(),
             sizes: section.tables("sizes").into_iter().map(|s| SizeAlong::read(s, corners)).collect(),
             surfaces: section.tables("surfaces").into_iter().map(|s| Patch::read(s, corners)).collect(),

@@ -1,34 +1,69 @@
 //! `[mesh.sphere]`: an octant of a solid or hollow ball in a larger one.
 
 use fluxmorph_geometry::generate::SphereParameters;
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
-use super::layers;
+use super::{GROWTHS, REFINEMENTS, layers};
 use crate::config::Dimension;
 use crate::config::range::Range;
 use crate::config::section::Section;
+use crate::schema::form::{integer, length, no_default, number};
+use crate::schema::rules::Rules;
 
-/// Radii and layers of the sphere, as in [`SphereParameters`], whose defaults they take.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A solid or hollow sphere in a larger ball: the octant x, y, z ≥ 0, whose symmetry planes are the coordinate planes. All
+/// nodes lie on spheres about the origin; faces are flat, so that volumes and areas err with the square of the cell size.
+/// Every key has a default.
+///
+/// Regions: `sphere`, `air`, and `cavity` of a hollow sphere. Surfaces: `x_min`, `y_min`, `z_min` (the symmetry planes),
+/// `outer`, `sphere` and, of a hollow sphere, `cavity`.
+///
+/// ```toml
+/// [mesh]
+/// generator = "sphere"
+///
+/// [mesh.sphere]
+/// radius = "50 mm"
+/// inner_radius = "45 mm"
+/// wall_layers = 6
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default, transform = layers_of_a_wall)]
 pub struct SphereMesh {
     /// Outer radius of the sphere [m].
+    #[schemars(transform = length(Range::POSITIVE))]
     pub radius: f64,
-    /// Radius of the cavity of a hollow sphere [m]; solid without.
+    /// Radius of the cavity of a hollow sphere [m], less than `radius`. Default: the sphere is solid.
+    #[schemars(transform = length(Range::POSITIVE))]
     pub inner_radius: Option<f64>,
-    /// Radius of the whole mesh [m]. Default: five radii of the sphere.
+    /// Radius of the whole mesh [m], more than `radius`. Default: five times `radius`.
+    #[schemars(with = "Option<f64>", transform = length(Range::POSITIVE), transform = no_default)]
     pub outer_radius: f64,
-    /// Cells along an eighth of a great circle, and along the radius of the core.
+    /// Cells along an eighth of a great circle, and along the radius inside the layers.
+    #[schemars(transform = integer(1, 1000))]
     pub divisions: usize,
-    /// Depths of layers under the surface, or under both surfaces of a hollow sphere [m].
+    /// Depths of layers under the surface, or under both surfaces of a hollow sphere [m]: growing, less than the radius, or
+    /// at most half the wall.
+    #[schemars(transform = length(Range::POSITIVE))]
     pub skin: Vec<f64>,
-    /// Equal layers of the wall of a hollow sphere without skin; nothing for any other sphere, for which the key is refused.
+    /// Equal layers of the wall of a hollow sphere without `skin`, and of no other. Default there: 4.
+    #[schemars(transform = integer(1, 1000))]
     pub wall_layers: Option<usize>,
-    /// Thickness of the first layer outside [m]. Default: the length of the surface's cells.
+    /// Thickness of the first layer outside [m]. Default: the length of the cells of the surface.
+    #[schemars(transform = length(Range::POSITIVE))]
     pub air_layer: Option<f64>,
-    /// Ratio of neighbouring layers outside.
+    /// Ratio of neighbouring layers outside; none is thicker than 3.5 times the length of its cells.
+    #[schemars(transform = number(GROWTHS))]
     pub growth: f64,
-    /// Divisions are multiplied and layers divided by it.
+    /// Divisions are multiplied by it, layers divided into as many, and the growth becomes its root.
+    #[schemars(transform = number(REFINEMENTS))]
     pub refinement: f64,
+}
+
+fn layers_of_a_wall(schema: &mut Schema) {
+    let hollow = json!({ "required": ["inner_radius"], "properties": { "skin": { "maxItems": 0 } } });
+    Rules::of(schema).add(json!({ "dependentSchemas": { "wall_layers": hollow } }));
 }
 
 impl Default for SphereMesh {
@@ -98,8 +133,8 @@ impl SphereMesh {
             skin,
             wall_layers: wall_layers.or(default_layers),
             air_layer: length("air_layer"),
-            growth: section.number("growth", Range::closed(1.0, 100.0)).unwrap_or(default.growth),
-            refinement: section.number("refinement", Range::closed(0.25, 20.0)).unwrap_or(default.refinement),
+            growth: section.number("growth", GROWTHS).unwrap_or(default.growth),
+            refinement: section.number("refinement", REFINEMENTS).unwrap_or(default.refinement),
         };
         section.finish();
         sphere

@@ -1,29 +1,78 @@
 //! `[[morph.motion]]`: which nodes move, and along which path.
 
+use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::json;
 
 use super::super::choice::choice;
-use super::super::coil::{Axis, read_axis};
+use super::super::coil::{Axis, AxisWord, read_axis};
 use super::super::quantity::Dimension;
 use super::super::range::Range;
 use super::super::section::Section;
+use crate::schema::form::{length, name_or_names, not_empty, number, quantity};
+use crate::schema::rules::{Rules, Then};
 
-/// Nodes and their motion. With `t` from 0 to 1 a node at `x` goes to
-/// `c_r + R(t · angle) (c_s + (1 + (factor − 1) t) (x − c_s) − c_r) + t · displacement`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Nodes and their motion. Exactly one of `surface`, `line`, `nodes`, `box` and `design` says which nodes; later motions
+/// win at nodes of several. All three components of such a node are prescribed. A node belongs to a line, box or point up
+/// to a millionth of the mesh's diagonal.
+///
+/// With t from 0 to 1 a node is scaled by 1 + (factor − 1) t, then turned by t times the angle, then shifted by t times the
+/// displacement. At least one of the three is needed where there is no `design`, and none beside it.
+///
+/// ```toml
+/// [[morph.motion]]
+/// surface = "z_max"
+/// displacement = ["0 mm", "0 mm", "5 mm"]
+///
+/// [[morph.motion]]
+/// box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "10 mm", "0 mm"]]
+/// rotation = { axis = "z", angle = "30 deg" }
+/// ```
+// A node at x goes to c_r + R(t · angle) (c_s + (1 + (factor − 1) t) (x − c_s) − c_r) + t · displacement.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PrescribedMotion {
     /// Which nodes.
     #[serde(flatten)]
+    #[schemars(with = "TargetKeys")]
     pub target: Target,
-    /// Translation [m]. Default none.
+    /// Translation [m].
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = length(Range::FINITE))]
     pub displacement: Option<[f64; 3]>,
-    /// Finite rotation, after the scaling. Default none.
+    /// Finite rotation, after the scaling.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation: Option<Rotation>,
-    /// Scaling, before all else. Default none.
+    /// Scaling, before all else.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<Scale>,
+}
+
+/// Which nodes move, as it is written.
+#[derive(JsonSchema)]
+#[schemars(transform = one_target)]
+#[allow(dead_code, reason = "stands for the keys of `Target` in the schema")]
+struct TargetKeys {
+    /// All nodes of these surfaces, interfaces `"a|b"` included.
+    #[schemars(transform = name_or_names)]
+    surface: Option<Vec<String>>,
+    /// All nodes on the segment between two points [m].
+    #[schemars(transform = length(Range::FINITE))]
+    line: Option<[[f64; 3]; 2]>,
+    /// The nodes at these points [m].
+    #[schemars(transform = length(Range::FINITE), transform = not_empty)]
+    nodes: Option<Vec<[f64; 3]>>,
+    /// All nodes between two corners [m], the lower one first; the box may be flat.
+    #[schemars(transform = length(Range::FINITE))]
+    r#box: Option<[[f64; 3]; 2]>,
+    /// The nodes of `[design]`, moved by a design.
+    design: Option<DesignMotion>,
+}
+
+fn one_target(schema: &mut Schema) {
+    Rules::of(schema)
+        .exactly_one(&TARGETS)
+        .with("design", Then { required: &[], refused: &TRANSFORMS })
+        .add(json!({ "if": { "required": ["design"] }, "else": { "anyOf": TRANSFORMS.map(|key| json!({ "required": [key] })) } }));
 }
 
 /// Which nodes move.
@@ -47,13 +96,14 @@ pub enum Target {
 }
 
 /// A design of `[design]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
+#[schemars(inline)]
 pub enum DesignMotion {
     /// One made from the bounds.
     Word(DesignWord),
-    /// The variables [m].
-    Values(Vec<f64>),
+    /// The variables [m], one length for each.
+    Values(#[schemars(transform = length(Range::FINITE))] Vec<f64>),
 }
 
 choice! {
@@ -69,22 +119,27 @@ choice! {
 }
 
 /// A rotation by a finite angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Rotation {
-    /// Its axis. Default z.
+    /// Direction of the axis; the length of a vector does not matter.
+    #[schemars(extend("default" = AxisWord::Z))]
     pub axis: Axis,
-    /// A point on the axis [m]. Default the origin.
+    /// A point on the axis [m].
+    #[schemars(transform = length(Range::FINITE), extend("default" = [0, 0, 0]))]
     pub center: [f64; 3],
-    /// Right-handed angle [rad].
+    /// Right-handed angle [rad]; more than a turn is more than a turn.
+    #[schemars(transform = quantity(Dimension::Angle, Range::FINITE))]
     pub angle: f64,
 }
 
 /// A scaling about a point.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Scale {
-    /// The point that stays [m]. Default the origin.
+    /// The point that stays [m].
+    #[schemars(transform = length(Range::FINITE), extend("default" = [0, 0, 0]))]
     pub center: [f64; 3],
     /// Ratio of lengths after to before.
+    #[schemars(transform = number(Range::POSITIVE))]
     pub factor: f64,
 }
 

@@ -1,25 +1,46 @@
 //! `[morph.tune]`: what `fluxmorph morph --tune` may change, and how far.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::choice::{Choice, choice};
 use super::super::range::Range;
 use super::super::section::Section;
+use crate::config::remesh::POISSON;
+use crate::schema::form::{each_once, integer, not_empty, number};
 
-/// What the tuner may change.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Exponents of a ratio of moduli.
+const DECADES: Range = Range::closed(-9.0, 9.0);
+/// Multiples of the force that counts.
+const FORCES: Range = Range::closed(-1e6, 1e6);
+
+/// What `fluxmorph morph --tune` may change. The search is for the motion outside of the cases.
+///
+/// ```toml
+/// [morph.tune]
+/// parameters = ["young", "poisson", "force"]
+/// evaluations = 200
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(default)]
 pub struct Tune {
-    /// The parameters of every subregion that are searched. Default `young` and `poisson`.
+    /// Which parameters of every region of the body are searched; each once. The modulus of the first region is kept.
+    #[schemars(transform = not_empty, transform = each_once)]
     pub parameters: Vec<TunedParameter>,
-    /// Evaluations of the worst quality, for every stiffness policy. Default 60: three subregions have five parameters,
-    /// and the quadratic model of the search needs about twice that to begin.
+    /// Evaluations of the worst quality, for each stiffness. Three regions have five parameters, and the quadratic model of
+    /// the search needs about twice that to begin.
+    #[schemars(transform = integer(1, 100_000))]
     pub evaluations: usize,
-    /// Bounds of log10 of a subregion's Young's modulus over that of the first. Default −3 to 3.
+    /// Bounds of log10 of a region's Young's modulus over that of the first, the lower one first.
+    #[schemars(transform = number(DECADES))]
     pub log10_young: [f64; 2],
-    /// Bounds of Poisson's ratio. Default −0.2 to 0.45: beyond, the body nearly loses a stiffness.
+    /// Bounds of Poisson's ratio, the lower one first. Beyond the default the body nearly loses a stiffness.
+    #[schemars(transform = number(POISSON))]
     pub poisson: [f64; 2],
-    /// Bounds of the force, as multiples of the force at which the body yields about as far as it is moved.
-    /// Default −3 to 3.
+    /// Bounds of the force along the mean motion, the lower one first, in units of E₁ u V / (N L²): modulus of the first
+    /// region, longest displacement, volume per node and largest extent of the body. A force of 1 makes the body yield about
+    /// as far as it is moved.
+    #[schemars(transform = number(FORCES))]
     pub force: [f64; 2],
 }
 
@@ -53,10 +74,9 @@ impl Tune {
         let tune = Self {
             parameters: read_parameters(&section).unwrap_or(default.parameters),
             evaluations: section.integer("evaluations", 1, 100_000).unwrap_or(default.evaluations),
-            log10_young: bounds(&section, "log10_young", Range::closed(-9.0, 9.0))
-                .unwrap_or(default.log10_young),
-            poisson: bounds(&section, "poisson", Range::open(-1.0, 0.5)).unwrap_or(default.poisson),
-            force: bounds(&section, "force", Range::closed(-1e6, 1e6)).unwrap_or(default.force),
+            log10_young: bounds(&section, "log10_young", DECADES).unwrap_or(default.log10_young),
+            poisson: bounds(&section, "poisson", POISSON).unwrap_or(default.poisson),
+            force: bounds(&section, "force", FORCES).unwrap_or(default.force),
         };
         section.finish();
         tune

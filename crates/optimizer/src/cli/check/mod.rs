@@ -1,0 +1,44 @@
+//! `fluxmorph check`: what a configuration means, without solving.
+//!
+//! `summary` finds it, `text` puts it into words, `table` aligns columns.
+
+mod summary;
+mod table;
+mod text;
+
+use std::io::Write;
+
+use super::args::{CheckArgs, Progress};
+use super::exit::ExitCode;
+use super::{stdout, with_threads};
+use crate::error::Error;
+use crate::observer::{Bar, Observer, Paint, Silent};
+
+/// Set the problem up and print what it is, as a table or JSON.
+///
+/// # Errors
+/// When the configuration or the mesh is wrong, or standard output cannot be written to.
+pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
+    let (config, source) = args.common.load()?;
+    let work = &args.common.work;
+    with_threads(work.threads, |_| {
+        // A mesh of a million elements takes some seconds; lines of progress would only hide the table.
+        let mut observer: Box<dyn Observer> = match (work.progress(), Bar::stderr()) {
+            (Progress::Auto | Progress::Bar, Some(bar)) => Box::new(bar),
+            _ => Box::new(Silent),
+        };
+        let told = &mut |stage| observer.stage(stage);
+        let summary = summary::summary(&config, &source, work.older_run(), told)?;
+        drop(observer);
+        if work.json {
+            stdout::print_json(&summary)?;
+        } else {
+            stdout::print(&text::text(&summary, &args.common.config))?;
+            let paint = Paint::for_stderr();
+            for warning in &summary.warnings {
+                let _ = writeln!(std::io::stderr(), "{}", paint.warning(warning));
+            }
+        }
+        Ok(ExitCode::Success)
+    })
+}

@@ -1,0 +1,75 @@
+//! Columns of text that are as wide as their longest cell.
+
+/// Where the cells of a column stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Align {
+    /// Words.
+    Left,
+    /// Numbers.
+    Right,
+}
+
+/// A table with a header.
+#[derive(Debug)]
+pub(super) struct Table<const N: usize> {
+    columns: [Align; N],
+    rows: Vec<[String; N]>,
+}
+
+impl<const N: usize> Table<N> {
+    /// A table of the columns with these names.
+    pub(super) fn new(columns: [(&str, Align); N]) -> Self {
+        Self {
+            columns: columns.map(|(_, align)| align),
+            rows: vec![columns.map(|(name, _)| name.to_owned())],
+        }
+    }
+
+    /// A further row.
+    pub(super) fn row(&mut self, cells: [String; N]) {
+        self.rows.push(cells);
+    }
+
+    /// The lines, each with its break, after an empty one; nothing where the table has no row.
+    pub(super) fn text(&self) -> String {
+        if self.rows.len() == 1 {
+            return String::new();
+        }
+        let width =
+            |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths: [usize; N] = std::array::from_fn(width);
+        let mut text = String::from("\n");
+        for row in &self.rows {
+            let mut line = String::new();
+            for (column, cell) in row.iter().enumerate() {
+                let blanks = " ".repeat(widths[column] - cell.chars().count());
+                line += if column == 0 { "" } else { "  " };
+                line += &match self.columns[column] {
+                    Align::Left => format!("{cell}{blanks}"),
+                    Align::Right => format!("{blanks}{cell}"),
+                };
+            }
+            text += line.trim_end();
+            text.push('\n');
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_as_wide_as_their_longest_cell() {
+        let mut table = Table::new([("region", Align::Left), ("tets", Align::Right), ("in", Align::Left)]);
+        assert_eq!(table.text(), "");
+        table.row(["a region with a name as long as this".to_owned(), "7".to_owned(), "µ".to_owned()]);
+        table.row(["b".to_owned(), "12345".to_owned(), String::new()]);
+        let text = table.text();
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[1], format!("{:<36}  {:>5}  in", "region", "tets"));
+        assert_eq!(lines[2], "a region with a name as long as this      7  µ");
+        assert_eq!(lines[3], format!("{:<36}  12345", "b"));
+    }
+}

@@ -1,0 +1,266 @@
+//! What `check` found, for people: a block of lines with names in front, then tables.
+
+use std::path::Path;
+
+use super::summary::{FieldProblem, Summary};
+use super::table::{Align, Table};
+use crate::config::{CoilShape, Constraint, DesignDirection, Goal, Limit, RemeshExtent, UpperBound};
+use crate::output::shell_word;
+
+/// Names stand in a column of this width: the longest is `design variables`.
+const NAMES: usize = 18;
+
+/// Everything, with the command to type next.
+pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
+    let mut text = format!("{}\n\n", summary.title);
+    let mut row = |name: &str, value: String| text += &format!("{name:<NAMES$}{value}\n");
+    mesh(summary, &mut row);
+    field(summary, &mut row);
+    shape(summary, &mut row);
+    row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
+    row("output", summary.output_directory.clone());
+    text += &region_table(summary).text();
+    text += &surface_table(summary).text();
+    text += &coil_table(summary).text();
+    text += &skin_table(summary).text();
+    text += &motion_table(summary).text();
+    let command = match (summary.motions.is_empty(), summary.objective.is_some() && summary.design.is_some())
+    {
+        (false, _) => "morph",
+        (true, true) => "run",
+        (true, false) => "solve",
+    };
+    let warnings = match summary.warnings.len() {
+        0 => String::new(),
+        1 => ", with 1 warning".to_owned(),
+        count => format!(", with {count} warnings"),
+    };
+    text + &format!("\nok{warnings}; next: fluxmorph {command} {}\n", shell_word(config))
+}
+
+fn mesh(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
+    match &summary.mesh_file {
+        Some(file) => row("mesh file", format!("{}, coordinates in {}", file.path, file.unit)),
+        None => row("mesh", format!("made by the generator {}", summary.mesh_origin)),
+    }
+    row("size", format!("{} nodes, {} tetrahedra", summary.nodes, summary.tets));
+    let [lower, upper] = summary.bounding_box_m.map(millimetres);
+    row("bounding box", format!("{lower} to {upper} mm"));
+    let q = &summary.quality;
+    let at = millimetres(q.worst_at_m);
+    row("worst quality", format!("{:.4} in the {}: element {} at {at} mm", q.worst, q.of, q.worst_element));
+    let [poor, fair, good] = [q.up_to_0_3, q.from_0_3_to_0_6, q.from_0_6].map(|share| 100.0 * share);
+    row("shares of quality", format!("{poor:.1} % up to 0.3, {fair:.1} % to 0.6, {good:.1} % above"));
+}
+
+fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
+    if summary.field_problem == FieldProblem::None {
+        row("field problem", "none: only the mesh moves".to_owned());
+        return;
+    }
+    let frequencies: Vec<String> = summary.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
+    let rest = if summary.frequencies_hz == [0.0] { " (magnetostatic)" } else { "" };
+    row("frequency", format!("{}{rest}", frequencies.join(", ")));
+    row("unknowns", format!("{} of the field, elements of order {}", summary.unknowns, summary.order));
+    let conditions = summary.boundaries;
+    for (name, surfaces) in
+        [("flux parallel", &conditions.flux_parallel), ("flux normal", &conditions.flux_normal)]
+    {
+        if !surfaces.is_empty() {
+            row(name, surfaces.join(", "));
+        }
+    }
+    if let Some(field) = &conditions.uniform_field {
+        let [x, y, z] = field.b;
+        row("uniform field", format!("({x}, {y}, {z}) T on {}", field.surfaces.join(", ")));
+    }
+    row("linear solver", summary.linear_solvers.join(", "));
+    match summary.objective {
+        Some(objective) => {
+            let goal = match objective.goal {
+                Goal::Minimise => "minimise",
+                Goal::Maximise => "maximise",
+            };
+            let term = |term: &crate::config::Term| {
+                let weight = if term.weight == 1.0 { String::new() } else { format!("{} x ", term.weight) };
+                let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
+                let at = term.functional.frequency.map(|f| format!(" at {f} Hz")).unwrap_or_default();
+                format!("{weight}{}{}{at}", term.functional.kind.name(), region.unwrap_or_default())
+            };
+            let terms: Vec<String> = objective.terms().iter().map(term).collect();
+            let unit = summary.objective_unit.map(|unit| format!(" [{unit}]")).unwrap_or_default();
+            row("objective", format!("{goal} {}{unit}", terms.join(" + ")));
+        }
+        None => row("objective", "none".to_owned()),
+    }
+    for constraint in summary.constraints {
+        row("constraint", bound_of(constraint));
+    }
+    if !summary.probes.is_empty() {
+        let probe = |p: &crate::config::Probe| format!("{} ({})", p.name, p.points.len());
+        row("probes (points)", summary.probes.iter().map(probe).collect::<Vec<_>>().join(", "));
+    }
+}
+
+fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
+    if let Some(design) = summary.design {
+        let grid = design.grid.map(|[n, m]| format!(", grid {n} x {m}")).unwrap_or_default();
+        let surfaces = design.surface.join(", ");
+        row("design variables", format!("{} on {surfaces}{grid}", summary.design_variables));
+        let way = match design.direction {
+            DesignDirection::Vector([x, y, z]) => format!("along ({}, {}, {})", x + 0.0, y + 0.0, z + 0.0),
+            DesignDirection::Word(word) => format!("along the {}", word.name()),
+        };
+        row("bounds", format!("{} to {} mm {way}", millimetre(design.lower), millimetre(design.upper)));
+    }
+    if let Some(remesh) = summary.remesh {
+        let body = match &remesh.extent {
+            RemeshExtent::Regions(names) => names.join(", "),
+            RemeshExtent::Box([lower, upper]) => {
+                format!("all in {} to {} mm", millimetres(*lower), millimetres(*upper))
+            }
+        };
+        let equations = match summary.elastic_equations {
+            0 => String::new(),
+            count => format!(": {count} equations"),
+        };
+        row("mesh motion", format!("{body}, stiffness {}{equations}", remesh.stiffness.name()));
+    }
+    if summary.design.is_some() && summary.objective.is_some() {
+        let optimizer = summary.optimizer;
+        let time = optimizer.max_time.map(|seconds| format!(" or {seconds} s")).unwrap_or_default();
+        let most = optimizer.max_evaluations;
+        row("optimiser", format!("{}, at most {most} evaluations{time}", optimizer.algorithm.name()));
+    }
+}
+
+/// A constraint in words.
+fn bound_of(constraint: &Constraint) -> String {
+    let upper = |bound: &UpperBound| match bound {
+        UpperBound::Value(upper) => format!("at most {upper:e} in SI"),
+        UpperBound::Ratio(upper_ratio) => format!("at most {upper_ratio} times that of the initial design"),
+    };
+    let bounds = match &constraint.limit {
+        Limit::Field { bound, .. } | Limit::Body { bound, .. } => upper(bound),
+        Limit::Thickness { minimum, maximum, .. } => {
+            let side =
+                |word: &str, value: &Option<f64>| value.map(|t| format!("{word} {} mm", millimetre(t)));
+            let sides = [side("at least", minimum), side("at most", maximum)];
+            sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
+        }
+    };
+    format!("{} {bounds}", constraint.name)
+}
+
+fn region_table(summary: &Summary<'_>) -> Table<5> {
+    use Align::{Left, Right};
+    let mut table = Table::new([
+        ("region", Left),
+        ("tets", Right),
+        ("volume cm³", Right),
+        ("material", Left),
+        ("model", Left),
+    ]);
+    for r in &summary.regions {
+        let volume = format!("{:.4}", r.volume_m3 * 1e6);
+        table.row([r.name.clone(), r.tets.to_string(), volume, r.material.clone(), r.model.to_owned()]);
+    }
+    table
+}
+
+fn surface_table(summary: &Summary<'_>) -> Table<3> {
+    let columns = [("surface", Align::Left), ("triangles", Align::Right), ("area cm²", Align::Right)];
+    let mut table = Table::new(columns);
+    for s in &summary.surfaces {
+        table.row([s.name.clone(), s.triangles.to_string(), format!("{:.4}", s.area_m2 * 1e4)]);
+    }
+    table
+}
+
+fn coil_table(summary: &Summary<'_>) -> Table<4> {
+    use Align::{Left, Right};
+    let mut table =
+        Table::new([("coil", Left), ("ampere-turns A", Right), ("phase deg", Right), ("shape", Left)]);
+    for coil in summary.coils {
+        let at = |center: [f64; 3]| format!("centre {} mm", millimetres(center));
+        let window = |[a, b]: [f64; 2]| format!("window 2 x {} by 2 x {} mm", millimetre(a), millimetre(b));
+        let section =
+            |width: f64, height: f64| format!("section {} x {} mm", millimetre(width), millimetre(height));
+        let shape = match &coil.shape {
+            CoilShape::Racetrack(c) => {
+                format!(
+                    "racetrack, {}, {}, {}",
+                    window(c.half_window),
+                    section(c.width, c.height),
+                    at(c.center)
+                )
+            }
+            CoilShape::Rectangular(c) => {
+                format!(
+                    "rectangular, {}, {}, {}",
+                    window(c.half_window),
+                    section(c.width, c.height),
+                    at(c.center)
+                )
+            }
+            CoilShape::Circular(c) => {
+                let radius = millimetre(c.radius);
+                format!(
+                    "circular, inner radius {radius} mm, {}, {}",
+                    section(c.width, c.height),
+                    at(c.center)
+                )
+            }
+            CoilShape::Region(c) => format!("region {}", c.region),
+        };
+        let phase = format!("{}", (coil.phase.to_degrees() * 1e6).round() / 1e6 + 0.0);
+        table.row([coil.name.clone(), coil.ampere_turns.to_string(), phase, shape]);
+    }
+    table
+}
+
+fn skin_table(summary: &Summary<'_>) -> Table<5> {
+    use Align::{Left, Right};
+    let mut table = Table::new([
+        ("conductor", Left),
+        ("model", Left),
+        ("skin depth mm", Right),
+        ("elements per depth", Right),
+        ("2V/S in depths", Right),
+    ]);
+    for s in &summary.skin {
+        let elements =
+            format!("{:.2} (least {:.2})", s.median_elements_per_skin_depth, s.least_elements_per_skin_depth);
+        let depth = format!("{:.3}", s.skin_depth_m * 1e3);
+        let thickness = format!("{:.1}", s.thickness_in_skin_depths);
+        table.row([s.region.clone(), s.model.to_owned(), depth, elements, thickness]);
+    }
+    table
+}
+
+fn motion_table(summary: &Summary<'_>) -> Table<5> {
+    use Align::{Left, Right};
+    let mut table = Table::new([
+        ("motion", Left),
+        ("moved nodes", Right),
+        ("largest mm", Right),
+        ("elements of body", Right),
+        ("equations", Right),
+    ]);
+    for m in &summary.motions {
+        let largest = format!("{:.3}", m.largest_displacement_m * 1e3);
+        let [nodes, elements, equations] = [m.moved_nodes, m.elements, m.equations].map(|n| n.to_string());
+        table.row([m.name.clone(), nodes, largest, elements, equations]);
+    }
+    table
+}
+
+/// A length to a micrometre [mm].
+fn millimetre(length: f64) -> f64 {
+    (length * 1e6).round() / 1e3 + 0.0
+}
+
+fn millimetres(point: [f64; 3]) -> String {
+    let [x, y, z] = point.map(millimetre);
+    format!("({x}, {y}, {z})")
+}

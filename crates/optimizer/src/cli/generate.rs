@@ -1,0 +1,74 @@
+//! `fluxmorph generate`: what other programs want to know about this one.
+
+use std::path::Path;
+
+use clap::{Command, CommandFactory};
+
+use super::args::{Cli, GenerateArgs, Generated};
+use super::exit::ExitCode;
+use super::stdout;
+use crate::error::Error;
+use crate::output::{OutputError, system_disk, write_whole};
+use crate::schema;
+
+/// Print what is asked for.
+///
+/// # Errors
+/// When standard output or a file cannot be written to.
+pub(super) fn generate(args: &GenerateArgs) -> Result<ExitCode, Error> {
+    let mut bytes = Vec::new();
+    match &args.what {
+        Generated::Schema => bytes.extend_from_slice(schema::text().as_bytes()),
+        Generated::Man { out: Some(folder) } => write_pages(folder)?,
+        Generated::Man { out: None } => pages().into_iter().for_each(|(_, page)| bytes.extend(page)),
+        Generated::Completions { shell } => {
+            clap_complete::generate(*shell, &mut Cli::command(), "fluxmorph", &mut bytes);
+        }
+    }
+    stdout::print(&String::from_utf8_lossy(&bytes))?;
+    Ok(ExitCode::Success)
+}
+
+/// One man page for the program and each of its commands, by the name of its file.
+fn pages() -> Vec<(String, Vec<u8>)> {
+    let mut program = Cli::command().disable_help_subcommand(true);
+    program.build();
+    let mut pages = Vec::new();
+    add_pages(&program, "fluxmorph".to_owned(), &mut pages);
+    pages
+}
+
+fn add_pages(command: &Command, name: String, pages: &mut Vec<(String, Vec<u8>)>) {
+    let mut page = Vec::new();
+    let version = concat!("fluxmorph ", env!("CARGO_PKG_VERSION"));
+    let man = clap_mangen::Man::new(command.clone()).title(name.to_uppercase()).source(version);
+    man.render(&mut page).expect("a vector takes all that is written");
+    pages.push((format!("{name}.1"), page));
+    for inner in command.get_subcommands() {
+        add_pages(inner, format!("{name}-{}", inner.get_name()), pages);
+    }
+}
+
+fn write_pages(folder: &Path) -> Result<(), OutputError> {
+    let disk = system_disk();
+    disk.create_dir(folder).map_err(OutputError::io("create the folder", folder))?;
+    pages().into_iter().try_for_each(|(name, page)| write_whole(&*disk, &folder.join(name), &page))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_command_has_a_page() {
+        let pages = pages();
+        let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
+        for name in ["fluxmorph.1", "fluxmorph-run.1", "fluxmorph-generate-completions.1"] {
+            assert!(names.contains(&name), "{name}: {names:?}");
+        }
+        for (name, page) in &pages {
+            let text = String::from_utf8_lossy(page);
+            assert!(text.contains(".TH ") && text.contains(".SH SYNOPSIS"), "{name}: {text}");
+        }
+    }
+}

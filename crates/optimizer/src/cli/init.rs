@@ -1,0 +1,157 @@
+//! `fluxmorph init`: a commented configuration to start from.
+//!
+//! Where it is written and what is said of it; the texts are in [`super::template`].
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use super::args::InitArgs;
+use super::exit::ExitCode;
+use super::template::Template;
+use crate::error::Error;
+use crate::output::{OutputError, shell_word, system_disk, write_whole};
+
+/// Why a starting configuration is not written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum InitError {
+    /// A file stands in its place.
+    #[error("`{}` exists, and nothing was written; choose another NAME or folder, or replace it with --force", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The name cannot be that of a file or cannot stand in a configuration.
+    #[error(
+        "`{}` cannot be the name of a configuration: expected the name of a file in UTF-8 without quotes, backslashes and \
+         control characters, such as plate or devices/plate.toml",
+        name.display()
+    )]
+    Name {
+        /// What was given.
+        name: PathBuf,
+    },
+}
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When a file is there already, the name is none, or the files fail.
+pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
+    let place = Place::of(args)?;
+    let files: Vec<(PathBuf, Vec<u8>)> = place
+        .template
+        .files()
+        .iter()
+        .map(|file| {
+            let name = format!("{}.{}", place.name, file.extension);
+            (place.folder.join(name), file.named(&place.name).into_owned())
+        })
+        .collect();
+    let taken = |(path, _): &&(PathBuf, Vec<u8>)| path.symlink_metadata().is_ok();
+    if let Some((path, _)) = files.iter().find(taken).filter(|_| !args.force) {
+        return Err(InitError::Exists { path: path.clone() }.into());
+    }
+    let disk = system_disk();
+    if !place.folder.as_os_str().is_empty() {
+        disk.create_dir(&place.folder).map_err(OutputError::io("create the folder", &place.folder))?;
+    }
+    // The configuration last: where it is, all that it needs is there too.
+    for (path, content) in files.iter().rev() {
+        write_whole(&*disk, path, content)?;
+    }
+    if !args.quiet {
+        let written: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
+        let _ = writeln!(std::io::stderr(), "{}", told(&written, place.template));
+    }
+    Ok(ExitCode::Success)
+}
+
+/// What is written where.
+#[derive(Debug, PartialEq, Eq)]
+struct Place {
+    folder: PathBuf,
+    /// Of the files, without extension.
+    name: String,
+    template: Template,
+}
+
+impl Place {
+    fn of(args: &InitArgs) -> Result<Self, InitError> {
+        let Some(given) = &args.name else {
+            let template = args.template.unwrap_or(Template::Shield);
+            let folder = args.out.clone().unwrap_or_default();
+            return Ok(Self { folder, name: template.name().to_owned(), template });
+        };
+        let wrong = || InitError::Name { name: given.clone() };
+        let text = given.to_str().ok_or_else(wrong)?;
+        let file = given.file_name().and_then(|name| name.to_str()).ok_or_else(wrong)?;
+        let name = file.strip_suffix(".toml").unwrap_or(file);
+        let is_bad = |c: char| c.is_control() || matches!(c, '"' | '\\');
+        if name.is_empty() || text.ends_with(std::path::is_separator) || name.contains(is_bad) {
+            return Err(wrong());
+        }
+        let folder = given.parent().unwrap_or(Path::new(""));
+        Ok(Self {
+            folder: args.out.as_deref().unwrap_or(Path::new("")).join(folder),
+            name: name.to_owned(),
+            template: args.template.or_else(|| Template::named(name)).unwrap_or(Template::Shield),
+        })
+    }
+}
+
+/// What was written, and the next commands.
+fn told(files: &[&Path], template: Template) -> String {
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let config = shell_word(files[0]);
+    let command = template.command();
+    format!(
+        "wrote {}\n\nnext:\n  fluxmorph check {config:<24} # what it means, without solving\n  fluxmorph {command} \
+         {config:<width$} # the work itself",
+        names.join(", "),
+        width = 29 - command.len()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(name: Option<&str>, template: Option<Template>, out: Option<&str>) -> InitArgs {
+        InitArgs {
+            name: name.map(PathBuf::from),
+            template,
+            out: out.map(PathBuf::from),
+            force: false,
+            quiet: true,
+        }
+    }
+
+    #[test]
+    fn names_templates_and_folders_are_found() {
+        use Template::*;
+        let cases = [
+            (args(None, None, None), ("", "shield", Shield)),
+            (args(None, Some(Pole), Some("a")), ("a", "pole", Pole)),
+            (args(Some("gmsh"), None, None), ("", "gmsh", Gmsh)),
+            (args(Some("pole"), Some(Block), None), ("", "pole", Block)),
+            (args(Some("plate.toml"), None, None), ("", "plate", Shield)),
+            (args(Some("x/block.toml"), None, Some("a")), ("a/x", "block", Block)),
+            (args(Some("v1.2"), None, None), ("", "v1.2", Shield)),
+        ];
+        for (args, (folder, name, template)) in cases {
+            let expected = Place { folder: folder.into(), name: name.to_owned(), template };
+            assert_eq!(Place::of(&args).expect("a place"), expected);
+        }
+    }
+
+    #[test]
+    fn names_that_are_none_are_refused() {
+        for name in ["", ".toml", "..", "/", "folder/", "a\nb", "a\"b", "a\\b"] {
+            assert!(
+                matches!(Place::of(&args(Some(name), None, None)), Err(InitError::Name { .. })),
+                "{name:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! How much memory the work on a problem will hold, from the sizes that are known before anything is solved.
+//!
+//! A sum of what the process holds anyway, arrays by element, matrices, and factors by their symbolic analysis. The constants
+//! are least-error fits to the peak of the resident memory over the shipped configurations; docs/performance.md has the
+//! table. Matrices and factors dominate from ten thousand elements on, and these are counted, not fitted.
+//!
+//! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
+
+use fluxmorph_solver::FieldModel;
+use fluxmorph_solver::Order;
+use fluxmorph_solver::linear::{Method, Reuse, TWO_LEVELS_FROM};
+
+use crate::config::Config;
+use crate::problem::Problem;
+
+/// The program itself, its libraries and the stacks of its threads.
+const PROCESS: usize = 13 << 20;
+
+/// Mesh, adjacency and output arrays, with what belongs to the nodes, and the places of a linear element's entries in the
+/// matrix; per element.
+const LINEAR_ELEMENT: usize = 330;
+
+/// The same with the 30 unknowns of a quadratic element, whose places alone are 900 numbers.
+const QUADRATIC_ELEMENT: usize = 2600;
+
+/// Element derivatives, moved mesh and quality, per element where something moves.
+const MOVING: usize = 170;
+
+/// What a run still holds of its own mesh and patterns while the fresh mesh is worked on, per element.
+const HELD_BY_SETUP: usize = 300;
+
+/// Entries of the factor of a three-dimensional mesh under nested dissection grow with this power of its unknowns: George
+/// and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 8.
+const FACTOR_GROWTH: f64 = 4.0 / 3.0;
+
+/// Bytes of both levels of the two-level preconditioner per unknown: 474 and 598 on the TEAM problems.
+const TWO_LEVELS_PER_UNKNOWN: usize = 600;
+
+/// What an evaluation of a problem adds to the process [bytes].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Evaluation {
+    /// Arrays by element, and the elastic solver.
+    arrays: usize,
+    /// Matrices of the field.
+    matrices: usize,
+    /// Their preconditioners.
+    preconditioners: usize,
+}
+
+impl Evaluation {
+    fn of(problem: &Problem) -> Self {
+        let quadratic = problem.states.iter().any(|state| state.space().order() == Order::Quadratic);
+        let moving = if problem.shape.is_some() { MOVING } else { 0 };
+        let element = moving + if quadratic { QUADRATIC_ELEMENT } else { LINEAR_ELEMENT };
+        let elastic = problem.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
+        let mut evaluation = Self {
+            arrays: problem.original.topology().tets().len() * element + elastic,
+            matrices: 0,
+            preconditioners: 0,
+        };
+        // Factors that serve the next design are held all at once, the others one after the other.
+        let mut largest = (0, 0);
+        for solver in problem.states.iter().map(FieldModel::linear_solver) {
+            let sizes =
+                (solver.matrix_bytes(), solver.preconditioner_bytes(solver.method()).unwrap_or_default());
+            match solver.reuse() {
+                Reuse::WhileItPays => {
+                    evaluation.matrices += sizes.0;
+                    evaluation.preconditioners += sizes.1;
+                }
+                Reuse::Never if sizes.0 + sizes.1 > largest.0 + largest.1 => largest = sizes,
+                Reuse::Never => {}
+            }
+        }
+        evaluation.matrices += largest.0;
+        evaluation.preconditioners += largest.1;
+        evaluation
+    }
+
+    fn bytes(&self) -> usize {
+        self.arrays + self.matrices + self.preconditioners
+    }
+
+    /// The same on a mesh with so many times the elements.
+    fn grown(&self, problem: &Problem, growth: f64) -> usize {
+        let times = |bytes: usize, factor: f64| (bytes as f64 * factor) as usize;
+        let solvers = || problem.states.iter().map(FieldModel::linear_solver);
+        let unknowns = times(solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0), growth);
+        let preconditioners = if solvers().any(|solver| is_factor(solver.method())) {
+            let factor = times(self.preconditioners, growth.powf(FACTOR_GROWTH));
+            let is_static = problem.states.iter().all(|state| state.angular_frequency() == 0.0);
+            if is_static || unknowns < TWO_LEVELS_FROM {
+                factor
+            } else {
+                factor.min(unknowns * TWO_LEVELS_PER_UNKNOWN).max(self.preconditioners)
+            }
+        } else {
+            times(self.preconditioners, growth)
+        };
+        times(self.arrays + self.matrices, growth) + preconditioners
+    }
+}
+
+fn is_factor(method: Method) -> bool {
+    !matches!(method, Method::Incomplete | Method::TwoLevel)
+}
+
+/// Bytes that the process holds at the peak of one evaluation, about.
+pub fn of_evaluation(problem: &Problem) -> usize {
+    PROCESS + Evaluation::of(problem).bytes()
+}
+
+/// Bytes that the process holds at the peak of a run, about: its evaluations, and the check of its result on a fresh mesh
+/// where `config` asks for one.
+pub fn of_run(config: &Config, problem: &Problem) -> usize {
+    of_evaluation(problem).max(of_fresh_mesh(config, problem).unwrap_or(0))
+}
+
+/// Bytes that the process holds at the peak of the check on a fresh mesh, about; `None` where there is none to be made.
+pub fn of_fresh_mesh(config: &Config, problem: &Problem) -> Option<usize> {
+    let factor = config.output.verify_refinement;
+    if factor == 0.0 || problem.shape.is_none() || problem.objective.is_none() {
+        return None;
+    }
+    let fresh = config.mesh.refined(factor)?.tet_count()?;
+    let growth = fresh as f64 / config.mesh.tet_count()?.max(1) as f64;
+    let held = problem.original.topology().tets().len() * HELD_BY_SETUP;
+    Some(PROCESS + held + Evaluation::of(problem).grown(problem, growth))
+}

@@ -1,0 +1,71 @@
+//! The stages of a long piece of work, as told to whoever watches it, and a stop watch for them.
+//!
+//! Whoever computes tells through a function that a stage begins; what comes of it (a word on a terminal, or nothing) is
+//! decided in [`crate::observer`].
+
+use std::time::Instant;
+
+/// What is being computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// The mesh is read or generated, and names are looked up in it.
+    Mesh,
+    /// Unknowns of the field are numbered, and their systems analysed.
+    Unknowns,
+    /// The elastic system of the mesh motion is assembled and factored.
+    Elasticity,
+    /// The mesh is moved to a design.
+    Moving,
+    /// Matrix and load of a field are assembled.
+    Assembling,
+    /// The matrix is factored.
+    Factoring,
+    /// The state is solved for.
+    State,
+    /// The adjoint is solved for.
+    Adjoint,
+    /// Objective and derivatives are summed.
+    Differentiating,
+    /// Files are written.
+    Writing,
+    /// Something without a name of its own; its time is not told.
+    Other,
+}
+
+impl Stage {
+    /// What is being done, in a few words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Mesh => "building the mesh",
+            Self::Unknowns => "ordering the unknowns",
+            Self::Elasticity => "factoring the elastic body",
+            Self::Moving => "moving the mesh",
+            Self::Assembling => "assembling",
+            Self::Factoring => "factoring",
+            Self::State => "solving",
+            Self::Adjoint => "adjoint",
+            Self::Differentiating => "differentiating",
+            Self::Writing => "writing",
+            Self::Other => "working",
+        }
+    }
+}
+
+/// A function that is told of stages.
+pub type Told<'a> = &'a mut dyn FnMut(Stage);
+
+/// A stop watch with intermediate times.
+pub(crate) struct Lap(Instant);
+
+impl Lap {
+    pub(crate) fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Seconds since the start or the last lap.
+    pub(crate) fn lap(&mut self) -> f64 {
+        let seconds = self.0.elapsed().as_secs_f64();
+        self.0 = Instant::now();
+        seconds
+    }
+}
