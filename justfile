@@ -100,3 +100,8 @@ deny:
 # What must be green before a change is taken
 ci:
     .ci/run
+
+# Pictures of the shield's report in docs/images; needs Chromium and python3
+screenshots:
+    cargo run --release -- run configs/shield.toml --force
+    python3 -B tools/screenshots.py configs/runs/shield

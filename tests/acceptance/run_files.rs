@@ -36,7 +36,7 @@ fn a_run_leaves_every_file_and_the_files_agree_with_each_other() {
         .iter()
         .map(ToString::to_string)
         .chain(fields)
-        .chain(["optimum.msh", "optimum_plate_bottom.stl", "result.json"].map(str::to_owned))
+        .chain(["optimum.msh", "optimum_plate_bottom.stl", "report.html", "result.json"].map(str::to_owned))
         .collect();
         expected.sort();
         assert_eq!(files_below(&run.0), expected, "{model:?}");

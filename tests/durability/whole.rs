@@ -36,6 +36,7 @@ pub(crate) fn torn(files: &BTreeMap<PathBuf, Vec<u8>>, logs: Logs) -> Vec<String
             }
             "msh" => text.ends_with("$EndElements\n"),
             "stl" => bytes.len() > 84,
+            "html" => text.ends_with("</html>\n"),
             "csv" | "jsonl" => logs == Logs::MayBeCut || text.is_empty() || text.ends_with('\n'),
             "bin" => journal::parse(bytes).is_ok(),
             _ => false,

@@ -129,6 +129,14 @@ pub enum Error {
         /// Why, and what to do.
         cause: String,
     },
+    /// A run directory that there is nothing to report of.
+    #[error("there is no report of `{}`: {cause}", path.display())]
+    NoReport {
+        /// The directory.
+        path: PathBuf,
+        /// Why, and what to do.
+        cause: String,
+    },
     /// A signal came before there was anything to keep.
     #[error("interrupted before there was anything to keep")]
     Interrupted,
@@ -194,6 +202,7 @@ impl Error {
             Self::Constraint { .. }
             | Self::OtherRun { .. }
             | Self::NotResumable { .. }
+            | Self::NoReport { .. }
             | Self::DesignUnreached { .. }
             | Self::FirstDesign { .. }
             | Self::Apart(_)

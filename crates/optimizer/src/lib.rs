@@ -24,6 +24,7 @@ pub mod objective;
 pub mod observer;
 pub mod output;
 pub mod problem;
+pub mod report;
 pub mod rounds;
 pub mod schema;
 pub mod session;

@@ -1,6 +1,7 @@
 //! `fluxmorph run` and `fluxmorph resume`.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::args::{ResumeArgs, RunArgs};
 use super::exit::ExitCode;
@@ -10,7 +11,8 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::Observer;
-use crate::output::{RunResult, RunStatus, StopReason, resume_command, system_disk};
+use crate::output::{Disk, RunResult, RunStatus, StopReason, resume_command, system_disk};
+use crate::report;
 use crate::session::{self, Limits, Options, SavedRun};
 
 /// Do what the command line says.
@@ -27,7 +29,10 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
         let result = session::run(&config, &source, options, &mut *observer);
-        concluded(result, &config.output.directory, args.common.work.json, &signal, &mut *observer)
+        let report = config.output.report.then_some(&disk);
+        let json = args.common.work.json;
+        let ended = Ended { directory: &config.output.directory, report, json };
+        concluded(result, &ended, &signal, &mut *observer)
     });
     signal.ended(outcome)
 }
@@ -51,25 +56,42 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         }
         let older_run = args.work.older_run();
         let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
+        let report = config.output.report.then_some(&disk);
         let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);
         let result = session::resume(saved, limits, options, &mut *observer);
-        concluded(result, &args.directory, args.work.json, &signal, &mut *observer)
+        let ended = Ended { directory: &args.directory, report, json: args.work.json };
+        concluded(result, &ended, &signal, &mut *observer)
     });
     signal.ended(outcome)
 }
 
-/// Prints the result, and how to go on.
+/// What is done when a run has ended.
+struct Ended<'a> {
+    directory: &'a Path,
+    /// Where the report is written to; `None` where there is to be none.
+    report: Option<&'a Arc<dyn Disk>>,
+    json: bool,
+}
+
+/// Prints the result, writes the report, and tells how to go on.
 fn concluded(
     result: Result<RunResult, Error>,
-    directory: &Path,
-    json: bool,
+    ended: &Ended<'_>,
     signal: &Signal,
     observer: &mut dyn Observer,
 ) -> Result<ExitCode, Error> {
     let result = result?;
-    if json {
+    let directory = ended.directory;
+    if ended.json {
         stdout::print_json(&result)?;
+    }
+    if let Some(disk) = ended.report {
+        // The result is worth more than a page about it.
+        match report::write(disk, directory, None) {
+            Ok(path) => observer.note(&format!("report: {}", path.display())),
+            Err(error) => observer.warning(&format!("the report is not written: {error}")),
+        }
     }
     // The search may have ended by itself, and the check of its result not.
     let interrupted = result.status == RunStatus::Interrupted;

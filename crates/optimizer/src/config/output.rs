@@ -49,6 +49,8 @@ pub struct Output {
     /// the elements. A mesh from a file or of the generator `block` has no check.
     #[schemars(transform = zero_or(REFINEMENTS))]
     pub verify_refinement: f64,
+    /// Whether a run ends with `report.html`. Default `true`: it is what one looks at first.
+    pub report: bool,
 }
 
 choice! {
@@ -80,6 +82,7 @@ impl Output {
             mesh: true,
             stl: surfaces.iter().filter(|name| !name.is_empty()).cloned().collect(),
             verify_refinement: 1.25,
+            report: true,
         }
     }
 
@@ -93,6 +96,7 @@ impl Output {
             verify_refinement: section
                 .number("verify_refinement", Range::FINITE)
                 .unwrap_or(default.verify_refinement),
+            report: section.boolean("report").unwrap_or(default.report),
         };
         let factor = output.verify_refinement;
         if factor != 0.0 && !REFINEMENTS.contains(factor) {

@@ -47,8 +47,10 @@ const FILES: &[&str] = &[
     "morph.csv",
     "tuned.toml",
     OPTIMUM,
+    REPORT,
 ];
 const OPTIMUM: &str = "optimum.msh";
+const REPORT: &str = "report.html";
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
     ///
@@ -348,6 +350,11 @@ impl RunDirectory {
         self.path.join("tuned.toml")
     }
 
+    /// `report.html`, one page about the run.
+    pub fn report(&self) -> PathBuf {
+        self.path.join(REPORT)
+    }
+
     /// `optimum.msh`, the mesh of the best design.
     pub fn optimum(&self) -> PathBuf {
         self.path.join(OPTIMUM)
@@ -438,6 +445,7 @@ mod tests {
             run.before(Some(99)),
             run.morph_csv(),
             run.tuned(),
+            run.report(),
         ]);
         let foreign = ["notes.md", "fields/eval_best.vtu", "case_1_before.vtu", "case_01.vtu"];
         let foreign = foreign.map(|name| run.path().join(name));

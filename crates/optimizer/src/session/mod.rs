@@ -34,6 +34,7 @@ use crate::rounds::RoundEvent;
 use crate::setup::{Purpose, Setup, set_up_watched};
 use crate::stage::Stage;
 use recorder::{DirectoryRecorder, write_collection, write_field};
+pub(crate) use resume::configuration;
 pub use resume::{Limits, SavedRun, resume};
 use summary::{constraints, linear_solver, terms};
 

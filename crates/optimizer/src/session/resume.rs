@@ -150,7 +150,13 @@ fn not_resumable(directory: &RunDirectory, cause: String) -> Error {
 }
 
 /// The configuration that the run was started with, read again.
-fn configuration(directory: &RunDirectory, manifest: &Manifest) -> Result<(Config, Source), Error> {
+///
+/// # Errors
+/// [`Error::NotResumable`] where it is gone, faults of its text, or when it cannot be read.
+pub(crate) fn configuration(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+) -> Result<(Config, Source), Error> {
     let path = directory.config();
     let bytes = match directory.disk().read(&path, LARGEST[0]) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {

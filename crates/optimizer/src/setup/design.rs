@@ -77,13 +77,18 @@ pub(super) fn surface(
 
 /// The triangles of the design surface, each once, on the mesh with all regions.
 pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Triangulation, Error> {
+    Ok(Triangulation::new(mesh, &triangles(design, mesh)?))
+}
+
+/// The triangles themselves.
+pub(super) fn triangles(design: &config::Design, mesh: &Mesh) -> Result<Vec<[NodeId; 3]>, Error> {
     let mut own = BTreeSet::new();
     let mut triangles = Vec::new();
     for name in &design.surface {
         let surface = mesh.topology().surface(name)?;
         triangles.extend(surface.iter().copied().filter(|t| own.insert(face_key(*t))));
     }
-    Ok(Triangulation::new(mesh, &triangles))
+    Ok(triangles)
 }
 
 /// The same surface on the mesh without the regions that impedance surfaces replace.

@@ -2,17 +2,19 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem.
+//! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod design;
 mod field;
 mod functional;
 pub(crate) mod mesh;
 mod motion;
+mod outline;
 mod shape;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub use motion::{MotionSetup, set_up_motion};
+pub use outline::{Outline, OutlinedDesign, outline};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;

@@ -228,7 +228,7 @@ pub(super) fn guidance(source: &Source, design: Option<&Design>, remesh: &Remesh
 }
 
 /// Regions with an element that has a face between design nodes, which are ascending.
-fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
+pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
     let topology = mesh.topology();
     topology
         .facets()
@@ -240,7 +240,7 @@ fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
 }
 
 /// The region that a positive design thickens: behind the design surface, and not air.
-fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+pub(super) fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
     let topology = mesh.topology();
     let direction_at = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok()?;

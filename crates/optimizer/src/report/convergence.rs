@@ -1,0 +1,165 @@
+//! The way of the search: what the history holds against the number of the evaluation.
+
+use super::data::RunData;
+use super::html::Html;
+use super::plot::{BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, dot, grid, line, polyline, svg, text};
+use super::ticks::{Count, number};
+use crate::observer::Evaluation;
+
+/// Height of one drawing area.
+const HEIGHT: f64 = 150.0;
+
+/// Constraints that have a figure; the table of evaluations has all.
+const MOST_CONSTRAINTS: usize = 12;
+
+/// Lines at new rounds.
+const MOST_ROUNDS: usize = 100;
+
+/// Values that differ by more than this factor are drawn by factors.
+const WIDE: f64 = 30.0;
+
+/// One quantity of the history.
+struct Series<'a> {
+    title: String,
+    values: Vec<Option<f64>>,
+    /// A value that must not be exceeded.
+    bound: Option<f64>,
+    rows: &'a [Evaluation],
+    best: Option<usize>,
+    /// Whether the value of the best design stands beside its ring.
+    is_labelled: bool,
+}
+
+/// All figures.
+pub(super) fn figures(html: &mut Html, data: &RunData) {
+    let rows = &data.history;
+    let series = |title: &str, value: &dyn Fn(&Evaluation) -> Option<f64>| Series {
+        title: title.to_owned(),
+        values: rows.iter().map(value).map(|v| v.filter(|v| v.is_finite())).collect(),
+        bound: None,
+        rows,
+        best: data.best,
+        is_labelled: true,
+    };
+    let mut all = vec![("objective", series("objective F / F₀", &|row| Some(row.ratio)))];
+    let constraints: Vec<&String> =
+        rows.first().map(|row| row.constraints.keys().collect()).unwrap_or_default();
+    for name in constraints.into_iter().take(MOST_CONSTRAINTS) {
+        let plain = name.strip_prefix("c_").unwrap_or(name);
+        let title = format!("constraint {plain}: (value − bound) / bound");
+        let mut own = series(&title, &|row| row.constraints.get(name).copied());
+        own.bound = Some(0.0);
+        all.push(("constraint", own));
+    }
+    all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [SI]", &|row| Some(row.gradient_norm))));
+    all.push(("quality", series("worst quality of an element (Eq. 4)", &|row| Some(row.worst_quality))));
+    all.push((
+        "step",
+        series("length of the step [mm]", &|row| Some(1e3 * row.step_norm).filter(|s| *s > 0.0)),
+    ));
+    for (kind, own) in &mut all {
+        own.is_labelled = !matches!(*kind, "gradient" | "step");
+    }
+    html.element("div", &[("class", "grid2")], |html| {
+        for (kind, series) in &all {
+            html.element("figure", &[("class", "chart"), ("data-chart", kind)], |html| {
+                series.draw(html);
+                html.leaf("figcaption", &[], &series.caption());
+            });
+        }
+    });
+}
+
+impl Series<'_> {
+    fn known(&self) -> impl Iterator<Item = (&Evaluation, f64)> {
+        self.rows.iter().zip(&self.values).filter_map(|(row, value)| Some((row, (*value)?)))
+    }
+
+    fn scale(&self) -> Scale {
+        let values = self.known().map(|(_, v)| v).chain(self.bound);
+        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        let pixels = [TOP + HEIGHT, TOP];
+        if !(low.is_finite() && high.is_finite()) {
+            return Scale { low: 0.0, high: 1.0, count: Count::Linear, pixels };
+        }
+        if low > 0.0 && high / low > WIDE {
+            let room = (high / low).powf(0.06);
+            return Scale { low: low / room, high: high * room, count: Count::Logarithmic, pixels };
+        }
+        let room = if high > low { 0.06 * (high - low) } else { 0.1 * high.abs().max(1e-9) };
+        Scale { low: low - room, high: high + room, count: Count::Linear, pixels }
+    }
+
+    fn draw(&self, html: &mut Html) {
+        let last = self.rows.last().map_or(1, |row| row.evaluation).max(1);
+        let x =
+            Scale { low: 0.0, high: last as f64, count: Count::Linear, pixels: [LEFT + 6.0, WIDTH - RIGHT] };
+        let y = self.scale();
+        let point = |row: &Evaluation, value: f64| [x.at(row.evaluation as f64), y.at(value)];
+        let label = format!("{} against the evaluation. {}", self.title, self.caption());
+        svg(html, TOP + HEIGHT + BOTTOM, &label, |html| {
+            grid(html, &x, &y, 5);
+            axes(html, &x, &y, ["evaluation", &self.title], [last.min(8), 5]);
+            let begun =
+                self.rows.windows(2).filter(|pair| pair[1].round > pair[0].round).map(|pair| &pair[1]);
+            for row in begun.take(MOST_ROUNDS) {
+                let at = x.at(row.evaluation as f64 - 0.5);
+                line(html, "round", [at, y.pixels[0]], [at, y.pixels[1]]);
+                text(html, "tick", at + 3.0, TOP + 9.0, &format!("round {}", row.round));
+            }
+            if let Some(bound) = self.bound {
+                line(html, "bound", [x.pixels[0], y.at(bound)], [x.pixels[1], y.at(bound)]);
+            }
+            let points: Vec<[f64; 2]> = self.known().map(|(row, value)| point(row, value)).collect();
+            polyline(html, "curve", &points);
+            if points.len() <= 60 {
+                points.iter().for_each(|&at| dot(html, "point", at, 2.4));
+            }
+            if let Some((row, value)) = self.known().find(|(row, _)| Some(row.evaluation) == self.best) {
+                let at = point(row, value);
+                dot(html, "best", at, 4.6);
+                if !self.is_labelled {
+                    return;
+                }
+                let right = at[0] > 0.6 * WIDTH;
+                let (class, x) = if right { ("mark end", at[0] - 8.0) } else { ("mark", at[0] + 8.0) };
+                let above = at[1] > TOP + 0.5 * HEIGHT;
+                text(
+                    html,
+                    class,
+                    x,
+                    at[1] + if above { -8.0 } else { 16.0 },
+                    &format!("best: {}", number(value, 4)),
+                );
+            }
+        });
+    }
+
+    fn caption(&self) -> String {
+        let values: Vec<(&Evaluation, f64)> = self.known().collect();
+        let (Some(first), Some(last)) = (values.first(), values.last()) else {
+            return format!("{}: no values.", self.title);
+        };
+        let name = self.title.split(':').next().unwrap_or_default();
+        let name = name.split('[').next().unwrap_or_default().trim();
+        let mut text = format!(
+            "{}{}: {} at evaluation {}, {} at evaluation {}",
+            name.chars().next().map(|c| c.to_uppercase().to_string()).unwrap_or_default(),
+            name.chars().skip(1).collect::<String>(),
+            number(first.1, 4),
+            first.0.evaluation,
+            number(last.1, 4),
+            last.0.evaluation
+        );
+        if let Some((row, value)) = values.iter().find(|(row, _)| Some(row.evaluation) == self.best) {
+            text += &format!("; best design (ring): evaluation {}, {}", row.evaluation, number(*value, 4));
+        }
+        if self.bound.is_some() {
+            text += "; kept where it is not above zero (dashed line)";
+        }
+        if self.rows.iter().any(|row| row.round > 0) {
+            text += "; dotted lines: the mesh got a new reference";
+        }
+        text + "."
+    }
+}

@@ -1,0 +1,90 @@
+//! `report.html`: one page about a run, made from its directory alone, that can be sent and read anywhere.
+//!
+//! `data` reads the directory, `page` puts the sections in their order, and the others draw one thing each: `map`, `field`,
+//! `convergence`, `histogram`, `surface`, `tables`, `paper`. Underneath are `plot` (axes), `ticks` (numbers), `colour`,
+//! `raster` and `png` (images), `cut`, `coils` and `plane` (geometry), `words` (the configuration in plain words). Markup is
+//! written by `html` alone, which escapes. The page holds its style and its script (`style.css`, `view.js`), asks no network,
+//! and says nothing of the moment at which it is made: equal directories make equal pages.
+//!
+//! Does not live here: anything that solves a field or moves a mesh. What is shown was computed by the run.
+
+mod coils;
+mod colour;
+mod convergence;
+mod cut;
+mod data;
+mod field;
+mod histogram;
+mod html;
+mod map;
+mod page;
+mod paper;
+mod plane;
+mod plot;
+mod png;
+mod raster;
+mod surface;
+mod tables;
+mod ticks;
+mod words;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::Error;
+use crate::output::{Disk, RunDirectory};
+use data::RunData;
+
+/// Writes the page of a run directory, into the directory or to `out`; where it is written.
+///
+/// # Errors
+/// [`Error::NoReport`] for a directory of another command; damaged files, faults of the configuration, or when the operating
+/// system refuses.
+pub fn write(disk: &Arc<dyn Disk>, directory: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
+    let run = RunDirectory::open(disk, directory)?;
+    let path = out.map_or_else(|| run.report(), Path::to_owned);
+    let page = text(disk, directory, &path)?;
+    run.write(&path, page.as_bytes())?;
+    Ok(path)
+}
+
+/// The page of a run directory as it is written to `path`, to which its links are relative.
+///
+/// # Errors
+/// As [`write`].
+pub fn text(disk: &Arc<dyn Disk>, directory: &Path, path: &Path) -> Result<String, Error> {
+    let data = RunData::read(disk, directory)?;
+    Ok(page::page(&data, &way(path, directory)))
+}
+
+/// The way from the folder of a file to a directory, with a slash at its end; nothing where they are the same.
+fn way(file: &Path, directory: &Path) -> String {
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let (from, to) = (whole(file), whole(directory));
+    let from: Vec<_> = from.parent().map(|folder| folder.components().collect()).unwrap_or_default();
+    let to: Vec<_> = to.components().collect();
+    let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let mut way = "../".repeat(from.len() - same);
+    for part in &to[same..] {
+        way += &page::address(&part.as_os_str().to_string_lossy());
+        way.push('/');
+    }
+    way
+}
+
+#[cfg(test)]
+mod tests {
+    use super::way;
+    use std::path::Path;
+
+    #[test]
+    fn links_lead_from_the_page_to_the_run() {
+        for (file, directory, expected) in [
+            ("runs/a/report.html", "runs/a", ""),
+            ("b.html", "runs/a b", "runs/a%20b/"),
+            ("out/b.html", "runs/a", "../runs/a/"),
+        ] {
+            assert_eq!(way(Path::new(file), Path::new(directory)), expected);
+        }
+    }
+}

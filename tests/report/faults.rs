@@ -1,0 +1,96 @@
+//! Directories that there is no report of, and files that are damaged: named, with the exit codes of the documentation.
+
+use std::path::Path;
+
+use crate::program::{BLOCK, block, fluxmorph, report, repository};
+
+fn report_fails(directory: &Path, code: i32, fragments: &[&str]) {
+    fluxmorph(&[&"report", &directory]).with(code, fragments);
+}
+
+#[test]
+fn what_is_no_run_or_analysis_is_refused() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    report_fails(home.path(), 5, &["holds no run of fluxmorph"]);
+    report_fails(&home.path().join("none"), 5, &["holds no run of fluxmorph"]);
+    let out = home.path().join("morph");
+    let config = repository("configs/block_table2.toml");
+    fluxmorph(&[&"morph", &config, &"--out", &out, &"--quiet"]);
+    report_fails(&out, 3, &["it holds a `morph`", "fluxmorph run"]);
+    assert!(!out.join("report.html").exists());
+}
+
+#[test]
+fn a_damaged_file_is_named_and_the_older_page_stays() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let out = block("run", home.path(), &[]);
+    let page = std::fs::read(out.join("report.html")).expect("a page");
+    let field = "fields/eval_0000.vtu";
+    for name in ["result.json", "history.jsonl", field, "config.toml", "manifest.json"] {
+        let path = out.join(name);
+        let whole = std::fs::read(&path).expect("a file");
+        let halved = whole[..whole.len() / 2].to_vec();
+        let garbled: Vec<u8> =
+            whole.iter().enumerate().map(|(i, b)| if i % 7 == 3 { b ^ 0x15 } else { *b }).collect();
+        let hollow = b"{}\n".to_vec();
+        for damaged in [halved, garbled, hollow] {
+            // A history that ends early is what a crash leaves: it is no damage.
+            if name == "history.jsonl" && whole.starts_with(&damaged) {
+                continue;
+            }
+            std::fs::write(&path, damaged).expect("written");
+            let ended = fluxmorph(&[&"report", &out]);
+            let expected = if name == "config.toml" { [Some(3), Some(5)] } else { [Some(5); 2] };
+            assert!(expected.contains(&ended.code), "{name}: {:?} {}", ended.code, ended.said);
+            let file = if name == "manifest.json" { "out" } else { name };
+            assert!(ended.said.contains(file) && !ended.said.contains("panicked"), "{name}: {}", ended.said);
+            assert_eq!(std::fs::read(out.join("report.html")).expect("a page"), page, "{name}");
+        }
+        std::fs::write(&path, whole).expect("written");
+    }
+    assert_eq!(report(&out).as_bytes(), page);
+}
+
+#[test]
+fn without_its_mesh_file_a_run_is_still_reported() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let first = block("solve", home.path(), &[]);
+    let folder = home.path().join("second");
+    std::fs::create_dir(&folder).expect("made");
+    std::fs::copy(first.join("optimum.msh"), folder.join("device.msh")).expect("copied");
+    let (before, rest) = BLOCK.split_once("[mesh]").expect("a mesh");
+    let (_, behind) = rest.split_once("[analysis]").expect("an analysis");
+    let text = format!("{before}[mesh]\nfile = \"device.msh\"\nunit = \"mm\"\n\n[analysis]{behind}");
+    std::fs::write(folder.join("block.toml"), text).expect("written");
+    let out = folder.join("out");
+    fluxmorph(&[&"solve", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).with(0, &[]);
+    assert!(!report(&out).contains("Not shown"));
+    std::fs::remove_file(folder.join("device.msh")).expect("removed");
+    let page = report(&out);
+    assert!(page.contains("the mesh cannot be made again") && page.contains("device.msh"));
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_an_error_that_names_it() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let out = block("run", home.path(), &[]);
+    let nowhere = home.path().join("none/report.html");
+    fluxmorph(&[&"report", &out, &"--out", &nowhere]).with(5, &["none/report.html"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_whose_page_cannot_be_written_ends_as_it_would() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let out =
+        block("run", home.path(), &[("verify_refinement = 0", "verify_refinement = 0\nreport = false")]);
+    // A folder in the place of the page.
+    std::fs::create_dir(out.join("report.html")).expect("made");
+    std::fs::write(out.join("report.html/theirs"), "x").expect("written");
+    let text = std::fs::read_to_string(out.join("config.toml")).expect("a configuration");
+    std::fs::write(out.join("config.toml"), text.replace("report = false", "report = true"))
+        .expect("written");
+    let ended = fluxmorph(&[&"resume", &out, &"--max-evaluations", &"7"]);
+    ended.with(1, &["the report is not written", "report.html"]);
+    assert!(out.join("result.json").is_file());
+}
