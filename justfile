@@ -67,7 +67,7 @@ demo:
 # The picture of a run on a terminal, docs/images/terminal.svg; needs python3
 screenshot-terminal:
     cargo build --release
-    tools/terminal.py --svg docs/images/terminal.svg --at "3/5 [" -- target/release/fluxmorph run configs/shield_quick.toml --force || test $? -eq 1
+    tools/terminal.py --svg docs/images/terminal.svg --at "3/5 [" --shown-as "fluxmorph run configs/shield_quick.toml" -- target/release/fluxmorph run configs/shield_quick.toml --force || test $? -eq 1
 
 # Fuzz one reader (msh22, msh41_ascii, msh41_binary, config, quantity, journal); needs `cargo install cargo-fuzz`
 fuzz TARGET SECONDS="60":

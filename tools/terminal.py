@@ -196,8 +196,9 @@ def line_of(line, x, y, width):
     for start, text, (colour, bold, faint) in runs:
         if text.strip():
             fill = COLOURS.get(colour) or (FAINT if faint else None)
-            attributes = (f' fill="{fill}" style="fill:{fill}"' if fill else "") + (' font-weight="bold"' if bold else "")
-            length = f'{len(text) * width:.1f}'
+            rules = (f"fill:{fill};" if fill else "") + ("font-weight:bold" if bold else "")
+            attributes = f' style="{rules}"' if rules else ""
+            length = f"{len(text) * width:.1f}"
             texts.append(
                 f'<text x="{x + start * width:.1f}" y="{y:.1f}" textLength="{length}" xml:space="preserve"{attributes}>'
                 f"{html.escape(text)}</text>"
@@ -223,6 +224,8 @@ def main():
     began = time.monotonic()
 
     def hear(text):
+        # A picture says nothing of the machine that it was made on.
+        text = text.replace(os.getcwd() + os.sep, "")
         # Piece by piece, since the text looked for may stand only for a moment.
         for piece in re.split(r"(?<=\r)(?!\n)|(?=\x1b\[2K)", text):
             screen.feed(piece)

@@ -48,7 +48,7 @@ const CASES: &[Case] = &[
     Case {
         name: "missing table",
         from: "[remesh]",
-        to: "[remesh_]",
+        to: "[leftover]",
         line: None,
         says: &["missing key `remesh`", "the mesh must follow the design"],
     },
@@ -182,7 +182,7 @@ const CASES: &[Case] = &[
         line: None,
         says: &[
             "a coil reaches into the remesh region",
-            "[[coils]]",
+            "center = ",
             "coils and their windows outside the remesh region",
         ],
     },

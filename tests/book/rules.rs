@@ -100,8 +100,8 @@ impl Rule {
                 (!exists).then(|| format!("`{argument}` is no target of the justfile"))
             }
             Exists::Paths => {
-                let words = command.split_whitespace().skip(2).filter(|word| !word.starts_with('-'));
-                let missing = words.filter(|path| !repository(path).exists()).next();
+                let mut words = command.split_whitespace().skip(2).filter(|word| !word.starts_with('-'));
+                let missing = words.find(|path| !repository(path).exists());
                 missing.map(|path| format!("`{command}`: there is no {path}"))
             }
         }

@@ -76,8 +76,8 @@ pub(crate) fn changed(
         Change::Unknown => {
             let path = pick(&mut root, random, toml::Value::is_table)?;
             let key = ["colour", "sub.table", "unit", "name", "kind", "box"][random.usize(..6)];
-            let value: toml::Value =
-                [1.into(), "text".into(), toml::Table::new().into()][random.usize(..3)].clone();
+            let values: [toml::Value; 3] = [1.into(), "text".into(), toml::Table::new().into()];
+            let value = values[random.usize(..3)].clone();
             value_at(&mut root, &path).as_table_mut()?.insert(key.to_owned(), value);
         }
         Change::Sampled => {

@@ -47,6 +47,8 @@ pub enum SolverError {
     /// A model without any excitation.
     #[error("no current flows: {cause}")]
     NoSource {
+        /// Its name.
+        coil: String,
         /// Why, and what to do.
         cause: String,
     },

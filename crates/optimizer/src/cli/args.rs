@@ -10,6 +10,7 @@ use crate::config::{Config, Dimension, OutputNamedBy, Source, parse_quantity};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::output::OlderRun;
+use crate::setup::with_names;
 
 /// Finds the shape of an electromagnetic device from a TOML file
 ///
@@ -106,7 +107,7 @@ pub struct CommonArgs {
     pub config: PathBuf,
 
     /// Directory to write into, instead of the configuration's output.directory
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", alias = "output")]
     pub out: Option<PathBuf>,
 
     /// Set a key of the configuration; repeatable
@@ -283,7 +284,7 @@ impl CommonArgs {
     /// # Errors
     /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
     pub fn load(&self) -> Result<(Config, Source), Error> {
-        let (mut config, source) = Config::from_file(&self.config, &self.overrides)?;
+        let (mut config, source) = Config::from_file(&self.config, &self.overrides).map_err(with_names)?;
         if !self.work.allow_outside {
             let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
             source.confined(by)?;

@@ -91,9 +91,13 @@ impl Place {
         if name.is_empty() || text.ends_with(std::path::is_separator) || name.contains(is_bad) {
             return Err(wrong());
         }
-        let folder = given.parent().unwrap_or(Path::new(""));
+        let folder = match (&args.out, given.parent().filter(|folder| !folder.as_os_str().is_empty())) {
+            (Some(out), Some(folder)) => out.join(folder),
+            (Some(out), None) => out.clone(),
+            (None, folder) => folder.map(Path::to_owned).unwrap_or_default(),
+        };
         Ok(Self {
-            folder: args.out.as_deref().unwrap_or(Path::new("")).join(folder),
+            folder,
             name: name.to_owned(),
             template: args.template.or_else(|| Template::named(name)).unwrap_or(Template::Shield),
         })

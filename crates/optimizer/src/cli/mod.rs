@@ -27,6 +27,7 @@ use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::observer::{Bar, Console, Observer, Quiet};
+use crate::output::DesignFileError;
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -66,7 +67,9 @@ fn done(cli: &Cli) -> ExitCode {
 /// What is shown for an error on standard error.
 fn message(error: &Error) -> String {
     match error {
-        Error::Config(ConfigError::Faults(report)) => diagnostics::render(report, Style::for_stderr()),
+        Error::Config(ConfigError::Faults(report)) | Error::Design(DesignFileError::Fault(report)) => {
+            diagnostics::render(report, Style::for_stderr())
+        }
         other => format!("error: {other}"),
     }
 }

@@ -138,7 +138,7 @@ impl Frequencies {
         if section.has("frequencies") {
             if section.has("frequency") {
                 let message = format!("`{}` has both `frequency` and `frequencies`", section.path());
-                section.wrong("frequencies", message, "one of them");
+                section.clash(["frequency", "frequencies"], message, "one of them");
             }
             // A list with a fault is not handed out.
             let several = several.unwrap_or_else(|| vec![f64::NAN]);
@@ -152,7 +152,7 @@ impl Frequencies {
             }
             if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {
                 let message = format!("`analysis.frequencies` has {} Hz twice", several[twice]);
-                section.wrong("frequencies", message, "each frequency once");
+                section.wrong(&format!("frequencies[{twice}]"), message, "each frequency once");
             }
             return Self::Several(several);
         }

@@ -59,26 +59,25 @@ impl Boundaries {
             flux_normal: section.names("flux_normal").unwrap_or_default(),
             uniform_field: section.table("uniform_field").map(UniformField::read),
         };
-        if let Some(name) = boundaries.flux_parallel.iter().find(|name| boundaries.flux_normal.contains(name))
-        {
-            section.wrong(
-                "flux_normal",
+        for (i, name) in boundaries.flux_normal.iter().enumerate() {
+            let Some(k) = boundaries.flux_parallel.iter().position(|other| other == name) else { continue };
+            section.clash(
+                [&format!("flux_parallel[{k}]"), &format!("flux_normal[{i}]")],
                 format!("`{name}` is flux-parallel and flux-normal at once"),
                 "each surface in one of the two lists",
             );
         }
         let given = boundaries.uniform_field.iter().flat_map(|field| &field.surfaces);
-        for name in given {
-            for (kind, list) in
-                [("flux-parallel", &boundaries.flux_parallel), ("flux-normal", &boundaries.flux_normal)]
+        for (i, name) in given.enumerate() {
+            for (key, list) in
+                [("flux_parallel", &boundaries.flux_parallel), ("flux_normal", &boundaries.flux_normal)]
             {
-                if list.contains(name) {
-                    section.wrong(
-                        "uniform_field",
-                        format!("`{name}` is {kind} and has a uniform field at once"),
-                        "each surface with one condition",
-                    );
-                }
+                let Some(k) = list.iter().position(|other| other == name) else { continue };
+                section.clash(
+                    [&format!("{key}[{k}]"), &format!("uniform_field.surfaces[{i}]")],
+                    format!("`{name}` is {} and has a uniform field at once", key.replace('_', "-")),
+                    "each surface with one condition",
+                );
             }
         }
         boundaries

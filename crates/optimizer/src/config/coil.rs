@@ -7,7 +7,7 @@ use serde_json::json;
 use super::Dimension;
 use super::choice::choice;
 use super::range::Range;
-use super::section::{Section, first_duplicate};
+use super::section::Section;
 use crate::schema::form::{each_once, length as length_form, not_all_zero, not_zero, number, quantity};
 use crate::schema::rules::{Rules, Then};
 
@@ -314,10 +314,8 @@ const CENTER: &str = "[\"0 mm\", \"0 mm\", \"60 mm\"]";
 /// Read `[[coils]]`.
 pub(super) fn read_coils(root: &Section<'_>) -> Vec<Coil> {
     let coils: Vec<_> = root.tables("coils").into_iter().map(Coil::read).collect();
-    let names: Vec<_> = coils.iter().map(|coil| coil.name.clone()).filter(|name| !name.is_empty()).collect();
-    if let Some(name) = first_duplicate(&names) {
-        root.wrong("coils", format!("two coils are named `{name}`"), "a different name for each coil");
-    }
+    let names: Vec<_> = coils.iter().map(|coil| coil.name.clone()).collect();
+    root.named_twice("coils", &names, "coils", "a different name for each coil");
     coils
 }
 
@@ -333,8 +331,8 @@ impl Coil {
         let shape = section.choice("shape");
         let region = section.text("region");
         if section.has("shape") && section.has("region") {
-            section.wrong(
-                "region",
+            section.clash(
+                ["shape", "region"],
                 format!("`{}` has both `shape` and `region`", section.path()),
                 "shape with its dimensions, or region with its terminals",
             );
@@ -460,8 +458,8 @@ fn read_corner(section: &Section<'_>, half_window: Option<[f64; 2]>) -> Corner {
     let word = section.choice("corner");
     let radius = section.quantity("inner_radius", Dimension::Length, Range::POSITIVE);
     if section.has("corner") && section.has("inner_radius") {
-        section.wrong(
-            "inner_radius",
+        section.clash(
+            ["corner", "inner_radius"],
             format!("`{}` has both `corner` and `inner_radius`", section.path()),
             "one of them",
         );

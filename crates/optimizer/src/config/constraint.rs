@@ -10,7 +10,7 @@ use super::choice::choice;
 use super::design::COMPONENTS;
 use super::functional::{Functional, ObjectiveKind, Weighting, keys_of_the_kind};
 use super::range::Range;
-use super::section::{Section, first_duplicate};
+use super::section::Section;
 use crate::schema::form::{column_name, length, not_all_zero, number, of_some_dimension, quantity};
 use crate::schema::rules::{Rules, Then, is};
 
@@ -213,17 +213,13 @@ pub enum UpperBound {
 
 /// Read `[[constraints]]`; `frequencies` [Hz] are those of the analysis, empty where they are unknown.
 pub(super) fn read_constraints(root: &Section<'_>, frequencies: &[f64]) -> Vec<Constraint> {
-    let constraints: Vec<_> =
-        root.tables("constraints").into_iter().filter_map(|s| Constraint::read(s, frequencies)).collect();
-    let names: Vec<String> = constraints.iter().map(|c| c.name.clone()).collect();
-    if let Some(name) = first_duplicate(&names) {
-        root.wrong(
-            "constraints",
-            format!("two constraints are named `{name}`"),
-            "a different `name` for each constraint",
-        );
-    }
-    constraints
+    let constraints: Vec<Option<Constraint>> =
+        root.tables("constraints").into_iter().map(|s| Constraint::read(s, frequencies)).collect();
+    let name =
+        |constraint: &Option<Constraint>| constraint.as_ref().map_or(String::new(), |c| c.name.clone());
+    let names: Vec<String> = constraints.iter().map(name).collect();
+    root.named_twice("constraints", &names, "constraints", "a different `name` for each constraint");
+    constraints.into_iter().flatten().collect()
 }
 
 impl Constraint {
@@ -291,7 +287,7 @@ impl Constraint {
         {
             let message =
                 format!("`{}` asks for {minimum} m at least and {maximum} m at most", section.path());
-            section.wrong("maximum", message, "more than the minimum");
+            section.clash(["minimum", "maximum"], message, "more than the minimum");
         }
         Limit::Thickness { kind: ThicknessKind::Thickness, minimum, maximum }
     }
@@ -304,7 +300,7 @@ impl UpperBound {
         match (section.has("upper"), section.has("upper_ratio")) {
             (true, true) => {
                 let message = format!("`{}` has both `upper` and `upper_ratio`", section.path());
-                section.wrong("upper_ratio", message, "one of them");
+                section.clash(["upper", "upper_ratio"], message, "one of them");
             }
             (false, false) => {
                 section

@@ -135,8 +135,8 @@ impl Design {
         let length = |key, range| section.quantity(key, Dimension::Length, range);
         let filter_radius = length("filter_radius", Range::POSITIVE);
         if section.has("grid") && section.has("filter_radius") {
-            section.wrong(
-                "filter_radius",
+            section.clash(
+                ["grid", "filter_radius"],
                 "design.grid and design.filter_radius are both given: a grid is smooth already",
                 "one of them",
             );

@@ -25,13 +25,27 @@ pub struct Fault {
     pub expected: Option<String>,
     /// What to do.
     pub help: Option<String>,
+    /// A second place that the fault has to do with, such as where a key stood first, and what is there.
+    pub other: Option<(Place, String)>,
 }
 
 impl Fault {
+    /// A fault with a message only.
+    pub fn new(path: impl Into<String>, place: Place, message: impl Into<String>) -> Self {
+        Self { path: path.into(), place, message: message.into(), expected: None, help: None, other: None }
+    }
+
     /// The same fault with the expected value or range.
     #[must_use]
     pub fn expected(mut self, expected: impl Into<String>) -> Self {
         self.expected = Some(expected.into());
+        self
+    }
+
+    /// The same fault with a second place and what is there.
+    #[must_use]
+    pub fn other(mut self, place: Place, label: impl Into<String>) -> Self {
+        self.other = Some((place, label.into()));
         self
     }
 
@@ -43,6 +57,9 @@ impl Fault {
     }
 }
 
+/// How the message of a missing key starts.
+pub(super) const MISSING_KEY: &str = "missing key ";
+
 /// Gathers the faults of one reading: readers go on after a fault, so that all are reported at once.
 #[derive(Debug, Default)]
 pub(super) struct Faults(RefCell<Vec<Fault>>);
@@ -51,6 +68,26 @@ impl Faults {
     /// Record a fault.
     pub(super) fn push(&self, fault: Fault) {
         self.0.borrow_mut().push(fault);
+    }
+
+    /// Take back that a key of the table at a path is missing, alone or as one of several that would do: it is there,
+    /// misspelt.
+    pub(super) fn retract_missing(&self, table: &str, key: &str) {
+        let of_table = |path: &str| path.rsplit_once('.').map_or("", |(table, _)| table) == table;
+        let says = |fault: &Fault| {
+            let example = fault.help.as_deref().unwrap_or_default();
+            let forms = [format!(" {key} = "), format!("[{key}]"), format!(".{key}]")];
+            forms.iter().any(|form| example.contains(form.as_str()))
+        };
+        self.0.borrow_mut().retain(|fault| {
+            !(fault.message.starts_with(MISSING_KEY) && of_table(&fault.path) && says(fault))
+        });
+    }
+
+    /// Whether there is a fault in the table at a path.
+    pub(super) fn any_below(&self, table: &str) -> bool {
+        let below = |fault: &Fault| fault.path.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
+        self.0.borrow().iter().any(below)
     }
 
     /// All faults in the order of the text they stand in.
@@ -64,55 +101,4 @@ impl Faults {
 /// Brings faults into the order of the text they stand in.
 pub(super) fn sort(faults: &mut [Fault]) {
     faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
-}
-
-/// Longest name that is compared letter by letter [characters]: the comparison takes time and memory by the product of the
-/// lengths, and a longer name is no slip of the pen.
-const LONGEST_COMPARED: usize = 64;
-
-/// The candidate that `name` was probably meant to be, if one is near enough.
-///
-/// Near means at most one edit for every three letters (two at least for short names of four letters or
-/// more), or equal but for case, `-` and `_`.
-pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let fold = |text: &str| text.to_lowercase().replace(['-', ' '], "_");
-    let wanted = fold(name);
-    let length = wanted.chars().count();
-    if length > LONGEST_COMPARED {
-        return None;
-    }
-    let limit = if length >= 4 { (length / 3).max(2) } else { 1 };
-    candidates
-        .into_iter()
-        .filter(|candidate| candidate.chars().count() <= LONGEST_COMPARED + limit)
-        .map(|candidate| (fold(candidate), candidate))
-        // Every missing letter is an edit.
-        .filter(|(folded, _)| folded.chars().count().abs_diff(length) <= limit)
-        .map(|(folded, candidate)| (strsim::damerau_levenshtein(&wanted, &folded), candidate))
-        .filter(|(distance, _)| *distance <= limit)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::nearest;
-
-    #[test]
-    fn the_nearest_name_is_suggested_only_when_it_is_near() {
-        let names = ["frequency", "penalty", "x_min", "x_max"];
-        assert_eq!(nearest("freqency", names), Some("frequency"));
-        assert_eq!(nearest("Frequency", names), Some("frequency"));
-        assert_eq!(nearest("x-min", names), Some("x_min"));
-        assert_eq!(nearest("conductivity", names), None);
-        assert_eq!(nearest("", names), None);
-    }
-
-    #[test]
-    fn long_names_are_not_compared() {
-        // Compared letter by letter, these two would take eight gigabytes.
-        let (name, other) = ("a".repeat(32_000), "b".repeat(32_000));
-        assert_eq!(nearest(&name, [other.as_str(), "x_min"]), None);
-        assert_eq!(nearest("x_mim", [other.as_str(), "x_min"]), Some("x_min"));
-    }
 }

@@ -46,7 +46,7 @@ impl InitialDesign {
                 && let Some(k) = values.iter().position(|value| !(lower..=upper).contains(value))
             {
                 section.wrong(
-                    "initial",
+                    &format!("initial[{k}]"),
                     format!("design.initial[{k}] is {} m, outside of the bounds", values[k]),
                     format!("from {lower} m to {upper} m"),
                 );
@@ -79,10 +79,10 @@ impl InitialDesign {
 fn check_order(section: &Section<'_>, lower: Option<f64>, upper: Option<f64>) -> bool {
     let (Some(lower), Some(upper)) = (lower, upper) else { return false };
     if lower >= upper {
-        section.wrong(
-            "upper",
+        section.clash(
+            ["lower", "upper"],
             format!("the bounds cross: design.lower is {lower} m, design.upper is {upper} m"),
-            format!("design.upper above {lower} m"),
+            &format!("design.upper above {lower} m"),
         );
     }
     lower < upper

@@ -163,7 +163,8 @@ fn check_region(
             "model = \"volume\", or analysis.frequency above 0 Hz",
         );
     }
-    if material.conductivity == 0.0 {
+    // A conductivity may be there, misspelt.
+    if material.conductivity == 0.0 && !section.is_faulty(&format!("materials.{name}")) {
         section.wrong(
             "model",
             format!("`{}` has an impedance surface, but `{name}` does not conduct", section.path()),

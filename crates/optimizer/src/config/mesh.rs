@@ -126,8 +126,8 @@ impl MeshConfig {
         let sphere = section.table("sphere").map(SphereMesh::read).unwrap_or_default();
 
         match (section.has("generator"), section.has("file")) {
-            (true, true) => section.wrong(
-                "file",
+            (true, true) => section.clash(
+                ["generator", "file"],
                 "`mesh.file` and `mesh.generator` are both given",
                 "one of them: a mesh is read or generated",
             ),
@@ -135,8 +135,8 @@ impl MeshConfig {
                 section.missing("generator", "generator = \"shield\", or file = \"device.msh\"")
             }
             (false, true) if !section.has("unit") => section.missing("unit", "unit = \"mm\""),
-            (true, false) if section.has("unit") => section.wrong(
-                "unit",
+            (true, false) if section.has("unit") => section.clash(
+                ["generator", "unit"],
                 "`mesh.unit` belongs to `mesh.file`, and a generator is given",
                 "no unit: the generator's parameters carry their own",
             ),
@@ -229,10 +229,10 @@ impl BlockMesh {
 /// Depths of layers, each below the one before.
 fn layers(section: &Section<'_>, key: &'static str) -> Option<Vec<f64>> {
     let depths = section.length_list(key, Range::POSITIVE)?;
-    if let Some(pair) = depths.windows(2).find(|pair| pair[0] >= pair[1]) {
+    if let Some(k) = (1..depths.len()).find(|&k| depths[k - 1] >= depths[k]) {
         section.wrong(
-            key,
-            format!("`{}.{key}` goes from {} m to {} m", section.path(), pair[0], pair[1]),
+            &format!("{key}[{k}]"),
+            format!("`{}.{key}` goes from {} m to {} m", section.path(), depths[k - 1], depths[k]),
             "depths that grow from one to the next",
         );
         return None;

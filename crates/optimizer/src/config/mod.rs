@@ -14,10 +14,12 @@ mod design;
 mod fault;
 mod functional;
 mod initial;
+mod keys;
 mod linear_solver;
 mod material;
 mod mesh;
 mod morph;
+mod nearest;
 mod objective;
 mod optimizer;
 mod output;
@@ -26,6 +28,7 @@ pub(crate) mod range;
 mod remesh;
 pub(crate) mod section;
 mod source;
+mod syntax;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -48,7 +51,7 @@ pub use coil::{
 pub use confinement::OutputNamedBy;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
-pub use fault::{Fault, Place, nearest};
+pub use fault::{Fault, Place};
 pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use initial::InitialDesign;
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
@@ -61,12 +64,13 @@ pub use morph::{
     AutoWord, Case, DesignMotion, DesignWord, Increments, Morph, Paper, PrescribedMotion, Rotation, Scale,
     Target, Tune, TunedParameter,
 };
+pub use nearest::{nearest, nearest_two};
 pub use objective::{Goal, Objective, Probe, Sum, Term};
 pub use optimizer::{Algorithm, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use quantity::{Dimension, QuantityError, parse_quantity};
 pub use remesh::{Motion, Remesh, RemeshExtent, StiffnessLaw, Subregion};
-pub use source::{ConfigError, Document, FaultReport, Source};
+pub use source::{ConfigError, Document, FaultReport, Faulty, Source};
 
 use confinement::WrittenPaths;
 use fault::Faults;
@@ -276,7 +280,7 @@ fn read(
     stem: &str,
     overrides: &[String],
 ) -> Result<(Config, Source), ConfigError> {
-    let mut documents = vec![Document { name, text }];
+    let mut documents = vec![Document::whole(name, text)];
     documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
     let bare = Source {
         documents: documents.into(),
@@ -323,9 +327,10 @@ fn read(
     source.cases = cases.into();
     match config {
         Some(config) if faults.is_empty() => Ok((config, source)),
-        _ => {
+        unfinished => {
             fault::sort(&mut faults);
-            Err(source.error(faults))
+            let unfinished = unfinished.map(Box::new);
+            Err(ConfigError::Faults(Box::new(FaultReport { unfinished, ..FaultReport::new(source, faults) })))
         }
     }
 }

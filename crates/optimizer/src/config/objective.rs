@@ -7,7 +7,7 @@ use serde_json::json;
 use super::choice::choice;
 use super::functional::{Functional, keys_of_the_kind};
 use super::range::Range;
-use super::section::{Section, first_duplicate};
+use super::section::Section;
 use crate::schema::form::{length, not_empty, not_zero, number};
 use crate::schema::rules::{Rules, Then};
 
@@ -208,10 +208,7 @@ pub(super) fn read_probes(root: &Section<'_>) -> Vec<Probe> {
         probe
     };
     let probes: Vec<_> = root.tables("probes").into_iter().map(read).collect();
-    let names: Vec<_> =
-        probes.iter().map(|probe| probe.name.clone()).filter(|name| !name.is_empty()).collect();
-    if let Some(name) = first_duplicate(&names) {
-        root.wrong("probes", format!("two probes are named `{name}`"), "a different name for each probe");
-    }
+    let names: Vec<_> = probes.iter().map(|probe| probe.name.clone()).collect();
+    root.named_twice("probes", &names, "probes", "a different name for each probe");
     probes
 }

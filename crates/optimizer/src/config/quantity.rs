@@ -252,7 +252,14 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
         return fail(format!("`{written}` is not {}: it must start with a number", dimension.name()));
     };
     if unit_text.is_empty() {
-        return fail(format!("`{written}` has no unit"));
+        return Err(QuantityError {
+            message: format!("`{written}` has no unit"),
+            help: format!(
+                "write its unit behind it, like \"{written} {}\"; accepted units: {}",
+                dimension.example().split_once(' ').map_or("", |(_, unit)| unit),
+                dimension.accepted_units()
+            ),
+        });
     }
     if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
         let help = match number.scaled(0).filter(|rho| *rho > 0.0) {
@@ -267,8 +274,8 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
         let known: Vec<_> =
             UNITS.iter().filter(|unit| unit.dimension == dimension).map(|unit| unit.name).collect();
-        let hint = match super::nearest(unit_text, known.iter().copied()) {
-            Some(name) => format!("did you mean `{name}`? "),
+        let hint = match meant(unit_text, &known) {
+            Some(name) => format!("did you mean \"{} {name}\"? ", number.written),
             None => String::new(),
         };
         return Err(QuantityError {
@@ -285,6 +292,57 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     }
 }
 
+/// Whether a text starts with a number and goes on with a unit of any dimension.
+pub(super) fn is_number_with_unit(text: &str) -> bool {
+    let (number, unit) = split_number(text.trim());
+    number.is_some() && unit.starts_with(|c: char| c.is_alphabetic() || c == '\u{b0}')
+}
+
+/// The unit of a few that another text was probably meant to be: one that differs by case alone before all others.
+fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
+    let by_name =
+        SPELLED_OUT.iter().filter(|(name, _)| text.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit);
+    let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text));
+    by_case
+        .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
+        .or_else(|| super::nearest(text, known.iter().copied()))
+}
+
+/// Units by their full names.
+const SPELLED_OUT: &[(&str, &str)] = &[
+    ("meter", "m"),
+    ("metre", "m"),
+    ("meters", "m"),
+    ("metres", "m"),
+    ("millimeter", "mm"),
+    ("millimetre", "mm"),
+    ("millimeters", "mm"),
+    ("millimetres", "mm"),
+    ("micron", "um"),
+    ("inch", "in"),
+    ("inches", "in"),
+    ("hertz", "Hz"),
+    ("ampere", "A"),
+    ("amperes", "A"),
+    ("amp", "A"),
+    ("amps", "A"),
+    ("tesla", "T"),
+    ("gauss", "G"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("\u{b0}", "deg"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("sec", "s"),
+    ("minute", "min"),
+    ("minutes", "min"),
+    ("hour", "h"),
+    ("hours", "h"),
+    ("watt", "W"),
+    ("watts", "W"),
+    ("joule", "J"),
+];
+
 impl Dimension {
     /// The name of the dimension without its article.
     pub(crate) fn noun(self) -> &'static str {
@@ -294,6 +352,8 @@ impl Dimension {
 
 /// A decimal number as written: mantissa digits and the power of ten behind them.
 struct Number<'a> {
+    /// All of it.
+    written: &'a str,
     mantissa: &'a str,
     exponent: i32,
 }
@@ -330,7 +390,7 @@ fn split_number(text: &str) -> (Option<Number<'_>>, &str) {
                 text[fraction + 1..end].parse().unwrap_or(if sign_is_minus { -100_000 } else { 100_000 });
         }
     }
-    (Some(Number { mantissa: &text[..fraction], exponent }), text[end..].trim_start())
+    (Some(Number { written: &text[..end], mantissa: &text[..fraction], exponent }), text[end..].trim_start())
 }
 
 #[cfg(test)]
@@ -383,7 +443,10 @@ mod tests {
             ("- 5 mm", Length, "must start with a number"),
             (".", Length, "must start with a number"),
             ("60 Hz", Length, "is a frequency, not a length"),
-            ("60 hz", Frequency, "did you mean `Hz`?"),
+            ("60 hz", Frequency, "did you mean \"60 Hz\"?"),
+            ("10 MM", Length, "did you mean \"10 mm\"?"),
+            ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
+            ("10", Length, "write its unit behind it, like \"10 mm\""),
             ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
             ("0 Ohm m", Conductivity, "is a resistivity"),
             ("1e400 m", Length, "too large"),

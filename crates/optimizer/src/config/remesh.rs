@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::choice::choice;
 use super::range::Range;
-use super::section::{Section, first_duplicate};
+use super::section::Section;
 use crate::schema::form::{integer, length, name_or_names, names, number};
 use crate::schema::rules::Rules;
 
@@ -167,9 +167,10 @@ impl Remesh {
         let lists = [("slide", &remesh.slide), ("fixed", &remesh.fixed), ("free", &remesh.free)];
         for (index, (key, names)) in lists.iter().enumerate() {
             for (earlier_key, earlier) in &lists[..index] {
-                if let Some(name) = names.iter().find(|name| earlier.contains(name)) {
-                    section.wrong(
-                        key,
+                for (i, name) in names.iter().enumerate() {
+                    let Some(k) = earlier.iter().position(|earlier| earlier == name) else { continue };
+                    section.clash(
+                        [&format!("{earlier_key}[{k}]"), &format!("{key}[{i}]")],
                         format!("`{name}` stands in remesh.{earlier_key} and remesh.{key}"),
                         "each surface in one of the lists",
                     );
@@ -177,9 +178,7 @@ impl Remesh {
             }
         }
         let names: Vec<_> = remesh.subregions.iter().map(|subregion| subregion.name.clone()).collect();
-        if let Some(name) = first_duplicate(&names).filter(|name| !name.is_empty()) {
-            section.wrong("subregions", format!("two subregions are named `{name}`"), "each region once");
-        }
+        section.named_twice("subregions", &names, "subregions", "each region once");
         section.finish();
         remesh
     }
@@ -204,7 +203,7 @@ fn read_extent(section: &Section<'_>) -> RemeshExtent {
     let corners = section.corners("box");
     match (section.has("region"), section.has("box")) {
         (true, true) => {
-            section.wrong("box", "remesh.region and remesh.box are both given", "one of them");
+            section.clash(["region", "box"], "remesh.region and remesh.box are both given", "one of them");
         }
         (false, false) => {
             section.missing("region", "region = \"remesh\", or box = [[0, 0, 0], [1, 1, 1]]");

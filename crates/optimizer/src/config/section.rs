@@ -5,12 +5,13 @@
 //! placeholder never reaches a caller; that of numbers is NaN, with which no later comparison holds.
 
 mod lists;
+mod unknown;
 
 use std::cell::RefCell;
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 use super::choice::Choice;
-use super::fault::{Fault, Faults, Place};
+use super::fault::{Fault, Faults, MISSING_KEY, Place};
 use super::quantity::{Dimension, parse_quantity};
 use super::range::Range;
 use super::source::suggest;
@@ -92,6 +93,11 @@ impl<'a> Section<'a> {
         self.table.get(key).is_some_and(|node| matches!(node.value, Value::Table(_)))
     }
 
+    /// Whether another table, which was read before, has a fault.
+    pub(super) fn is_faulty(&self, table: &str) -> bool {
+        self.faults.any_below(table)
+    }
+
     /// Record a fault at a key that is known and not read.
     pub(super) fn refuse(&self, key: &'static str, message: impl Into<String>, expected: impl Into<String>) {
         self.asked.borrow_mut().push(key);
@@ -108,11 +114,49 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
-    /// Record a fault at a key of this table, or at the table when the key is not written.
+    /// Record a fault at a key of this table, or at the table when the key is not written. The key may lead on into lists and
+    /// tables: `terminals[1]`, `coils[1].name`.
     pub(super) fn fault(&self, key: &str, fill: impl FnOnce(Fault) -> Fault) {
-        let place = self.table.get(key).map_or_else(|| self.place.clone(), |node| node.place.clone());
         let path = if key.is_empty() { self.path.clone() } else { join(&self.path, key) };
-        self.faults.push(fill(Fault { path, place, message: String::new(), expected: None, help: None }));
+        self.faults.push(fill(Fault::new(path, self.place_of(key), String::new())));
+    }
+
+    /// The place of a key as for [`Self::fault`].
+    fn place_of(&self, key: &str) -> Place {
+        let mut place = self.place.clone();
+        let mut table = Some(self.table);
+        for part in key.split('.') {
+            let mut steps = part.split('[');
+            let Some(mut node) = table.and_then(|table| table.get(steps.next()?)) else { return place };
+            for step in steps {
+                let index = step.trim_end_matches(']').parse::<usize>().ok();
+                let Value::Array(items) = &node.value else { return node.place.clone() };
+                let Some(item) = index.and_then(|index| items.get(index)) else { return node.place.clone() };
+                node = item;
+            }
+            place = node.place.clone();
+            table = if let Value::Table(inner) = &node.value { Some(inner) } else { None };
+        }
+        place
+    }
+
+    /// Record a fault about two keys that do not go together: at the second, with the first as the other place.
+    pub(super) fn clash(&self, [first, second]: [&str; 2], message: impl Into<String>, expected: &str) {
+        let place = self.place_of(first);
+        let label = format!("`{first}` stands here");
+        self.fault(second, |fault| {
+            Fault { message: message.into(), ..fault }.expected(expected).other(place, label)
+        });
+    }
+
+    /// Record that two items of a list of tables have one name.
+    pub(super) fn named_twice(&self, key: &str, names: &[String], what: &str, expected: &str) {
+        let Some([first, second]) = first_duplicate(names) else { return };
+        let message = format!("two {what} are named `{}`", shown(&names[second]));
+        let place = self.place_of(&format!("{key}[{first}].name"));
+        self.fault(&format!("{key}[{second}].name"), |fault| {
+            Fault { message, ..fault }.expected(expected).other(place, "the name stands here first")
+        });
     }
 
     /// Record a fault with a message and what is expected instead.
@@ -122,7 +166,7 @@ impl<'a> Section<'a> {
 
     fn wrong_at(&self, node: &Node, path: &str, message: String, expected: &str, help: Option<String>) {
         let expected = (!expected.is_empty()).then(|| expected.to_owned());
-        self.faults.push(Fault { path: path.to_owned(), place: node.place.clone(), message, expected, help });
+        self.faults.push(Fault { expected, help, ..Fault::new(path, node.place.clone(), message) });
     }
 
     /// The value, or a placeholder with a fault when the key is missing; `example` is a value to write.
@@ -137,7 +181,7 @@ impl<'a> Section<'a> {
     pub(super) fn missing(&self, key: &str, example: &str) {
         let table = if self.path.is_empty() { String::new() } else { format!(" in `{}`", self.path) };
         self.fault(key, |fault| {
-            Fault { message: format!("missing key `{key}`{table}"), ..fault }
+            Fault { message: format!("{MISSING_KEY}`{key}`{table}"), ..fault }
                 .help(format!("add a line like: {example}"))
         });
     }
@@ -154,7 +198,7 @@ impl<'a> Section<'a> {
             Value::Float(value) => value,
             ref other => {
                 let message = format!("`{path}` is {}, not a number", other.describe());
-                self.wrong_at(node, path, message, "a number without quotes and unit", None);
+                self.wrong_at(node, path, message, "a number without quotes and unit", other.as_number());
                 return None;
             }
         };
@@ -231,7 +275,7 @@ impl<'a> Section<'a> {
             },
             ref other => {
                 let message = format!("`{path}` is {}, not a whole number", other.describe());
-                self.wrong_at(node, path, message, &expected, None);
+                self.wrong_at(node, path, message, &expected, other.as_number());
             }
         }
         None
@@ -255,7 +299,7 @@ impl<'a> Section<'a> {
             Value::Text(text) => return Some(text.clone()),
             other => {
                 let message = format!("`{path}` is {}, not a text", other.describe());
-                self.wrong_at(node, path, message, "a text in quotes", None);
+                self.wrong_at(node, path, message, "a text in quotes", other.as_text());
             }
         }
         None
@@ -269,7 +313,11 @@ impl<'a> Section<'a> {
         }
         let path = join(&self.path, key);
         let message = format!("`{path}` is {}, not true or false", node.value.describe());
-        self.wrong_at(node, &path, message, "true or false, without quotes", None);
+        let help = match &node.value {
+            Value::Text(text) if matches!(text.as_str(), "true" | "false") => Some(format!("write {text}")),
+            _ => None,
+        };
+        self.wrong_at(node, &path, message, "true or false, without quotes", help);
         None
     }
 
@@ -299,7 +347,11 @@ impl<'a> Section<'a> {
             Value::Table(table) => Some(Section::new(path, table, node.place.clone(), self.faults)),
             other => {
                 let message = format!("`{path}` is {}, not a table", other.describe());
-                self.wrong_at(node, &path, message, &format!("a table: [{path}]"), None);
+                let help = match other {
+                    Value::Array(_) => Some(format!("write [{path}] with single brackets, once")),
+                    _ => None,
+                };
+                self.wrong_at(node, &path, message, &format!("a table: [{path}]"), help);
                 None
             }
         }
@@ -311,7 +363,11 @@ impl<'a> Section<'a> {
         let Some(node) = self.get(key) else { return Vec::new() };
         let Value::Array(items) = &node.value else {
             let message = format!("`{path}` is {}, not a list of tables", node.value.describe());
-            self.wrong_at(node, &path, message, &format!("a list of tables: [[{path}]]"), None);
+            let help = match &node.value {
+                Value::Table(_) => Some(format!("write [[{path}]] with double brackets, once for each")),
+                _ => None,
+            };
+            self.wrong_at(node, &path, message, &format!("a list of tables: [[{path}]]"), help);
             return Vec::new();
         };
         let section = |(index, item)| self.section_of(item, format!("{path}[{index}]"));
@@ -333,29 +389,11 @@ impl<'a> Section<'a> {
         };
         section.table.iter().filter_map(named).collect()
     }
-
-    /// Report every key that nobody asked for.
-    pub(super) fn finish(self) {
-        let asked = self.asked.into_inner();
-        let mut known = asked.clone();
-        known.sort_unstable();
-        known.dedup();
-        for (key, node) in self.table.iter().filter(|(key, _)| !asked.contains(&key.as_str())) {
-            let table = if self.path.is_empty() { String::new() } else { format!(" in `{}`", self.path) };
-            let fault = Fault {
-                path: join(&self.path, key),
-                place: node.key_place.clone(),
-                message: format!("unknown key `{}`{table}", shown(key)),
-                expected: None,
-                help: None,
-            };
-            self.faults.push(suggest(fault, key, &known));
-        }
-    }
 }
 
-/// The first name that comes a second time.
-pub(super) fn first_duplicate(names: &[String]) -> Option<&String> {
-    let mut known = HashSet::with_capacity(names.len());
-    names.iter().find(|name| !known.insert(name.as_str()))
+/// Positions of a name and of the place where it comes a second time; empty names are left out.
+pub(super) fn first_duplicate(names: &[String]) -> Option<[usize; 2]> {
+    let mut known = HashMap::with_capacity(names.len());
+    let named = names.iter().enumerate().filter(|(_, name)| !name.is_empty());
+    named.into_iter().find_map(|(i, name)| known.insert(name.as_str(), i).map(|first| [first, i]))
 }

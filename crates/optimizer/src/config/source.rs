@@ -8,6 +8,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::Config;
 use super::confinement::WrittenPaths;
 use super::fault::{Fault, Place};
 use super::tree::{self, Table};
@@ -17,8 +18,17 @@ use super::tree::{self, Table};
 pub struct Document {
     /// What to call it in messages: the path as typed, or `--set`.
     pub name: String,
-    /// The whole text.
+    /// The whole text, or the part of it that is shown.
     pub text: String,
+    /// The number of its first line, from 1.
+    pub first_line: usize,
+}
+
+impl Document {
+    /// All of a text.
+    pub fn whole(name: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { name: name.into(), text: text.into(), first_line: 1 }
+    }
 }
 
 /// Where a configuration came from. A clone shares the texts, and so does every case of a sweep.
@@ -38,6 +48,25 @@ impl Source {
     /// The same texts with the places and paths of one reading of them.
     pub(super) fn of_tree(&self, tree: &Table) -> Self {
         Self { places: tree::places(tree), written: WrittenPaths::of(tree), ..self.clone() }
+    }
+
+    /// A text without keys.
+    fn of_document(document: Document) -> Self {
+        Self {
+            documents: [document].into(),
+            places: BTreeMap::new(),
+            written: WrittenPaths::default(),
+            directory: PathBuf::new(),
+            stem: String::new(),
+            cases: [].into(),
+        }
+    }
+
+    /// The same with one more text, and the number of that.
+    pub fn with_document(&self, document: Document) -> (Self, usize) {
+        let documents: Arc<[Document]> = self.documents.iter().cloned().chain([document]).collect();
+        let number = documents.len() - 1;
+        (Self { documents, ..self.clone() }, number)
     }
 
     /// The file first, then the overrides in the order given.
@@ -82,13 +111,7 @@ impl Source {
 
     /// A fault at a key path; add what was expected and what to do with the methods of [`Fault`].
     pub fn fault(&self, path: &str, message: impl Into<String>) -> Fault {
-        Fault {
-            path: path.to_owned(),
-            place: self.place(path),
-            message: message.into(),
-            expected: None,
-            help: None,
-        }
+        Fault::new(path, self.place(path), message)
     }
 
     /// A fault about a name that is not among the known ones: suggests the nearest and lists them.
@@ -99,7 +122,7 @@ impl Source {
 
     /// The error that reports these faults at their places.
     pub fn error(&self, faults: Vec<Fault>) -> ConfigError {
-        ConfigError::Faults(Box::new(FaultReport { source: self.clone(), faults }))
+        ConfigError::Faults(Box::new(FaultReport::new(self.clone(), faults)))
     }
 
     /// `Ok` without faults, else the error that reports them.
@@ -111,32 +134,72 @@ impl Source {
     }
 }
 
-/// Most names that a fault compares with and lists: a hostile mesh may have as many as it has bytes.
-const MOST_NAMES: usize = 100;
+/// Most names that a fault lists: a mesh may have many, and a hostile one as many as it has bytes.
+const MOST_NAMES: usize = 30;
 
 /// The fault with the nearest known name as help and all known names as the expectation.
-pub(super) fn suggest(mut fault: Fault, name: &str, known: &[&str]) -> Fault {
-    if let Some(nearest) = super::nearest(name, known.iter().copied().take(MOST_NAMES)) {
-        fault = fault.help(format!("did you mean `{nearest}`?"));
-    }
+pub(super) fn suggest(fault: Fault, name: &str, known: &[&str]) -> Fault {
+    let offer = super::nearest::offer(name, known.iter().copied());
+    let fault = match offer {
+        Some(offer) => fault.help(offer),
+        None => fault,
+    };
+    fault.expected(listed(known))
+}
+
+/// The known names in one line.
+pub(super) fn listed(known: &[&str]) -> String {
     match known {
-        [] => fault.expected("none is known here"),
-        _ if known.len() > MOST_NAMES => fault.expected(format!(
-            "known: {} and {} more",
-            known[..MOST_NAMES].join(", "),
-            known.len() - MOST_NAMES
-        )),
-        _ => fault.expected(format!("known: {}", known.join(", "))),
+        [] => "none is known here".to_owned(),
+        _ if known.len() > MOST_NAMES => {
+            format!("known: {} and {} more", known[..MOST_NAMES].join(", "), known.len() - MOST_NAMES)
+        }
+        _ => format!("known: {}", known.join(", ")),
     }
 }
 
-/// All faults of one configuration, with the texts they stand in.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// What kind of file is at fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Faulty {
+    /// A configuration.
+    Configuration,
+    /// A file with a design.
+    Design,
+}
+
+impl Faulty {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Configuration => "configuration",
+            Self::Design => "design",
+        }
+    }
+}
+
+/// All faults of one configuration, or of another file, with the texts they stand in.
+#[derive(Debug, Clone, PartialEq)]
 pub struct FaultReport {
     /// The texts.
     pub source: Source,
     /// The faults, in the order to be shown.
     pub faults: Vec<Fault>,
+    /// What the first text is.
+    pub of: Faulty,
+    /// What could be read all the same, with placeholders for the rest: good for further checks of names only.
+    pub(crate) unfinished: Option<Box<Config>>,
+}
+
+impl FaultReport {
+    /// The faults of a configuration.
+    pub fn new(source: Source, faults: Vec<Fault>) -> Self {
+        Self { source, faults, of: Faulty::Configuration, unfinished: None }
+    }
+
+    /// The fault of another file.
+    pub fn of_file(of: Faulty, document: Document, fault: Fault) -> Self {
+        Self { of, ..Self::new(Source::of_document(document), vec![fault]) }
+    }
 }
 
 impl fmt::Display for FaultReport {

@@ -7,6 +7,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::fault::{Fault, Place};
 use super::source::Document;
+use super::syntax;
 
 /// Longest path of a key [bytes]. The place of every value is kept by its path: without a limit one long name of a table
 /// would be repeated for all that stands in it.
@@ -53,6 +54,25 @@ impl Value {
     }
 }
 
+impl Value {
+    /// The advice to write a text that is a number as one.
+    pub(super) fn as_number(&self) -> Option<String> {
+        let Self::Text(text) = self else { return None };
+        let number: f64 = text.trim().parse().ok()?;
+        number.is_finite().then(|| format!("write {} without quotes", text.trim()))
+    }
+
+    /// The advice to write a number or a truth value as a text.
+    pub(super) fn as_text(&self) -> Option<String> {
+        match self {
+            Self::Integer(value) => Some(format!("write \"{value}\"")),
+            Self::Float(value) => Some(format!("write \"{value}\"")),
+            Self::Boolean(value) => Some(format!("write \"{value}\"")),
+            _ => None,
+        }
+    }
+}
+
 /// A text for a message: escaped, and not longer than a line.
 pub(super) fn shown(text: &str) -> String {
     const LONGEST: usize = 60;
@@ -71,25 +91,14 @@ pub(super) fn parse(document: usize, text: &str) -> Result<Table, Vec<Fault>> {
         let table = convert_table(document, table.get_ref());
         return match first_long_path(&table, 0) {
             None => Ok(table),
-            Some(place) => Err(vec![Fault {
-                path: String::new(),
-                place: place.clone(),
-                message: format!(
-                    "the key and the tables around it have names of more than {LONGEST_PATH} bytes"
-                ),
-                expected: Some("shorter names".to_owned()),
-                help: None,
-            }]),
+            Some(place) => {
+                let message =
+                    format!("the key and the tables around it have names of more than {LONGEST_PATH} bytes");
+                Err(vec![Fault::new("", place.clone(), message).expected("shorter names")])
+            }
         };
     }
-    let fault = |error: &toml::de::Error| Fault {
-        path: String::new(),
-        place: Place { document, span: error.span().unwrap_or(0..0) },
-        message: format!("not valid TOML: {}", error.message().trim().replace('\n', ", ")),
-        expected: None,
-        help: None,
-    };
-    Err(errors.iter().map(fault).collect())
+    Err(syntax::faults(document, text, &errors))
 }
 
 /// The place of the first key whose path is too long, in a table whose own path has `length` bytes.
@@ -223,7 +232,7 @@ pub(super) fn override_document(typed: &str) -> Document {
     const LONGEST: usize = 200;
     let cut = typed.chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c });
     let dots = if typed.chars().nth(LONGEST).is_some() { "…" } else { "" };
-    Document { name: format!("--set '{}{dots}'", cut.collect::<String>()), text }
+    Document::whole(format!("--set '{}{dots}'", cut.collect::<String>()), text)
 }
 
 /// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.
@@ -246,7 +255,7 @@ pub(super) fn overlay(base: &mut Table, over: Table, path: &str) -> Result<(), B
 fn overlay_node(existing: &mut Node, node: Node, path: &str) -> Result<(), Box<Fault>> {
     let fault = |place: &Place, message: String, help: String| {
         let place = place.clone();
-        Err(Box::new(Fault { path: path.to_owned(), place, message, expected: None, help: Some(help) }))
+        Err(Box::new(Fault::new(path, place, message).help(help)))
     };
     let Value::Table(inner) = node.value else {
         *existing = node;
@@ -273,11 +282,8 @@ fn overlay_node(existing: &mut Node, node: Node, path: &str) -> Result<(), Box<F
         }
         other => {
             let what = other.describe();
-            fault(
-                &node.key_place,
-                format!("`{path}` is {what} and has no keys"),
-                format!("set `{path}` itself"),
-            )
+            let place = inner.values().next().map_or(&node.key_place, |first| &first.key_place);
+            fault(place, format!("`{path}` is {what} and has no keys"), format!("set `{path}` itself"))
         }
     }
 }

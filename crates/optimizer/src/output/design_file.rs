@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 use fluxmorph_geometry::io::open_regular;
 use serde_json::Value;
 
+use super::json_place;
+use crate::config::{Document, Fault, FaultReport, Faulty, Place};
+
 /// Largest design file that is read [bytes]: a million variables with their points.
 const LARGEST: u64 = 256 * 1024 * 1024;
 
@@ -31,8 +34,14 @@ pub enum DesignFileError {
         /// What is wrong with it.
         message: String,
     },
+    /// The file holds something else at one place.
+    #[error("{0}")]
+    Fault(Box<FaultReport>),
     /// The design does not fit the problem.
-    #[error("the design `{path}` has {found} values, but the problem has {expected} design variables")]
+    #[error(
+        "the design `{path}` has {found} values, but the problem has {expected} design variables; give one value [m] for \
+         each, as `design.values_m` of a result.json of the same design"
+    )]
     Count {
         /// The file.
         path: PathBuf,
@@ -55,7 +64,18 @@ pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileE
     if bytes.len() as u64 > LARGEST {
         return Err(content(format!("it has more than {LARGEST} bytes")));
     }
-    let value: Value = serde_json::from_slice(&bytes).map_err(|error| content(error.to_string()))?;
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|error| content(format!("it is not UTF-8 text at byte {}", error.valid_up_to())))?;
+    let faulty = |span: std::ops::Range<usize>, message: String| {
+        let document = Document::whole(path.display().to_string(), text);
+        let fault = Fault::new("", Place { document: 0, span }, message)
+            .help("give a result.json or a JSON array of lengths in metres");
+        DesignFileError::Fault(Box::new(FaultReport::of_file(Faulty::Design, document, fault)))
+    };
+    let value: Value = serde_json::from_str(text).map_err(|error| {
+        let span = json_place::at_line(text, error.line(), error.column());
+        faulty(span, format!("not a design: no valid JSON, {error}"))
+    })?;
     let list = match &value {
         Value::Object(_) => value.pointer("/design/values_m"),
         other => Some(other),
@@ -64,7 +84,12 @@ pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileE
         return Err(content("it has no list `design.values_m`".to_owned()));
     };
     let number = |(index, item): (usize, &Value)| {
-        item.as_f64().ok_or_else(|| content(format!("item {index} is {item}, not a number")))
+        item.as_f64().ok_or_else(|| {
+            let from = text.find("\"values_m\"").filter(|_| value.is_object()).unwrap_or(0);
+            let span = json_place::item(text, from, index).unwrap_or(0..0);
+            let shown: String = item.to_string().chars().take(60).collect();
+            faulty(span, format!("item {index} is {shown}, not a number"))
+        })
     };
     let values = list.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
     if values.len() != expected {

@@ -216,6 +216,13 @@ impl Manifest {
         self.program == PROGRAM
     }
 
+    /// Whether the manifest in a folder names another program.
+    pub(super) fn is_of_another(directory: &RunDirectory) -> bool {
+        let bytes = directory.disk().read(&directory.manifest(), LARGEST).unwrap_or_default();
+        let value: Option<serde_json::Value> = serde_json::from_slice(&bytes).ok();
+        value.is_some_and(|value| value.get("program").and_then(|name| name.as_str()) != Some(PROGRAM))
+    }
+
     /// Write the manifest into a run directory, replacing an older one.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ mod design_file;
 mod disk;
 mod files;
 mod history;
+mod json_place;
 mod manifest;
 mod names;
 mod process;
@@ -68,7 +69,7 @@ pub enum OutputError {
     },
     /// Another process writes into the run directory.
     #[error(
-        "`{path}` is written by another process: wait for it, stop it, or choose another directory with --out"
+        "`{path}` is written by another process: wait for it or stop it; a new run may write elsewhere with --out"
     )]
     InUse {
         /// The file that it holds.
@@ -76,7 +77,7 @@ pub enum OutputError {
     },
     /// A folder of a run is a link.
     #[error(
-        "`{path}` is a link, and nothing is written through links; remove it, or choose another directory with --out"
+        "`{path}` is a link, and nothing is written through links; remove it; a new run may write elsewhere with --out"
     )]
     Linked {
         /// The link.
@@ -107,7 +108,7 @@ fn advice(error: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     match error.kind() {
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-            "choose a directory you may write to with --out"
+            "choose a directory you may write to, for a new run with --out"
         }
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "free some space, or keep fewer files with output.fields"

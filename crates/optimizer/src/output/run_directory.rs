@@ -103,8 +103,13 @@ impl RunDirectory {
     /// When the folder does not hold one.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, OutputError> {
         let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
-        if !directory.holds_run() {
-            return Err(OutputError::NoRun { path: path.to_owned() });
+        match Manifest::read(&directory) {
+            Ok(manifest) if manifest.is_ours() => {}
+            // One that cannot be understood is that of a run all the same, unless it says that it is another program's.
+            Err(damaged @ OutputError::Damaged { .. }) if !Manifest::is_of_another(&directory) => {
+                return Err(damaged);
+            }
+            _ => return Err(OutputError::NoRun { path: path.to_owned() }),
         }
         directory.refuse_link()?;
         Ok(directory)

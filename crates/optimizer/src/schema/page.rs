@@ -69,10 +69,7 @@ impl<'a> Page<'a> {
                 Some((form, name)) => self.table(2, key, form, name),
                 None => {
                     self.text += &format!("\n## `{key}`\n\n");
-                    self.rows(
-                        &BTreeMap::from([(key.as_str(), property)]).into_iter().collect::<Vec<_>>(),
-                        document,
-                    );
+                    self.rows(&[(key.as_str(), property)], document);
                 }
             }
         }

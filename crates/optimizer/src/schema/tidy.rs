@@ -87,7 +87,8 @@ fn paragraphs(text: &str) -> String {
     for line in text.lines().map(str::trim_end) {
         let fence = line.starts_with("```");
         let same_paragraph = !in_code && !fence && !line.is_empty() && !joined.ends_with('\n');
-        if !joined.is_empty() {
+        let after_blank = !in_code && joined.ends_with("\n\n");
+        if !joined.is_empty() && !after_blank {
             joined.push_str(if same_paragraph { " " } else { "\n" });
         }
         if line.is_empty() && !in_code {

@@ -31,6 +31,7 @@ use crate::output::{
 };
 use crate::problem::{Problem, Want};
 use crate::rounds::RoundEvent;
+use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
 use crate::stage::Stage;
 use recorder::{DirectoryRecorder, write_collection, write_field};
@@ -70,7 +71,7 @@ pub fn run(
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
     let approach = setup.problem.approach(&initial, options.interrupted);
-    let approach = approach.map_err(|error| unreached(error, source))?;
+    let approach = approach.map_err(|error| unreached(error, config, source))?;
     let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
         let directory = session.directory.clone();
@@ -276,7 +277,12 @@ impl<'a> Session<'a> {
     ) -> Result<RunResult, Error> {
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             self.write_configuration()?;
-            let result = work(&mut self, observer)?;
+            let result = work(&mut self, observer).map_err(|error| match error {
+                Error::Constraint { .. } | Error::FirstDesign { .. } => {
+                    placed(error, self.config, self.source)
+                }
+                other => other,
+            })?;
             finite::result(&result)?;
             result.write(&self.directory)?;
             Ok::<RunResult, Error>(result)
@@ -342,12 +348,9 @@ impl<'a> Session<'a> {
 }
 
 /// A first design that the mesh cannot reach is a fault of the configuration.
-fn unreached(error: Error, source: &Source) -> Error {
+fn unreached(error: Error, config: &Config, source: &Source) -> Error {
     match error {
-        Error::DesignUnreached { .. } => {
-            let fault = source.fault("design.initial", error.to_string());
-            source.error(vec![fault]).into()
-        }
+        Error::DesignUnreached { .. } => placed(error, config, source),
         other => other,
     }
 }

@@ -96,7 +96,7 @@ pub fn resume(
     let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
     let approach = setup.problem.approach(&initial, options.interrupted).map_err(|error| match error {
         Error::Interrupted => Error::InterruptedRun,
-        other => unreached(other, &source),
+        other => unreached(other, &config, &source),
     })?;
     let setup_seconds = clock.elapsed().as_secs_f64();
     let mut session = Session {

@@ -3,8 +3,9 @@
 use fluxmorph_geometry::{Mesh, Topology};
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, Reuse};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, UniformField};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, SolverError, UniformField};
 
+use super::blame::Gathered;
 use crate::config::{self, Config, FactorReuse, Fault, RegionModel, SolverMethod, Source};
 use crate::error::Error;
 
@@ -73,13 +74,14 @@ pub(super) fn field_models(
     config: &Config,
     mesh: &Mesh,
     impedance_surfaces: &[Conductor],
+    coils: &[coil::Coil],
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
     for &frequency in config.analysis.frequencies() {
         // A model above 0 Hz shares all but its numbers with another.
         models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
             Some(model) => model.at_frequency(mesh, frequency)?,
-            None => field_model(config, mesh, frequency, impedance_surfaces.to_vec())?,
+            None => field_model(config, mesh, frequency, impedance_surfaces.to_vec(), coils.to_vec())?,
         });
     }
     Ok(models)
@@ -90,9 +92,9 @@ fn field_model(
     mesh: &Mesh,
     frequency: f64,
     impedance_surfaces: Vec<Conductor>,
+    coils: Vec<coil::Coil>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
-    let coils = config.coils.iter().map(|c| coil(c, mesh)).collect::<Result<Vec<_>, Error>>()?;
     let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
         names.iter().map(|name| (name.clone(), boundary)).collect()
     };
@@ -198,9 +200,25 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     model.coils().iter().filter_map(notice).collect()
 }
 
-/// Every region that a coil names and the mesh does not have, and every region that no coil can be.
-pub(super) fn coil_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
-    let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+/// The coils on the mesh, or the faults of all of them.
+pub(super) fn coils(config: &Config, source: &Source, mesh: &Mesh) -> Result<Vec<coil::Coil>, Error> {
+    let mut gathered = Gathered::new(config, source, Vec::new());
+    let mut coils = Vec::new();
+    for (i, written) in config.coils.iter().enumerate() {
+        let made = coil(written, mesh).map_err(|error| match error {
+            Error::Solver(SolverError::Parameter { ref what, .. }) => {
+                source.error(vec![source.fault(&format!("coils[{i}].{what}"), error.to_string())]).into()
+            }
+            other => other,
+        });
+        coils.extend(gathered.take(made)?);
+    }
+    gathered.check()?;
+    Ok(coils)
+}
+
+/// Every region that no coil can be, and every phase that means nothing.
+pub(super) fn coil_faults(config: &Config, source: &Source) -> Vec<Fault> {
     let mut faults = Vec::new();
     let is_static = config.analysis.frequencies().contains(&0.0);
     for (i, coil) in config.coils.iter().enumerate() {
@@ -212,9 +230,6 @@ pub(super) fn coil_faults(config: &Config, source: &Source, topology: &Topology)
         }
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
-        if topology.region(name).is_err() {
-            faults.push(source.unknown_name(&path, "region", name, &regions));
-        }
         if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
             let fault = source.fault(&path, format!("`{name}` is replaced by its impedance surface"));
             faults.push(fault.expected("a region that is meshed"));

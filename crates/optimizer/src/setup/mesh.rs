@@ -4,15 +4,20 @@
 //! the mesh under that name before anything else looks for it, so that every key may use it.
 
 use std::collections::{BTreeSet, HashSet};
+use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
+use fluxmorph_geometry::io::msh::{MshError, Place as MshPlace};
 use fluxmorph_geometry::io::read_msh_file;
 use fluxmorph_geometry::topology::OUTSIDE;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
-use crate::config::{CoilPath, CoilShape, Config, Fault, LengthUnit, MeshConfig, Source, Target};
+use super::blame::with_advice;
+use crate::config::{
+    CoilPath, CoilShape, Config, ConfigError, Document, Fault, LengthUnit, MeshConfig, Place, Source, Target,
+};
 use crate::error::Error;
 use crate::output::OutputError;
 
@@ -61,13 +66,24 @@ fn parameter_fault(error: MeshError, source: &Source) -> Error {
 /// A fault of a mesh file is shown at the key that names it.
 fn file_fault(error: MeshError, source: &Source) -> Error {
     match error {
-        MeshError::Msh { path, cause } => {
-            let fault = source.fault("mesh.file", format!("mesh file `{}`, {cause}", path.display()));
-            source.error(vec![fault]).into()
-        }
+        MeshError::Msh { path, cause } => msh_fault(&path, &cause, source).into(),
         MeshError::File { path, cause } => OutputError::io("read", path)(cause).into(),
         other => other.into(),
     }
+}
+
+/// A fault of a mesh file is shown in the file where that is text, and at the key that names it.
+fn msh_fault(path: &Path, error: &MshError, source: &Source) -> ConfigError {
+    let file = path.display().to_string();
+    let fault = with_advice(source.fault("mesh.file", format!("mesh file `{file}`, {error}")));
+    let (MshPlace::Line(first_line), Some(excerpt)) = (error.place, &error.excerpt) else {
+        return source.error(vec![fault]);
+    };
+    let document = Document { name: file, text: excerpt.text.clone(), first_line };
+    let (source, number) = source.with_document(document);
+    let place = Place { document: number, span: excerpt.span.clone() };
+    let named = fault.place.clone();
+    source.error(vec![Fault { place, ..fault }.other(named, "the file is named here")])
 }
 
 /// Every surface that the configuration names, with the path of its key.
@@ -85,7 +101,7 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         if let CoilShape::Region(region) = &coil.shape
             && let CoilPath::Terminals { terminals } = &region.path
         {
-            add(&format!("coils[{i}].terminals"), terminals);
+            add(&format!("coils[{i}].terminals"), terminals.as_slice());
         }
     }
     if let Some(remesh) = &config.remesh {
@@ -148,13 +164,11 @@ pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topolo
             _ => source.unknown_name(&path, "surface", name, &surfaces),
         }),
     };
-    let mut faults: Vec<Fault> = surface_names(config).into_iter().filter_map(fault).collect();
-    faults.extend(inner_faults(config, source, topology));
-    faults
+    surface_names(config).into_iter().filter(|(_, name)| !name.is_empty()).filter_map(fault).collect()
 }
 
 /// Every condition on a surface that does not lie at the outside of the mesh.
-fn inner_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+pub(super) fn inner_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
     let outer: HashSet<[NodeId; 3]> =
         topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
     surface_names(config)

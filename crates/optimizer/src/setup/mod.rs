@@ -4,6 +4,7 @@
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
 //! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
+pub(crate) mod blame;
 mod design;
 mod field;
 mod functional;
@@ -22,10 +23,11 @@ use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
 
-use crate::config::{self, Config, Fault, RegionModel, Source};
+use crate::config::{self, Config, ConfigError, Fault, FaultReport, RegionModel, Source};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::stage::{Stage, Told};
+use blame::Gathered;
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]
@@ -100,6 +102,10 @@ pub fn set_up_watched(
     if purpose == Purpose::Optimisation {
         config.optimisation(source)?;
     }
+    made(config, source, purpose, told).map_err(|error| blame::placed(error, config, source))
+}
+
+fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> Result<Setup, Error> {
     told(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;
@@ -107,7 +113,7 @@ pub fn set_up_watched(
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
-    source.check(probe_faults(config, source, &full_mesh, &mesh))?;
+    let mut gathered = Gathered::new(config, source, probe_faults(config, source, &full_mesh, &mesh));
     let conditions = &config.boundaries;
     let free = conditions.flux_parallel.is_empty()
         && conditions.flux_normal.is_empty()
@@ -117,10 +123,27 @@ pub fn set_up_watched(
         let fault = source
             .fault("boundaries", "no surface has a condition: the potential is known up to a constant only")
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
-        return Err(source.error(vec![fault]).into());
+        gathered.take::<()>(Err(source.error(vec![fault]).into()))?;
     }
     told(Stage::Unknowns);
-    let states = field::field_models(config, &mesh, &conductors)?;
+    let coils = gathered.take(field::coils(config, source, &mesh))?;
+    let design = match (&config.design, &config.remesh) {
+        (Some(design), Some(remesh)) => {
+            Some(shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh })
+        }
+        _ => None,
+    };
+    let body = match &design {
+        Some(inputs) => gathered.take(shape::body(inputs, config, &mut warnings))?,
+        None => None,
+    };
+    // Neither needs the other: what is wrong with them is told together.
+    let states = match coils {
+        Some(coils) => gathered.take(field::field_models(config, &mesh, &conductors, &coils))?,
+        None => None,
+    };
+    gathered.check()?;
+    let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
         warnings.push(
@@ -130,11 +153,10 @@ pub fn set_up_watched(
     }
     let objective = functional::objective(config, &mesh, &states)?;
     let (mut shape, mut constraints) = (None, Vec::new());
-    if let (Some(design), Some(remesh)) = (&config.design, &config.remesh) {
-        let inputs = shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh };
+    if let (Some(inputs), Some(body)) = (&design, body) {
         let observed = functional::observed(config, &mesh, &states)?;
         told(Stage::Elasticity);
-        let made = shape::shape(&inputs, config, &states[0], &observed, &mut warnings)?;
+        let made = shape::shape(inputs, config, body, &states[0], &observed)?;
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
         shape = Some(made);
     }
@@ -191,11 +213,66 @@ fn phasor(coil: &config::Coil) -> c64 {
     c64::from_polar(coil.ampere_turns, coil.phase)
 }
 
-/// Every name of the configuration that the mesh does not have, and every region named that is empty.
+/// A report of what is wrong with the text of a configuration, with what is wrong with its names in the mesh as well.
+///
+/// That is looked at where the tables of the mesh are sound. What could be read stands in for the rest: a name that is
+/// missing or faulty is empty, and left out.
+pub fn with_names(error: ConfigError) -> ConfigError {
+    match error {
+        ConfigError::Faults(report) => ConfigError::Faults(Box::new(report_with_names(*report))),
+        other => other,
+    }
+}
+
+fn report_with_names(report: FaultReport) -> FaultReport {
+    let FaultReport { source, mut faults, of, unfinished } = report;
+    let of_mesh = |fault: &Fault| {
+        let path = fault.path.as_str();
+        path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
+    };
+    let Some(config) = unfinished.filter(|_| !faults.iter().any(of_mesh)) else {
+        return FaultReport { source, faults, of, unfinished: None };
+    };
+    let confined = source.confined(config::OutputNamedBy::User).is_ok();
+    if confined && crate::memory_limit::check_mesh(&config, &source).is_ok() {
+        match mesh::build(&config, &source) {
+            Ok(built) => {
+                let found = names(&config, &source, built.mesh.topology());
+                // A place that has a fault already says enough.
+                let new = |fault: &Fault| faults.iter().all(|known| known.place != fault.place);
+                let found: Vec<Fault> = found.into_iter().filter(new).collect();
+                faults.extend(found);
+                faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
+            }
+            // Places of the mesh file belong to the texts of its own report, behind those of the configuration.
+            Err(Error::Config(ConfigError::Faults(mut of_mesh))) => {
+                of_mesh.faults.splice(0..0, faults);
+                return *of_mesh;
+            }
+            Err(_) => {}
+        }
+    }
+    FaultReport { source, faults, of, unfinished: None }
+}
+
+/// Every name of the configuration that the mesh does not have, every region named that is empty, and every one that cannot
+/// be used as it is.
 fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
-    let mut faults = field::coil_faults(config, source, topology);
+    let mut faults = names(config, source, topology);
+    faults.extend(field::coil_faults(config, source));
+    faults.extend(mesh::inner_faults(config, source, topology));
+    faults.extend(functional::faults(config, source, topology));
+    faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
+    faults
+}
+
+/// Every name of the configuration that the mesh does not have, and every region named that is empty; empty names are left
+/// out.
+fn names(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let mut faults = Vec::new();
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     let mut region = |path: String, name: &str| match topology.region(name) {
+        _ if name.is_empty() => {}
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
             faults.push(source.fault(&path, format!("the region `{name}` has no elements")));
@@ -205,13 +282,18 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
     for name in config.regions.keys() {
         region(format!("regions.{name}"), name);
     }
+    for (i, coil) in config.coils.iter().enumerate() {
+        if let config::CoilShape::Region(own) = &coil.shape {
+            region(format!("coils[{i}].region"), &own.region);
+        }
+    }
     for (path, name) in functional::regions(config) {
         region(path, name);
     }
     if let Some(remesh) = &config.remesh {
         if let config::RemeshExtent::Regions(names) = &remesh.extent {
-            for name in names {
-                region("remesh.region".to_owned(), name);
+            for (i, name) in names.iter().enumerate() {
+                region(format!("remesh.region[{i}]"), name);
             }
         }
         for (i, subregion) in remesh.subregions.iter().enumerate() {
@@ -219,7 +301,6 @@ fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fau
         }
     }
     faults.extend(mesh::surface_faults(config, source, topology));
-    faults.extend(functional::faults(config, source, topology));
     faults
 }
 

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::Guidance;
 
-use super::shape::{body, regions_at, remesh_setup};
+use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, Source};
 use crate::design::DesignSurface;
@@ -82,7 +82,7 @@ fn outlined(
     let surface = design::surface(config, source, design, full_mesh)?;
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
-    let body = body(full_mesh, &surface, config);
+    let body = thickened(full_mesh, &surface, config);
     let thickness = body.and_then(|region| Thickness::measure(full_mesh, region, &surface));
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     let bodies = match body {

@@ -33,13 +33,17 @@ pub(super) struct Inputs<'a> {
     pub(super) mesh: &'a Mesh,
 }
 
-pub(super) fn shape(
-    inputs: &Inputs<'_>,
-    config: &Config,
-    model: &FieldModel,
-    observed: &[(String, Vec<ElementId>)],
-    warnings: &mut Vec<String>,
-) -> Result<Shape, Error> {
+/// The design surface and the elastic map, before they are held against the field problem.
+pub(super) struct Body {
+    /// On the mesh with all regions.
+    full_surface: DesignSurface,
+    /// On the mesh that is left.
+    surface: DesignSurface,
+    motion: Motion,
+}
+
+/// Makes the design surface and the elastic map.
+pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<String>) -> Result<Body, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let full_surface = super::design::surface(config, source, design, full_mesh)?;
     let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
@@ -69,15 +73,31 @@ pub(super) fn shape(
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
     let motion = Motion::new(mesh.clone(), setup)?;
-    overlap_faults(inputs, motion.moving(), model, observed)?;
-    source.check(held_node_fault(inputs, &surface, motion.map(), model).into_iter().collect())?;
-    let thickness = body(full_mesh, &full_surface, config)
+    Ok(Body { full_surface, surface, motion })
+}
+
+/// The shape of a body, held against the field problem and the bounds.
+pub(super) fn shape(
+    inputs: &Inputs<'_>,
+    config: &Config,
+    body: Body,
+    model: &FieldModel,
+    observed: &[(String, Vec<ElementId>)],
+) -> Result<Shape, Error> {
+    let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
+    let Body { full_surface, surface, motion } = body;
+    let mut faults = overlap_faults(inputs, config, motion.moving(), model, observed);
+    if faults.is_empty() {
+        faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
+    }
+    let thickness = thickened(full_mesh, &full_surface, config)
         .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
-    let initial = design.initial.values(n, design.lower, design.upper).ok_or_else(|| {
+    let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
         let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
-        source.error(vec![fault.expected(format!("one value for each of the {n} design variables"))])
-    })?;
+        faults.push(fault.expected(format!("one value for each of the {n} design variables")));
+        Vec::new()
+    });
     let quality = motion.quality(mesh).worst;
     if let Some(minimum) = config.optimizer.minimum_quality.filter(|minimum| quality < *minimum) {
         let message = format!(
@@ -85,8 +105,9 @@ pub(super) fn shape(
              {minimum}"
         );
         let fault = source.fault("optimizer.minimum_quality", message);
-        return Err(source.error(vec![fault.expected(format!("at most {quality:.3e}"))]).into());
+        faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
+    source.check(faults)?;
     let limits = Limits {
         inversion_share: inputs.remesh.inversion_share,
         least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
@@ -240,7 +261,7 @@ pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<Regio
 }
 
 /// The region that a positive design thickens: behind the design surface, and not air.
-pub(super) fn body(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+pub(super) fn thickened(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
     let topology = mesh.topology();
     let direction_at = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok()?;
@@ -269,10 +290,11 @@ fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
 /// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
 fn overlap_faults(
     inputs: &Inputs<'_>,
+    config: &Config,
     moving: &[ElementId],
     model: &FieldModel,
     observed: &[(String, Vec<ElementId>)],
-) -> Result<(), Error> {
+) -> Vec<Fault> {
     let Inputs { source, mesh, .. } = *inputs;
     let moves = |e: &ElementId| moving.binary_search(e).is_ok();
     let mut faults = Vec::new();
@@ -288,14 +310,34 @@ fn overlap_faults(
         let place = centroid(mesh.vertices(e));
         faults.push(
             source
-                .fault("coils", format!("a coil reaches into the remesh region, at {}", millimetres(place)))
+                .fault(
+                    &coil_at(config, mesh, e),
+                    format!("a coil reaches into the remesh region, at {}", millimetres(place)),
+                )
                 .expected(
                     "coils and their windows outside the remesh region: a coil does not move with the mesh",
                 )
                 .help("shrink the remesh region, or move the coil"),
         );
     }
-    Ok(source.check(faults)?)
+    faults
+}
+
+/// The key path that says where the coil in an element lies; all coils where several may be it.
+fn coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> String {
+    let topology = mesh.topology();
+    let name = &topology.region_names()[topology.region_of()[element.index()].index()];
+    let in_region =
+        |coil: &config::Coil| matches!(&coil.shape, config::CoilShape::Region(own) if own.region == *name);
+    if let Some(i) = config.coils.iter().position(in_region) {
+        return format!("coils[{i}].region");
+    }
+    let analytic = |coil: &config::Coil| !matches!(coil.shape, config::CoilShape::Region(_));
+    let of_shape: Vec<usize> = (0..config.coils.len()).filter(|&i| analytic(&config.coils[i])).collect();
+    match of_shape.as_slice() {
+        [one] => format!("coils[{one}].center"),
+        _ => "coils".to_owned(),
+    }
 }
 
 /// Refuses a motion of nodes whose condition belongs to where they lie: on curved or oblique surfaces, and where A is

@@ -33,6 +33,7 @@ impl SourceTerms {
                     let moments = moments(racetrack, mesh);
                     if moments.is_empty() {
                         return Err(SolverError::NoSource {
+                            coil: coil.name.clone(),
                             cause: format!(
                                 "the coil `{}` lies outside the mesh; check its centre and the mesh unit",
                                 coil.name

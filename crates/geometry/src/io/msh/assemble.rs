@@ -50,6 +50,7 @@ pub(super) fn assemble(mut contents: Contents<'_>) -> Result<MshMesh, MshError> 
         topology = topology.with_surface(&name, triangles).map_err(|error| refused(&contents, &error))?;
     }
     let mesh = Mesh::new(Arc::new(topology), points).map_err(|error| refused(&contents, &error))?;
+    name_unnamed(&mut contents);
     Ok(MshMesh { mesh, notices: contents.notices })
 }
 
@@ -80,6 +81,20 @@ fn groups(
     }
     let names = tags.iter().map(|&tag| contents.names.of(dimension, tag)).collect();
     Ok((tags.into_iter().collect(), names))
+}
+
+/// Most made names that a notice lists.
+const MOST_LISTED: usize = 20;
+
+/// Notes the groups in use that have no name of their own.
+fn name_unnamed(contents: &mut Contents<'_>) {
+    let volumes: BTreeSet<i32> = contents.tetrahedra.iter().map(|tet| tet.group).collect();
+    let surfaces: BTreeSet<i32> = contents.triangles.iter().map(|triangle| triangle.group).collect();
+    let groups = volumes.into_iter().map(|tag| (3, tag)).chain(surfaces.into_iter().map(|tag| (2, tag)));
+    let unnamed = groups.filter(|&(dimension, tag)| !contents.names.is_named(dimension, tag));
+    let names: Vec<String> =
+        unnamed.take(MOST_LISTED).map(|(dimension, tag)| contents.names.of(dimension, tag)).collect();
+    contents.notices.unnamed_groups = names;
 }
 
 /// Whether two tetrahedra have the same four nodes.

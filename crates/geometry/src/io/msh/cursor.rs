@@ -4,7 +4,7 @@
 //! ASCII records are kept to their lines although the format does not ask for it (all known writers do): a number too
 //! few then shows on its own line, and not where the numbers run out.
 
-use super::error::{MshError, MshFault, Place, Subject};
+use super::error::{Excerpt, MshError, MshFault, Place, Subject};
 
 /// Bytes of a token that a message shows.
 const SHOWN: usize = 40;
@@ -76,7 +76,23 @@ impl<'a> Cursor<'a> {
 
     /// A fault of a subject at a position.
     pub(super) fn fault_at(&self, position: usize, subject: Subject, fault: MshFault) -> MshError {
-        MshError { place: self.place(position), subject, fault }
+        let place = self.place(position);
+        let excerpt = match place {
+            Place::Line(_) => Some(Box::new(Excerpt::of(self.bytes, position))),
+            Place::Byte(_) => None,
+        };
+        MshError { place, subject, fault, excerpt }
+    }
+
+    /// The position of the next number: in an ASCII file of the next word on this line, or of the line's end.
+    pub(super) fn next_word(&self) -> usize {
+        if self.encoding == Encoding::Ascii { self.next_word_of_text() } else { self.position }
+    }
+
+    /// The position of the next word on this line, of the line's end where there is none.
+    pub(super) fn next_word_of_text(&self) -> usize {
+        let blanks = self.bytes[self.position..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
+        self.position + blanks
     }
 
     fn truncated(&self, expected: &'static str) -> MshError {

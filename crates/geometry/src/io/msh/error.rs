@@ -71,6 +71,41 @@ pub struct MshError {
     pub subject: Subject,
     /// What is wrong.
     pub fault: MshFault,
+    /// The line of an ASCII file; `None` in the numbers of a binary one.
+    pub excerpt: Option<Box<Excerpt>>,
+}
+
+/// A line of an ASCII file and the place in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Excerpt {
+    /// The line, or the part of a long one around the place.
+    pub text: String,
+    /// Bytes of `text`: the word at the place, empty at the end of the line.
+    pub span: std::ops::Range<usize>,
+}
+
+impl Excerpt {
+    /// Most bytes of a line on either side of a place.
+    const MOST: usize = 2000;
+
+    /// The line of a byte; bytes that are no text are replaced.
+    pub(super) fn of(bytes: &[u8], position: usize) -> Self {
+        let position = position.min(bytes.len());
+        let is_end = |b: &u8| matches!(b, b'\n' | b'\r');
+        let start = bytes[..position].iter().rposition(|b| *b == b'\n').map_or(0, |end| end + 1);
+        let end = bytes[position..].iter().position(is_end).map_or(bytes.len(), |length| position + length);
+        let start = start.max(position.saturating_sub(Self::MOST));
+        let end = end.min(position.saturating_add(Self::MOST));
+        let length = bytes[position..end].iter().position(u8::is_ascii_whitespace).unwrap_or(end - position);
+        // Tabs would take the underlining out of step.
+        let shown = |part: &[u8]| {
+            let text = String::from_utf8_lossy(part);
+            text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>()
+        };
+        let (before, word) = (shown(&bytes[start..position]), shown(&bytes[position..position + length]));
+        let span = before.len()..before.len() + word.len();
+        Self { text: before + &word + &shown(&bytes[position + length..end]), span }
+    }
 }
 
 /// What is wrong in a Gmsh file.

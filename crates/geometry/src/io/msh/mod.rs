@@ -27,7 +27,7 @@ mod writer;
 
 use std::path::Path;
 
-pub use error::{MshError, MshFault, Place, Subject};
+pub use error::{Excerpt, MshError, MshFault, Place, Subject};
 pub use notices::MshNotices;
 pub use writer::{MshEncoding, msh_bytes};
 

@@ -13,6 +13,10 @@ pub struct MshNotices {
     pub second_order: usize,
     /// Left-handed tetrahedra, two nodes of which were exchanged.
     pub reoriented: usize,
+    /// Physical groups without a name, by the name that they are given.
+    pub unnamed_groups: Vec<String>,
+    /// Volumes of the geometry that belong to no physical group and have no tetrahedra in the file, by tag.
+    pub ungrouped_volumes: Vec<i32>,
     /// Nodes that no tetrahedron has as a vertex, and are dropped; midside nodes are among them.
     pub unused_nodes: usize,
     /// Triangles that are faces of no tetrahedron, and are dropped, by surface.
@@ -45,6 +49,20 @@ impl MshNotices {
         }
         if self.reoriented > 0 {
             messages.push(format!("{} left-handed tetrahedra are turned around", self.reoriented));
+        }
+        if !self.unnamed_groups.is_empty() {
+            messages.push(format!(
+                "physical groups without a name are called `{}`: give them names, or use these",
+                self.unnamed_groups.join("`, `")
+            ));
+        }
+        if !self.ungrouped_volumes.is_empty() {
+            let tags: Vec<String> = self.ungrouped_volumes.iter().map(i32::to_string).collect();
+            messages.push(format!(
+                "the volumes {} of the geometry belong to no physical group and are left out of the mesh: put them into one \
+                 if they are part of the device, air included",
+                tags.join(", ")
+            ));
         }
         if self.unused_nodes > 0 {
             messages

@@ -16,7 +16,7 @@ pub use tune::{Tune, TunedParameter};
 use super::Config;
 use super::choice::choice;
 use super::range::Range;
-use super::section::{Section, first_duplicate};
+use super::section::Section;
 use super::tree::{self, Table};
 use crate::schema::form::{Overlay, integer, number};
 use crate::schema::rules::Rules;
@@ -189,9 +189,7 @@ impl Morph {
             );
         }
         let names: Vec<_> = cases.iter().map(|case| case.name.clone()).collect();
-        if let Some(name) = first_duplicate(&names).filter(|name| !name.is_empty()) {
-            section.wrong("case", format!("two cases are named `{name}`"), "each name once");
-        }
+        section.named_twice("case", &names, "cases", "each name once");
         section.finish();
         Self {
             increments: increments.unwrap_or(Increments::Auto(AutoWord::Auto)),

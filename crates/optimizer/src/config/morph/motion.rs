@@ -182,8 +182,8 @@ fn read_target(section: &Section<'_>) -> Target {
     match given.as_slice() {
         [] => section.missing("surface", "surface = \"top\", or line, nodes, box or design"),
         [_] => {}
-        [first, second, ..] => section.wrong(
-            second,
+        [first, second, ..] => section.clash(
+            [first, second],
             format!("`{}` has both `{first}` and `{second}`", section.path()),
             "one of surface, line, nodes, box and design",
         ),

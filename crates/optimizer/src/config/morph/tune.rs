@@ -4,8 +4,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::choice::{Choice, choice};
+use super::super::fault::Fault;
 use super::super::range::Range;
 use super::super::section::Section;
+use super::super::source::suggest;
+use super::super::tree::shown;
 use crate::config::remesh::POISSON;
 use crate::schema::form::{each_once, integer, not_empty, number};
 
@@ -99,13 +102,17 @@ fn read_parameters(section: &Section<'_>) -> Option<Vec<TunedParameter>> {
     if names.is_empty() {
         section.wrong("parameters", "`morph.tune.parameters` is an empty list", "at least one parameter");
     }
-    let parameter = |name: &String| {
+    let words: Vec<&str> = TunedParameter::CHOICES.iter().map(|(word, _)| *word).collect();
+    let parameter = |(i, name): (usize, &String)| {
         let found = TunedParameter::CHOICES.iter().find(|(word, _)| word == name).map(|(_, choice)| *choice);
         if found.is_none() {
-            let message = format!("`morph.tune.parameters` cannot hold `{}`", name.escape_debug());
-            section.wrong("parameters", message, "young, poisson, force");
+            let message = format!("`morph.tune.parameters` cannot hold `{}`", shown(name));
+            section.fault(&format!("parameters[{i}]"), |fault| {
+                suggest(Fault { message, ..fault }, name, &words)
+            });
         }
         found
     };
-    names.iter().map(parameter).collect()
+    let found: Vec<_> = names.iter().enumerate().map(parameter).collect();
+    found.into_iter().collect()
 }

@@ -1,8 +1,9 @@
 //! Lists and arrays of a table: of numbers, quantities, points, corners and names.
 
+use super::super::fault::Fault;
 use super::super::quantity::Dimension;
 use super::super::range::Range;
-use super::super::tree::{Node, Value, join};
+use super::super::tree::{Node, Value, join, shown};
 use super::{LONGEST_LIST, Section, first_duplicate};
 
 impl Section<'_> {
@@ -191,8 +192,12 @@ impl Section<'_> {
     /// A list of different names.
     pub(in crate::config) fn names(&self, key: &'static str) -> Option<Vec<String>> {
         let names = self.list(key, "names", |item, path| self.text_of(item, path))?;
-        if let Some(twice) = first_duplicate(&names) {
-            self.wrong(key, format!("`{}` names `{twice}` twice", join(&self.path, key)), "each name once");
+        if let Some([first, second]) = first_duplicate(&names) {
+            let message = format!("`{}` names `{}` twice", join(&self.path, key), shown(&names[second]));
+            let place = self.place_of(&format!("{key}[{first}]"));
+            self.fault(&format!("{key}[{second}]"), |fault| {
+                Fault { message, ..fault }.expected("each name once").other(place, "it stands here first")
+            });
             return None;
         }
         Some(names)

@@ -68,14 +68,14 @@ const CASES: &[Case] = &[
         "[boundaries]",
         "[[coils]]\nname = \"coil\"\nshape = \"racetrack\"\nampere_turns = 1\ncenter = [0, 0, 0]\n\
       half_window = [1, 1]\nwidth = 1\nheight = 1\n[boundaries]",
-        "coils",
+        "coils[1].name",
         "two coils are named `coil`",
         0,
     ),
-    ("[\"x_min\", \"y_min\"]", "[\"x_min\", \"x_min\"]", "boundaries.flux_parallel", "`x_min` twice", 22),
+    ("[\"x_min\", \"y_min\"]", "[\"x_min\", \"x_min\"]", "boundaries.flux_parallel[1]", "`x_min` twice", 22),
     ("[\"x_min\", \"y_min\"]", "[\"x_min\", 3]", "boundaries.flux_parallel[1]", "not a text", 22),
     ("[\"x_min\", \"y_min\"]", "[\"x_min\", \"\"]", "boundaries.flux_parallel[1]", "is empty", 22),
-    ("\"y_min\"]", "\"y_min\"]\nflux_normal = [\"y_min\"]", "boundaries.flux_normal", "at once", 23),
+    ("\"y_min\"]", "\"y_min\"]\nflux_normal = [\"y_min\"]", "boundaries.flux_normal[0]", "at once", 23),
     (
         "region = \"observation\"",
         "region = \"observation\"\nkind = \"lost\"",
@@ -85,7 +85,7 @@ const CASES: &[Case] = &[
     ),
     ("\"60 Hz\"", "60\nfrequencies = [60]", "analysis.frequencies", "both", 7),
     ("frequency = \"60 Hz\"", "frequencies = []", "analysis.frequencies", "is an empty list", 6),
-    ("frequency = \"60 Hz\"", "frequencies = [50, 200, 50]", "analysis.frequencies", "has 50 Hz twice", 6),
+    ("frequency = \"60 Hz\"", "frequencies = [50, 200, 50]", "analysis.frequencies[2]", "has 50 Hz twice", 6),
     ("frequency = \"60 Hz\"", "frequencies = [50, \"1 m\"]", "analysis.frequencies[1]", "is a length", 6),
     (
         "region = \"observation\"",
@@ -226,7 +226,13 @@ const CASES: &[Case] = &[
     ("[remesh]", "[remesh]\nbox = [[0, 0, 0], [1, 1, 1]]", "remesh.box", "both given", 32),
     ("region = \"remesh\"", "box = [[0, 0, 0], [1, 1, 0]]", "remesh.box", "has no volume", 32),
     ("region = \"remesh\"", "region = []", "remesh.region", "is an empty list", 32),
-    ("[\"x_min\"]", "[\"x_min\"]\nfixed = [\"x_min\"]", "remesh.fixed", "remesh.slide and remesh.fixed", 34),
+    (
+        "[\"x_min\"]",
+        "[\"x_min\"]\nfixed = [\"x_min\"]",
+        "remesh.fixed[0]",
+        "remesh.slide and remesh.fixed",
+        34,
+    ),
     ("[optimizer]", "[optimizer]\nalgorithm = \"MMA2\"", "optimizer.algorithm", "cannot be", 35),
     ("[optimizer]", "[optimizer]\nmax_evaluations = 0", "optimizer.max_evaluations", "out of range", 35),
     (
@@ -241,7 +247,7 @@ const CASES: &[Case] = &[
     ("[[\"0 mm\", \"0 mm\", \"-50 mm\"]]", "[]", "probes[0].points", "is an empty list", 38),
     ("[[\"0 mm\", \"0 mm\", \"-50 mm\"]]", "[[0, 0]]", "probes[0].points[0]", "has 2 items", 38),
     ("[[probes]]", "[output]\nfields = \"all\"\n[[probes]]", "output.fields", "cannot be `all`", 37),
-    ("[\"0.4 mm\", \"1.2 mm\"]", "[\"0.4 mm\", \"0.2 mm\"]", "mesh.shield.skin", "goes from", 4),
+    ("[\"0.4 mm\", \"1.2 mm\"]", "[\"0.4 mm\", \"0.2 mm\"]", "mesh.shield.skin[1]", "goes from", 4),
     ("generator = \"shield\"", "generator = \"block\"", "mesh.shield", "has no use", 3),
     (
         "generator = \"shield\"",

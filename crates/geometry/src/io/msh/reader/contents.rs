@@ -81,18 +81,21 @@ impl GroupNames {
                 };
                 return Err(cursor.fault_at(start, cursor.subject.clone(), fault));
             }
+            let at_tag = cursor.next_word_of_text();
             let tag = cursor.text_int(GROUP_TAG)?;
             if tag <= 0 {
                 let fault = MshFault::Unexpected { expected: GROUP_TAG, found: tag.to_string() };
-                return Err(cursor.fault_at(start, cursor.subject.clone(), fault));
+                return Err(cursor.fault_at(at_tag, cursor.subject.clone(), fault));
             }
             let subject = Subject::Group { dimension, tag };
-            let name = name(cursor.line()).map_err(|fault| cursor.fault_at(start, subject.clone(), fault))?;
+            let at_name = cursor.next_word_of_text();
+            let name =
+                name(cursor.line()).map_err(|fault| cursor.fault_at(at_name, subject.clone(), fault))?;
             if groups.names.insert((dimension, tag), name.clone()).is_some() {
-                return Err(cursor.fault_at(start, subject, MshFault::DeclaredTwice));
+                return Err(cursor.fault_at(at_tag, subject, MshFault::DeclaredTwice));
             }
             if let Some(first) = groups.owners.insert((dimension, name.clone()), tag) {
-                return Err(cursor.fault_at(start, subject, MshFault::NameTwice { name, first }));
+                return Err(cursor.fault_at(at_name, subject, MshFault::NameTwice { name, first }));
             }
         }
         Ok(groups)
@@ -101,6 +104,11 @@ impl GroupNames {
     /// Tags of the named groups of a dimension, ascending.
     pub(crate) fn tags(&self, dimension: i32) -> impl Iterator<Item = i32> {
         self.names.range((dimension, i32::MIN)..=(dimension, i32::MAX)).map(|(&(_, tag), _)| tag)
+    }
+
+    /// Whether a group has a name of its own.
+    pub(crate) fn is_named(&self, dimension: i32, tag: i32) -> bool {
+        self.names.contains_key(&(dimension, tag))
     }
 
     /// The name of a group: as given, or made from its tag.
@@ -166,7 +174,7 @@ impl<'n> ElementList<'n> {
     ) -> Result<[u32; N], MshError> {
         let mut vertices = [0; N];
         for k in 0..shape.nodes {
-            let start = cursor.position();
+            let start = cursor.next_word();
             let tag = next(cursor, "the tag of a node")?;
             match (self.nodes.find(tag), vertices.get_mut(k)) {
                 (Some(position), Some(vertex)) => *vertex = position,

@@ -69,10 +69,7 @@ pub(super) fn read(bytes: &[u8], scale: Scale) -> Result<Contents<'_>, MshError>
             .map_err(|refused| refused.at(&cursor, start))?;
         end_of_section(&mut cursor, name, known)?;
     }
-    let missing = |section| {
-        let place = cursor.place(bytes.len());
-        MshError { place, subject: Subject::File, fault: MshFault::MissingSection { section } }
-    };
+    let missing = |section| cursor.fault_at(bytes.len(), Subject::File, MshFault::MissingSection { section });
     let nodes = sections.nodes.ok_or_else(|| missing("Nodes"))?;
     let elements = sections.elements.ok_or_else(|| missing("Elements"))?;
     let names = sections.names.unwrap_or_default();
@@ -192,24 +189,26 @@ fn header(cursor: &mut Cursor<'_>) -> Result<Version, MshError> {
     }
     cursor.subject = Subject::Section("MeshFormat".into());
     cursor.end_line()?;
-    let line = cursor.begin_record();
-    let fault = |cursor: &Cursor<'_>, fault| cursor.fault_at(line, cursor.subject.clone(), fault);
+    let mut at = cursor.begin_record();
+    let fault = |cursor: &Cursor<'_>, at, fault| cursor.fault_at(at, cursor.subject.clone(), fault);
     let version = match cursor.word("the version of the format")? {
         b"2.2" => Version::V2,
         b"4.1" => Version::V4,
-        other => return Err(fault(cursor, MshFault::Version { found: shown(other) })),
+        other => return Err(fault(cursor, at, MshFault::Version { found: shown(other) })),
     };
+    at = cursor.next_word();
     let binary = match cursor.word("0 for ASCII or 1 for binary")? {
         b"0" => false,
         b"1" => true,
         other => {
             let expected = "0 for ASCII or 1 for binary";
-            return Err(fault(cursor, MshFault::Unexpected { expected, found: shown(other) }));
+            return Err(fault(cursor, at, MshFault::Unexpected { expected, found: shown(other) }));
         }
     };
+    at = cursor.next_word();
     let size = cursor.word("the data size")?;
     if size != b"8" {
-        return Err(fault(cursor, MshFault::DataSize { found: shown(size) }));
+        return Err(fault(cursor, at, MshFault::DataSize { found: shown(size) }));
     }
     cursor.end_line()?;
     if binary {
@@ -231,13 +230,14 @@ fn header(cursor: &mut Cursor<'_>) -> Result<Version, MshError> {
 }
 
 /// The three coordinates of a node, in metres.
-fn point(cursor: &mut Cursor<'_>, place: usize, scale: Scale) -> Result<Point, MshError> {
+fn point(cursor: &mut Cursor<'_>, scale: Scale) -> Result<Point, MshError> {
     let mut point = [0.0; 3];
     for (x, expected) in point.iter_mut().zip(["the x coordinate", "the y coordinate", "the z coordinate"]) {
+        let start = cursor.next_word();
         let value = cursor.real(expected)?;
         *x = scale.metres(value);
         if !x.is_finite() {
-            return Err(cursor.fault_at(place, cursor.subject.clone(), MshFault::NotFinite { value }));
+            return Err(cursor.fault_at(start, cursor.subject.clone(), MshFault::NotFinite { value }));
         }
     }
     Ok(point)

@@ -21,7 +21,7 @@ pub(super) fn nodes(cursor: &mut Cursor<'_>, scale: Scale) -> Result<NodeTable, 
         let tag = cursor.tag("the tag of a node")?;
         cursor.subject = Subject::Node(tag);
         list.push_tag(tag, place);
-        list.push_point(super::point(cursor, place, scale)?);
+        list.push_point(super::point(cursor, scale)?);
         cursor.end_record()?;
         cursor.subject = Subject::Section("Nodes".into());
     }
@@ -57,9 +57,10 @@ pub(super) fn elements<'n>(
             let place = cursor.begin_record();
             let tag = cursor.tag("the tag of an element")?;
             cursor.subject = Subject::Element(tag);
+            let head = cursor.next_word();
             let code = cursor.int("the type of an element")?;
             let tags = cursor.tag("a number of tags")?;
-            reader.element(cursor, (tag, place, place), code, tags)?;
+            reader.element(cursor, (tag, place, head), code, tags)?;
             cursor.subject = Subject::Section("Elements".into());
         }
         return Ok(reader.list);

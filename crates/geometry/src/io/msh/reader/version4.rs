@@ -68,7 +68,7 @@ impl Entities {
 
 /// A number of tags and the tags.
 fn tags(cursor: &mut Cursor<'_>, expected: &'static str) -> Result<Vec<i32>, MshError> {
-    let start = cursor.position();
+    let start = cursor.next_word();
     let count = cursor.size("a number of tags")?;
     let least = if cursor.encoding() == Encoding::Ascii { 2 } else { 4 };
     let count = cursor.check_count(start, count, least, "tags")?;
@@ -95,8 +95,9 @@ struct Announced {
 
 impl Announced {
     fn read(cursor: &mut Cursor<'_>, what: &'static str) -> Result<Self, MshError> {
-        let place = cursor.begin_record();
+        cursor.begin_record();
         let blocks = cursor.size("the number of blocks")?;
+        let place = cursor.next_word();
         let claimed = cursor.size("the number of nodes or elements")?;
         cursor.size("the smallest tag")?;
         cursor.size("the largest tag")?;
@@ -139,20 +140,22 @@ pub(super) fn nodes(cursor: &mut Cursor<'_>, scale: Scale) -> Result<NodeTable, 
     let mut list = NodeList::with_capacity(count);
     for _ in 0..announced.blocks {
         cursor.subject = announced.section.clone();
-        let place = cursor.begin_record();
+        cursor.begin_record();
         let dimension = dimension(cursor)?;
         cursor.int("the tag of an entity")?;
+        let at_parametric = cursor.next_word();
         let parametric = cursor.int("0 or 1 for parametric coordinates")?;
         if !(0..=1).contains(&parametric) {
             let fault = MshFault::Unexpected {
                 expected: "0 or 1 for parametric coordinates",
                 found: parametric.to_string(),
             };
-            return Err(cursor.fault_at(place, cursor.subject.clone(), fault));
+            return Err(cursor.fault_at(at_parametric, cursor.subject.clone(), fault));
         }
+        let at_count = cursor.next_word();
         let count = cursor.size("the number of nodes in the block")?;
         cursor.end_record()?;
-        let count = announced.block(cursor, place, count, least)?;
+        let count = announced.block(cursor, at_count, count, least)?;
         let first = list.len();
         for _ in 0..count {
             let place = cursor.begin_record();
@@ -164,9 +167,9 @@ pub(super) fn nodes(cursor: &mut Cursor<'_>, scale: Scale) -> Result<NodeTable, 
         }
         let parameters = if parametric == 1 { dimension } else { 0 };
         for i in 0..count {
-            let place = cursor.begin_record();
+            cursor.begin_record();
             cursor.subject = Subject::Node(list.tag(first + i));
-            list.push_point(super::point(cursor, place, scale)?);
+            list.push_point(super::point(cursor, scale)?);
             for _ in 0..parameters {
                 cursor.real("a parametric coordinate")?;
             }
@@ -190,26 +193,29 @@ pub(super) fn elements<'n>(
         cursor.subject = announced.section.clone();
         let place = cursor.begin_record();
         let dimension = dimension(cursor)?;
+        let at_tag = cursor.next_word();
         let tag = cursor.int("the tag of an entity")?;
+        let at_code = cursor.next_word();
         let code = cursor.int("the type of the elements")?;
+        let at_count = cursor.next_word();
         let count = cursor.size("the number of elements in the block")?;
         cursor.end_record()?;
-        let of_entity = |fault| cursor.fault_at(place, Subject::Entity { dimension, tag }, fault);
-        let shape = Shape::of(code).ok_or_else(|| of_entity(MshFault::UnknownType { code }))?;
+        let of_entity = |at, fault| cursor.fault_at(at, Subject::Entity { dimension, tag }, fault);
+        let shape = Shape::of(code).ok_or_else(|| of_entity(at_code, MshFault::UnknownType { code }))?;
         if shape.dimension != dimension {
-            return Err(of_entity(MshFault::WrongDimension { shape: shape.name, dimension }));
+            return Err(of_entity(place, MshFault::WrongDimension { shape: shape.name, dimension }));
         }
         let groups = match entities {
             Some(entities) if dimension >= 2 => entities
                 .groups
                 .get(&(dimension, tag))
-                .ok_or_else(|| of_entity(MshFault::UnknownEntity))?
+                .ok_or_else(|| of_entity(at_tag, MshFault::UnknownEntity))?
                 .as_slice(),
             _ => &[],
         };
         let bytes = 8 * (1 + shape.nodes);
         let least = if cursor.encoding() == Encoding::Ascii { 2 * (1 + shape.nodes) } else { bytes };
-        let count = announced.block(cursor, place, count, least)?;
+        let count = announced.block(cursor, at_count, count, least)?;
         match (shape.becomes(), groups) {
             (Use::Tetrahedron, _) => list.tetrahedra.reserve_exact(count),
             (Use::Triangle, groups) => {
@@ -256,8 +262,14 @@ pub(super) fn elements<'n>(
         }
     }
     announced.complete(cursor)?;
+    let volumes = entities.into_iter().flat_map(|entities| entities.groups.range((3, i32::MIN)..));
+    let left_out = volumes.filter(|(_, groups)| groups.is_empty()).map(|((_, tag), _)| *tag);
+    list.notices.ungrouped_volumes = left_out.take(MOST_LISTED).collect();
     Ok(list)
 }
+
+/// Most volumes that a notice lists.
+const MOST_LISTED: usize = 20;
 
 fn dimension(cursor: &mut Cursor<'_>) -> Result<i32, MshError> {
     let start = cursor.position();
