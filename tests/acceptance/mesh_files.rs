@@ -206,7 +206,7 @@ fn a_broken_mesh_file_is_refused_with_line_and_element() {
             "device.msh",
             &format!("line {line}, element {}", words[0]),
             "uses node 9999999",
-            "device.toml:10:",
+            "device.toml:11:",
         ]);
     }
     assert!(!home.path().join("runs").exists(), "nothing is written before the mesh is read");

@@ -156,7 +156,7 @@ fn points_at(text: &str, marked: &Marked) -> Result<(), String> {
     let place = text.lines().find_map(|line| line.trim_start().strip_prefix("--> "));
     let Some((file, line, column)) = place.and_then(|place| {
         let mut parts = place.rsplitn(3, ':');
-        let (column, line) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+        let (column, line): (usize, usize) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
         Some((parts.next()?.to_owned(), line, column))
     }) else {
         return objection("no place");

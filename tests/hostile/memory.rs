@@ -9,7 +9,7 @@ use crate::limited::{assert_holds, check, limited, objection};
 /// Room for the program and a small set-up, and not for six million tetrahedra.
 const LITTLE: u64 = 32 << 20;
 
-/// Between what the set-up of the sphere takes (80 MiB) and what its solution is estimated at (190 MiB).
+/// Between what the set-up of the sphere takes (80 MiB) and what its solution is estimated at (355 MiB).
 const BETWEEN: u64 = 130 << 20;
 
 #[test]
@@ -20,7 +20,7 @@ fn a_problem_that_does_not_fit_is_refused_before_it_is_solved() {
     for command in ["check", "solve"] {
         let ended = limited(Some(BETWEEN), &[command.as_ref(), config.as_os_str()]);
         let says =
-            ["solving the problem needs about", "allowed by the limit on data", "--force", "device.toml:5:"];
+            ["solving the problem needs about", "allowed by the limit on data", "--force", "device.toml:6:"];
         assert_eq!(objection(&ended, &[3], &says), None, "{command}");
     }
     assert_holds(folder.path(), &["device.toml"]);

@@ -203,7 +203,8 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
         terms: Vec::new(),
     };
     let shapes = Shapes::of(&config, setup, &optimised.best.values).unwrap_or_else(|e| panic!("{e}"));
-    let gain = Gain { config: &config, source: &source, stop_reason: optimised.stop_reason, shapes: &shapes };
+    let stop_reason = optimised.stop_reason;
+    let gain = Gain { config: &config, source: &source, stop_reason, shapes: &shapes, memory: 0 };
     gain.verify(&mut objective, &|| false, &mut Silent);
     let verified = objective.verified_ratio.expect("the shield can be generated anew");
     println!("{name}: F/F0 {:.4}, {:?}", objective.ratio, objective.verification);

@@ -1,6 +1,7 @@
 //! What stands on the page.
 
 use std::path::Path;
+use std::process::Command;
 
 use crate::markup::{Element, elements};
 use crate::program::{block, fluxmorph, report, repository, shield};
@@ -74,6 +75,11 @@ fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
     let page = read(&out.join("report.html"));
     assert!(page.len() <= 2_000_000, "{}", page.len());
     assert_eq!(report(&out), page);
+    // However the directory is typed.
+    let mut relative = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
+    relative.args(["report", "out", "--quiet"]).current_dir(home.path());
+    assert!(relative.status().expect("the program starts").success());
+    assert_eq!(read(&out.join("report.html")), page);
     let elements = elements(&page);
     stands_alone(&page, &elements);
     figures_are_described(&elements);
@@ -107,7 +113,11 @@ fn another_file_has_links_that_lead_to_the_run() {
 fn constraints_and_rounds_are_drawn() {
     let home = tempfile::tempdir().expect("a temporary folder");
     let constraint = "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]";
-    let changes = [("[design]", constraint), ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = [")];
+    let changes = [
+        ("[design]", constraint),
+        ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = ["),
+        ("max_evaluations = 6", "max_evaluations = 8"),
+    ];
     let out = block("run", home.path(), &changes);
     let page = read(&out.join("report.html"));
     let elements = elements(&page);

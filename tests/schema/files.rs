@@ -108,14 +108,16 @@ fn complete(own: &toml::Table) -> (toml::Table, String) {
         let beside: toml::Table = text.parse().expect("a table");
         let there = table.entry(key).or_insert_with(|| toml::Table::new().into());
         let Some(there) = there.as_table_mut() else { continue };
-        if there.is_empty() || (key == "morph" && !there.contains_key("motion")) {
+        let needed = match key {
+            "morph" => "motion",
+            "design" => "surface",
+            "analysis" => "frequency",
+            _ => "",
+        };
+        if there.is_empty() || (!needed.is_empty() && !there.contains_key(needed)) {
             there.extend(beside);
         } else if key == "remesh" && !there.contains_key("region") {
             there.insert("region".into(), "block".into());
-        } else if key == "design" && !there.contains_key("surface") {
-            there.extend(beside);
-        } else if key == "analysis" && !there.contains_key("frequency") {
-            there.extend(beside);
         }
     }
     // A rotated design would leave a symmetry plane of an example.

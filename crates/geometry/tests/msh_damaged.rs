@@ -322,7 +322,7 @@ fn damage_in_binary_files_is_found_at_its_byte() {
         let mut damaged = bytes.clone();
         damaged[at + 8..at + 16].copy_from_slice(&order(f64::NAN.to_le_bytes()));
         let error = refused(&damaged, "NaN");
-        assert_eq!((error.place, error.subject), (Place::Byte(at), Subject::Node(device.nodes[3].0)));
+        assert_eq!((error.place, error.subject), (Place::Byte(at + 8), Subject::Node(device.nodes[3].0)));
 
         // The last node of the first tet of the last block.
         let group = device.tets.iter().map(|t| t.2).max().expect("tets");
@@ -341,7 +341,7 @@ fn damage_in_binary_files_is_found_at_its_byte() {
         let mut damaged = bytes.clone();
         damaged[at + 8..at + 16].copy_from_slice(&[0x7f; 8]);
         let error = refused(&damaged, "count");
-        assert_eq!(error.place, Place::Byte(at));
+        assert_eq!(error.place, Place::Byte(at + 8));
         let mut damaged = bytes;
         let at = find(&damaged, b"4.1 1 8\n") + 8;
         damaged[at] = 3;

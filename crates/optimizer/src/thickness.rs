@@ -13,6 +13,10 @@ use crate::design::DesignSurface;
 /// Nodes at the rim of the body send their ray along its side: how far outside a triangle still hits.
 const RIM_TOLERANCE: f64 = 1e-6;
 
+/// Sine of the angle (six degrees) between ray and triangle below which the triangle belongs to the body's side: facets of a
+/// round side lean by less, and an opposite face as steep as that makes no body whose thickness means anything.
+const GRAZING: f64 = 0.1;
+
 /// Initial thickness [m] behind every design node.
 #[derive(Clone, Debug)]
 pub struct Thickness {
@@ -42,8 +46,14 @@ impl Thickness {
                     return Some(None);
                 }
                 let (origin, back) = (mesh.point(node), direction.map(|d| -d));
-                let hits = faces.hits(origin, back).into_iter();
-                hits.filter_map(|i| distance(origin, back, &triangles[i])).min_by(f64::total_cmp).map(Some)
+                let hits: Vec<usize> = faces.hits(origin, back).into_iter().collect();
+                // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
+                let across = |i: &usize| !runs_along(back, &triangles[*i]);
+                let nearest = |of: &mut dyn Iterator<Item = usize>| {
+                    of.filter_map(|i| distance(origin, back, &triangles[i])).min_by(f64::total_cmp)
+                };
+                let opposite = nearest(&mut hits.iter().copied().filter(across));
+                opposite.or_else(|| nearest(&mut hits.iter().copied())).map(Some)
             })
             .collect::<Option<Vec<_>>>()?;
         initial.iter().any(Option::is_some).then_some(())?;
@@ -61,6 +71,12 @@ impl Thickness {
             .map(|(i, t)| t + heights[i])
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
+}
+
+/// Whether a ray runs along a triangle rather than through it.
+fn runs_along(direction: Point, triangle: &[Point; 3]) -> bool {
+    let normal = area_vector(*triangle);
+    dot(normal, direction).abs() < GRAZING * norm(normal)
 }
 
 /// A box that holds every place where a ray counts as hitting a triangle.

@@ -44,10 +44,10 @@ pub enum SolverError {
         /// A node at which both are asked [m].
         place: [f64; 3],
     },
-    /// A model without any excitation.
+    /// An analytic coil that meets no element.
     #[error("no current flows: {cause}")]
     NoSource {
-        /// Its name.
+        /// The coil's name.
         coil: String,
         /// Why, and what to do.
         cause: String,

@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::template::Template;
 use super::{examples, exit};
-use crate::config::{Config, Dimension, OutputNamedBy, Source, parse_quantity};
+use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, Source, parse_quantity};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::output::OlderRun;
@@ -345,7 +345,7 @@ fn threads(text: &str) -> Result<usize, String> {
 }
 
 fn evaluations(text: &str) -> Result<usize, String> {
-    whole_number(text, 1_000_000)
+    whole_number(text, MOST_EVALUATIONS)
 }
 
 fn duration(text: &str) -> Result<f64, String> {

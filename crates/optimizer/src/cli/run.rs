@@ -1,5 +1,6 @@
 //! `fluxmorph run` and `fluxmorph resume`.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -11,7 +12,7 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::Observer;
-use crate::output::{Disk, RunResult, RunStatus, StopReason, resume_command, system_disk};
+use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
 use crate::report;
 use crate::session::{self, Limits, Options, SavedRun};
 
@@ -87,10 +88,11 @@ fn concluded(
         stdout::print_json(&result)?;
     }
     if let Some(disk) = ended.report {
-        // The result is worth more than a page about it.
-        match report::write(disk, directory, None) {
-            Ok(path) => observer.note(&format!("report: {}", path.display())),
-            Err(error) => observer.warning(&format!("the report is not written: {error}")),
+        // The result is worth more than a page about it: not even a mistake of the program in it ends the run otherwise.
+        match catch_unwind(AssertUnwindSafe(|| report::write(disk, directory, None))) {
+            Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
+            Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
+            Err(_) => observer.warning("the report is not written: a mistake of the program, told above"),
         }
     }
     // The search may have ended by itself, and the check of its result not.
@@ -100,11 +102,9 @@ fn concluded(
             observer
                 .warning(&format!("all evaluations are saved: go on with `{}`", resume_command(directory)));
         }
-        StopReason::MaxEvaluations => observer.note(&format!(
-            "to go on from here: {} --max-evaluations {}",
-            resume_command(directory),
-            2 * result.evaluations
-        )),
+        StopReason::MaxEvaluations => {
+            observer.note(&format!("to go on from here: {}", extend_command(directory, result.evaluations)))
+        }
         _ => {}
     }
     // A signal that came too late to stop anything does not change how the run ended.

@@ -9,7 +9,7 @@ use super::section::Section;
 use crate::schema::form::{length, name_or_names, names, not_all_zero, quantity};
 
 /// What the field does at the outer faces and symmetry planes, by name of the surface. Each surface has at most one
-/// condition.
+/// condition. On an outer face without one the flux crosses at right angles, n × H = 0, as into iron of infinite permeability.
 ///
 /// ```toml
 /// [boundaries]
@@ -59,7 +59,7 @@ impl Boundaries {
             flux_normal: section.names("flux_normal").unwrap_or_default(),
             uniform_field: section.table("uniform_field").map(UniformField::read),
         };
-        for (i, name) in boundaries.flux_normal.iter().enumerate() {
+        for (i, name) in boundaries.flux_normal.iter().enumerate().take_while(|_| !section.is_crowded()) {
             let Some(k) = boundaries.flux_parallel.iter().position(|other| other == name) else { continue };
             section.clash(
                 [&format!("flux_parallel[{k}]"), &format!("flux_normal[{i}]")],
@@ -68,7 +68,7 @@ impl Boundaries {
             );
         }
         let given = boundaries.uniform_field.iter().flat_map(|field| &field.surfaces);
-        for (i, name) in given.enumerate() {
+        for (i, name) in given.enumerate().take_while(|_| !section.is_crowded()) {
             for (key, list) in
                 [("flux_parallel", &boundaries.flux_parallel), ("flux_normal", &boundaries.flux_normal)]
             {

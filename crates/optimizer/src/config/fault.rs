@@ -57,6 +57,9 @@ impl Fault {
     }
 }
 
+/// Faults from which on no more advice is given: far more than are shown.
+const MANY: usize = 500;
+
 /// How the message of a missing key starts.
 pub(super) const MISSING_KEY: &str = "missing key ";
 
@@ -84,8 +87,16 @@ impl Faults {
         });
     }
 
+    /// Whether there are so many that advice and comparisons would only take time.
+    pub(super) fn are_many(&self) -> bool {
+        self.0.borrow().len() > MANY
+    }
+
     /// Whether there is a fault in the table at a path.
     pub(super) fn any_below(&self, table: &str) -> bool {
+        if self.are_many() {
+            return true;
+        }
         let below = |fault: &Fault| fault.path.strip_prefix(table).is_some_and(|rest| rest.starts_with('.'));
         self.0.borrow().iter().any(below)
     }

@@ -158,7 +158,7 @@ const TABLES: &[Keys] = &[
         &["algorithm", "max_evaluations", "max_time", "ftol_rel", "xtol_rel", "minimum_quality"],
     ),
     table("[[probes]]", &["name", "points"]),
-    table("[output]", &["directory", "fields", "mesh", "stl", "verify_refinement"]),
+    table("[output]", &["directory", "fields", "mesh", "stl", "verify_refinement", "report"]),
 ];
 
 /// Tables whose keys are names of the user's.
@@ -214,7 +214,56 @@ fn written(path: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
+    use serde_json::Value;
+
     use super::*;
+
+    /// The schema behind references, of the items of a list, and of the tables with names of the user's.
+    fn inner<'a>(document: &'a Value, mut schema: &'a Value) -> &'a Value {
+        loop {
+            schema = if let Some(name) = schema["$ref"].as_str() {
+                &document["$defs"][name.trim_start_matches("#/$defs/")]
+            } else if schema["items"].is_object() {
+                &schema["items"]
+            } else {
+                return schema;
+            };
+        }
+    }
+
+    #[test]
+    fn the_list_has_the_tables_and_keys_of_the_schema() {
+        let document = crate::schema::document();
+        // A case takes whatever it changes, and its own name.
+        for table in TABLES.iter().filter(|table| table.header != "[[morph.case]]") {
+            let step = |schema, key: &str| {
+                let schema = inner(&document, schema);
+                let next =
+                    if key == "NAME" { &schema["additionalProperties"] } else { &schema["properties"][key] };
+                inner(&document, next)
+            };
+            let found = bare(table.header).split('.').fold(&document, step)["properties"].as_object();
+            // A table with brackets of its own below this one is no key of it.
+            let is_key = |key: &&str| {
+                !TABLES.iter().any(|other| {
+                    bare(other.header) == format!("{}.{key}", bare(table.header)) && !table.keys.contains(key)
+                })
+            };
+            let found = found.into_iter().flatten().map(|(key, _)| key.as_str());
+            let found: BTreeSet<&str> = found.filter(is_key).collect();
+            assert_eq!(found, table.keys.iter().copied().collect(), "{}", table.header);
+        }
+        let headers = TABLES.iter().flat_map(|table| bare(table.header).split('.'));
+        let listed: BTreeSet<&str> = all().map(|(_, key)| key).chain(headers).collect();
+        let tables = document["$defs"].as_object().expect("definitions");
+        for (name, schema) in tables.iter().filter(|(name, _)| !name.ends_with("Overlay")) {
+            for (key, _) in schema["properties"].as_object().into_iter().flatten() {
+                assert!(listed.contains(key.as_str()), "`{key}` of {name} stands in no table of the list");
+            }
+        }
+    }
 
     #[test]
     fn tables_are_found_by_key_path() {

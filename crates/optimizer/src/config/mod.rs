@@ -66,7 +66,7 @@ pub use morph::{
 };
 pub use nearest::{nearest, nearest_two};
 pub use objective::{Goal, Objective, Probe, Sum, Term};
-pub use optimizer::{Algorithm, Optimizer};
+pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use quantity::{Dimension, QuantityError, parse_quantity};
 pub use remesh::{Motion, Remesh, RemeshExtent, StiffnessLaw, Subregion};
@@ -220,7 +220,12 @@ impl Config {
         let fault = |(name, _): &(&str, bool)| {
             source
                 .fault(name, format!("missing table `{name}`: there is nothing to optimise without it"))
-                .help(format!("add a table [{name}]"))
+                .help(match self.morph {
+                    Some(_) => {
+                        format!("add a table [{name}]; or move the mesh as [morph] says: fluxmorph morph")
+                    }
+                    None => format!("add a table [{name}]"),
+                })
         };
         Err(source.error(tables.iter().filter(|(_, missing)| *missing).map(fault).collect()))
     }
@@ -259,6 +264,10 @@ pub fn resolved_toml(config: &Config) -> String {
 }
 
 fn read_text(path: &Path) -> Result<String, ConfigError> {
+    if let Some(extension) = path.extension().filter(|e| *e == "geo" || *e == "msh") {
+        let extension = extension.to_string_lossy().into_owned();
+        return Err(ConfigError::GmshFile { path: path.to_owned(), extension });
+    }
     let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
     // One byte more than allowed tells a file that is too large, without trusting the size it reports.

@@ -136,6 +136,13 @@ pub struct Probe {
 }
 
 impl Objective {
+    /// The unit of its value in SI, where all its terms have the same.
+    pub fn si_unit(&self) -> Option<&'static str> {
+        let mut units = self.terms().iter().map(|term| term.functional.dimension().si_unit());
+        let first = units.next()?;
+        units.all(|unit| unit == first).then_some(first)
+    }
+
     /// Reads the table; `frequencies` [Hz] are those of the analysis, empty where they are unknown.
     pub(super) fn read(section: Section<'_>, frequencies: &[f64]) -> Self {
         let goal = section.choice("goal").unwrap_or(Goal::Minimise);

@@ -9,6 +9,9 @@ use super::range::Range;
 use super::section::Section;
 use crate::schema::form::{integer, number, quantity};
 
+/// Most evaluations that a run may be given.
+pub const MOST_EVALUATIONS: usize = 1_000_000;
+
 /// Fractions of a whole.
 const FRACTIONS: Range = Range::half_open(0.0, 1.0);
 
@@ -27,7 +30,7 @@ pub struct Optimizer {
     /// `[[constraints]]`: `mma`, `ccsaq` or `slsqp`.
     pub algorithm: Algorithm,
     /// Most evaluations of the objective with its gradient.
-    #[schemars(transform = integer(1, 1_000_000))]
+    #[schemars(transform = integer(1, MOST_EVALUATIONS))]
     pub max_evaluations: usize,
     /// No evaluation is started after this time [s]. Default: no limit.
     #[schemars(transform = quantity(Dimension::Duration, Range::POSITIVE))]
@@ -96,7 +99,7 @@ impl Optimizer {
         let optimizer = Self {
             algorithm: section.choice("algorithm").unwrap_or(default.algorithm),
             max_evaluations: section
-                .integer("max_evaluations", 1, 1_000_000)
+                .integer("max_evaluations", 1, MOST_EVALUATIONS)
                 .unwrap_or(default.max_evaluations),
             max_time: section.quantity("max_time", Dimension::Duration, Range::POSITIVE),
             ftol_rel: tolerance("ftol_rel").unwrap_or(default.ftol_rel),

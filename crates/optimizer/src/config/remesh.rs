@@ -167,7 +167,7 @@ impl Remesh {
         let lists = [("slide", &remesh.slide), ("fixed", &remesh.fixed), ("free", &remesh.free)];
         for (index, (key, names)) in lists.iter().enumerate() {
             for (earlier_key, earlier) in &lists[..index] {
-                for (i, name) in names.iter().enumerate() {
+                for (i, name) in names.iter().enumerate().take_while(|_| !section.is_crowded()) {
                     let Some(k) = earlier.iter().position(|earlier| earlier == name) else { continue };
                     section.clash(
                         [&format!("{earlier_key}[{k}]"), &format!("{key}[{i}]")],

@@ -98,6 +98,11 @@ impl<'a> Section<'a> {
         self.faults.any_below(table)
     }
 
+    /// Whether there are so many faults that looking for more would only take time.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.faults.are_many()
+    }
+
     /// Record a fault at a key that is known and not read.
     pub(super) fn refuse(&self, key: &'static str, message: impl Into<String>, expected: impl Into<String>) {
         self.asked.borrow_mut().push(key);

@@ -220,6 +220,17 @@ pub enum ConfigError {
         /// The cause.
         source: std::io::Error,
     },
+    /// The file is one of Gmsh's.
+    #[error(
+        "`{path}` is a .{extension} file of Gmsh, and not a configuration; give the TOML file that names the mesh as \
+         mesh.file, `fluxmorph init --template gmsh` writes one"
+    )]
+    GmshFile {
+        /// The path as given.
+        path: PathBuf,
+        /// Its extension.
+        extension: String,
+    },
     /// The file is too large to be a configuration.
     #[error(
         "the configuration `{path}` is larger than {limit} bytes; a mesh belongs into its own file, named by \

@@ -14,29 +14,42 @@ mod headers;
 mod lines;
 mod values;
 
+/// Most lines whose errors are put into words: more are not shown, and a hostile text may have as many as it has bytes.
+const MOST_EXPLAINED: usize = 40;
+
 /// The faults of a text that is no TOML, at least one.
 pub(super) fn faults(document: usize, text: &str, errors: &[toml::de::Error]) -> Vec<Fault> {
-    let mut errors: Vec<(Range<usize>, &str)> =
-        errors.iter().map(|error| (error.span().unwrap_or(0..0), error.message().trim())).collect();
-    errors.sort_by_key(|(span, message)| (Line::at(text, span.start).range.start, rank(message), span.start));
+    let starts: Vec<usize> =
+        std::iter::once(0).chain(text.match_indices('\n').map(|(end, _)| end + 1)).collect();
+    let line_of = |byte: usize| starts.partition_point(|start| *start <= byte);
+    let mut errors: Vec<(usize, Range<usize>, &str)> = errors
+        .iter()
+        .map(|error| (error.span().unwrap_or(0..0), error.message().trim()))
+        .map(|(span, message)| (line_of(span.start), span, message))
+        .collect();
+    errors.sort_by_key(|(line, span, message)| (*line, rank(message), span.start));
+    // One error for each line.
+    errors.dedup_by_key(|(line, _, _)| *line);
     let mut found: Vec<Fault> = Vec::new();
-    let mut lines = Vec::new();
     // Under the header of a table that is there twice all keys are there twice.
     let mut repeated = 0..0;
-    for (span, message) in errors {
-        let line = Line::at(text, span.start);
-        let follows = message.starts_with("duplicate key") && repeated.contains(&span.start);
-        if lines.contains(&line.range.start) || follows {
+    for (_, span, message) in errors {
+        let place = |span| Place { document, span };
+        if found.len() >= MOST_EXPLAINED {
+            found.push(Fault::new("", place(span), format!("not valid TOML: {}", plain(message))));
             continue;
         }
-        if message.starts_with("duplicate key") && line.is_header() {
+        let is_duplicate = message.starts_with("duplicate key");
+        if is_duplicate && repeated.contains(&span.start) {
+            continue;
+        }
+        let line = Line::at(text, span.start);
+        if is_duplicate && line.is_header() {
             let next = Line::all(text).find(|next| next.range.start > line.range.start && next.is_header());
             repeated = line.range.end..next.map_or(text.len(), |next| next.range.start);
         }
-        lines.push(line.range.start);
         let Explained { span, message, expected, help, other, swallows } =
             explain(text, &span, &line, message);
-        let place = |span| Place { document, span };
         found.push(Fault {
             expected,
             help,
@@ -52,8 +65,13 @@ pub(super) fn faults(document: usize, text: &str, errors: &[toml::de::Error]) ->
 
 /// Of several errors on one line the one that says most comes first.
 fn rank(message: &str) -> usize {
-    let telling = ["string values must be quoted", "invalid unquoted key", "invalid"];
-    telling.iter().position(|start| message.starts_with(start)).unwrap_or(telling.len())
+    let telling = ["recursion", "string values must be quoted", "invalid unquoted key", "invalid"];
+    telling.iter().position(|word| message.contains(word)).unwrap_or(telling.len())
+}
+
+/// The parser's own words.
+fn plain(message: &str) -> String {
+    shown(&message.replace('\n', ", "))
 }
 
 /// An error in words.
@@ -91,6 +109,11 @@ impl Explained {
 
 fn explain(text: &str, span: &Range<usize>, line: &Line<'_>, message: &str) -> Explained {
     let starts = |start: &str| message.starts_with(start);
+    if message.contains("recursion") {
+        return Explained::new(span.clone(), plain(message))
+            .help("lists and tables lie within each other too deeply: take some levels out")
+            .swallowing();
+    }
     if let Some(open) = line.open_quote() {
         return values::open_quote(text, line, open);
     }
@@ -127,6 +150,6 @@ fn explain(text: &str, span: &Range<usize>, line: &Line<'_>, message: &str) -> E
     }
     match values::value(line, span, message) {
         Some(explained) => explained,
-        None => Explained::new(span.clone(), shown(&message.replace('\n', ", "))),
+        None => Explained::new(span.clone(), plain(message)),
     }
 }

@@ -26,7 +26,6 @@ pub use bar::{Bar, take_down};
 pub use console::Console;
 pub use paint::{Colour, Paint};
 pub use quiet::Quiet;
-pub(crate) use summary::unit_of;
 
 /// One evaluation of objective, constraints and gradients; a row of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

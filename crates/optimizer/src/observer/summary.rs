@@ -1,28 +1,8 @@
 //! The end of a run, or of a single analysis, in a few lines.
 
 use super::{Colour, Paint, Started, probes};
-use crate::config::{Dimension, Goal, Objective};
+use crate::config::{Goal, Objective};
 use crate::output::{ConstraintResult, RunResult, RunStatus};
-
-/// Unit of values of a dimension in SI.
-pub(crate) fn unit_of(dimension: Dimension) -> &'static str {
-    match dimension {
-        Dimension::Length => "m",
-        Dimension::Frequency => "Hz",
-        Dimension::Conductivity => "S/m",
-        Dimension::MassDensity => "kg/m³",
-        Dimension::Current => "A",
-        Dimension::FluxDensity => "T",
-        Dimension::Angle => "rad",
-        Dimension::Duration => "s",
-        Dimension::FluxDensitySquared => "T²",
-        Dimension::FluxDensityIntegral => "T² m³",
-        Dimension::Power => "W",
-        Dimension::Energy => "J",
-        Dimension::Volume => "m³",
-        Dimension::Mass => "kg",
-    }
-}
 
 /// What the objective of a run is called, and its unit.
 #[derive(Debug, Clone, Default)]
@@ -43,8 +23,8 @@ impl Named {
             Goal::Maximise => "maximise",
         };
         let terms = objective.terms();
-        let unit = unit_of(terms[0].functional.dimension());
-        let is_one_unit = terms.iter().all(|term| unit_of(term.functional.dimension()) == unit);
+        let unit = terms[0].functional.dimension().si_unit();
+        let is_one_unit = terms.iter().all(|term| term.functional.dimension().si_unit() == unit);
         let name = match terms {
             [term] => {
                 let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));

@@ -22,7 +22,7 @@ pub(crate) use files::write_whole;
 pub use history::History;
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
 pub(crate) use names::shell_word;
-pub use names::{resume_command, surface_files};
+pub use names::{extend_command, resume_command, surface_files};
 pub use process::{hostname, peak_memory_bytes, utc_timestamp};
 pub(crate) use result::to_json;
 pub use result::{

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::config::MOST_EVALUATIONS;
+
 /// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
 const LONGEST_NAME: usize = 50;
 
@@ -58,6 +60,12 @@ pub(super) fn field_number(name: &str) -> Option<usize> {
 /// The command that goes on with a run, as a shell takes it.
 pub fn resume_command(directory: &Path) -> String {
     format!("fluxmorph resume {}", shell_word(directory))
+}
+
+/// The command that goes on with a run that has used up so many evaluations.
+pub fn extend_command(directory: &Path, evaluations: usize) -> String {
+    let more = evaluations.saturating_mul(2).clamp(1, MOST_EVALUATIONS);
+    format!("{} --max-evaluations {more}", resume_command(directory))
 }
 
 /// A path as one word of a shell's command line.

@@ -116,11 +116,13 @@ mod tests {
         let at = |axis, at| sections(&coil, CutPlane { axis, at });
         let legs = at(0, 0.03);
         assert_eq!(legs.len(), 2);
-        assert_eq!(legs[1], [[0.03, 0.16, 0.04], [0.03, 0.18, 0.08]]);
-        assert_eq!(at(1, 0.0)[1], [[0.06, 0.0, 0.04], [0.08, 0.0, 0.08]]);
-        assert_eq!(at(0, 0.07), [[[0.07, -0.18, 0.04], [0.07, 0.18, 0.08]]]);
+        // The lower end is 0.06 - 0.02, which is 0.04 but for rounding.
+        let low = 0.06 - 0.02;
+        assert_eq!(legs[1], [[0.03, 0.16, low], [0.03, 0.18, 0.08]]);
+        assert_eq!(at(1, 0.0)[1], [[0.06, 0.0, low], [0.08, 0.0, 0.08]]);
+        assert_eq!(at(0, 0.07), [[[0.07, -0.18, low], [0.07, 0.18, 0.08]]]);
         assert!(at(0, 0.09).is_empty() && at(2, 0.06).is_empty());
-        assert_eq!(extent(&coil), Some([[-0.08, -0.18, 0.04], [0.08, 0.18, 0.08]]));
+        assert_eq!(extent(&coil), Some([[-0.08, -0.18, low], [0.08, 0.18, 0.08]]));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::data::RunData;
 use super::html::Html;
 use super::plot::{BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, dot, grid, line, polyline, svg, text};
 use super::ticks::{Count, number};
+use super::words::capital;
 use crate::observer::Evaluation;
 
 /// Height of one drawing area.
@@ -51,7 +52,7 @@ pub(super) fn figures(html: &mut Html, data: &RunData) {
         own.bound = Some(0.0);
         all.push(("constraint", own));
     }
-    all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [SI]", &|row| Some(row.gradient_norm))));
+    all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [F/m]", &|row| Some(row.gradient_norm))));
     all.push(("quality", series("worst quality of an element (Eq. 4)", &|row| Some(row.worst_quality))));
     all.push((
         "step",
@@ -143,9 +144,8 @@ impl Series<'_> {
         let name = self.title.split(':').next().unwrap_or_default();
         let name = name.split('[').next().unwrap_or_default().trim();
         let mut text = format!(
-            "{}{}: {} at evaluation {}, {} at evaluation {}",
-            name.chars().next().map(|c| c.to_uppercase().to_string()).unwrap_or_default(),
-            name.chars().skip(1).collect::<String>(),
+            "{}: {} at evaluation {}, {} at evaluation {}",
+            capital(name),
             number(first.1, 4),
             first.0.evaluation,
             number(last.1, 4),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::io::{VtuArray, vtu_contents};
 use fluxmorph_geometry::tet4::Point;
 
-use crate::config::{Config, FieldsKept};
+use crate::config::{Config, FieldsKept, OutputNamedBy};
 use crate::error::Error;
 use crate::journal::Journal;
 use crate::memory_limit;
@@ -24,6 +24,7 @@ const LARGEST_FIELD: u64 = 1 << 34;
 /// A run as its directory tells it.
 #[derive(Debug)]
 pub(super) struct RunData {
+    /// Absolute.
     pub(super) directory: PathBuf,
     pub(super) manifest: Manifest,
     pub(super) config: Config,
@@ -86,7 +87,10 @@ impl RunData {
             Some(_) => Some(0),
             None => last_improved(&history),
         };
-        let outline = memory_limit::check_mesh(&config, &source)
+        // How much memory is left is nothing that belongs into the page.
+        memory_limit::check_mesh(&config, &source)?;
+        let outline = source
+            .confined(OutputNamedBy::User)
             .map_err(Error::from)
             .and_then(|()| outline(&config, &source))
             .map_err(|error| format!("the mesh cannot be made again: {}", reason(&error)));
@@ -106,7 +110,8 @@ impl RunData {
         files.retain(|file| there.contains(file));
         files.extend(kept.iter().map(|&evaluation| directory.field_in_collection(evaluation)));
         Ok(Self {
-            directory: path.to_owned(),
+            // However the path is typed, the page is the same.
+            directory: std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
             resolved: text(&directory, &directory.resolved())?,
             designs: designs(&directory, &config, result.as_ref(), best, &outline),
             fields: [before?, after?],

@@ -92,7 +92,7 @@ impl View {
         let centre = observed.or(moved).unwrap_or(whole);
         let middle = centre.map(|c| c.map(|v| 0.5 * v));
         let middle: Point = std::array::from_fn(|d| middle[0][d] + middle[1][d]);
-        let upwards = outline.design.as_ref().map_or([0.0, 0.0, 1.0], |d| view_normal(data, outline, d));
+        let upwards = outline.design.as_ref().map_or([0.0, 0.0, 1.0], |d| view_normal(data, d));
         let up = (0..3).fold(2, |best, d| if upwards[d].abs() > upwards[best].abs() { d } else { best });
         // Of the two planes along the design's axis the one that shows its longer side.
         let shown = moved.unwrap_or(centre);

@@ -9,6 +9,7 @@ use super::plane::{Plane, images, mirrored, mirrors};
 use super::plot::{BAR, BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, colour_bar, dot, line, svg, text};
 use super::raster::Raster;
 use super::ticks::{Count, number, trimmed};
+use super::words::capital;
 use crate::config::{DesignDirection, DirectionWord};
 use crate::setup::{Outline, OutlinedDesign};
 
@@ -108,11 +109,6 @@ pub(super) fn figure(
     Ok(())
 }
 
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
-}
-
 /// One view of the surface: where its triangles are on the page.
 struct Drawing {
     plane: Plane,
@@ -127,7 +123,7 @@ struct Drawing {
 impl Drawing {
     fn new(data: &RunData, outline: &Outline, design: &OutlinedDesign, scale: Scale) -> Self {
         let points: Vec<Point> = design.surface.nodes().iter().map(|&n| outline.full_mesh.point(n)).collect();
-        let plane = Plane::across(view_normal(data, outline, design), &points);
+        let plane = Plane::across(view_normal(data, design), &points);
         let mirrors = mirrors(&data.config);
         let nodes = design.surface.nodes();
         let place = |node| nodes.binary_search(&node).unwrap_or(0);
@@ -242,15 +238,14 @@ impl Drawing {
 }
 
 /// The direction of the design, or where most of the surface looks.
-pub(super) fn view_normal(data: &RunData, outline: &Outline, design: &OutlinedDesign) -> Point {
+pub(super) fn view_normal(data: &RunData, design: &OutlinedDesign) -> Point {
     if let Some(DesignDirection::Vector(direction)) = data.config.design.as_ref().map(|d| d.direction) {
         return direction;
     }
-    let areas: Vec<Point> =
-        design.triangles.iter().map(|t| area_vector(t.map(|n| outline.full_mesh.point(n)))).collect();
-    let sum: Point = std::array::from_fn(|d| areas.iter().map(|a| a[d]).sum());
-    let total: f64 = areas.iter().map(|a| norm(*a)).sum();
-    if norm(sum) > 0.2 * total { sum } else { [0.0, 0.0, 1.0] }
+    // Out of the body, whatever the turn of the triangles.
+    let directions = design.surface.directions();
+    let sum: Point = std::array::from_fn(|d| directions.iter().map(|own| own[d]).sum());
+    if norm(sum) > 0.2 * directions.len() as f64 { sum } else { [0.0, 0.0, 1.0] }
 }
 
 fn extremes(values: &[Option<f64>]) -> [f64; 2] {
@@ -271,7 +266,7 @@ fn caption(
             design.bodies.first().map(|r| outline.full_mesh.topology().region_names()[r.index()].as_str());
         format!("Thickness of {} behind the surface {names}", body.unwrap_or("the body"))
     } else {
-        format!("Displacement of the surface {names} along its direction of motion, positive outwards")
+        format!("Displacement of the surface {names} along its direction of motion")
     };
     if let Some(before) = &surface.values[0] {
         let [low, high] = extremes(before);
@@ -285,8 +280,11 @@ fn caption(
     text += &format!("; after: {} to {} mm. ", trimmed(least, 2), trimmed(most, 2));
     if let Some(before) = &surface.values[0] {
         let [less, more] = changed(outline, design, before, after);
-        let words =
-            if surface.is_thickness { ["thinner", "thicker"] } else { ["moved inwards", "moved outwards"] };
+        let words = if surface.is_thickness {
+            ["thinner", "thicker"]
+        } else {
+            ["moved against it", "moved along it"]
+        };
         text += &format!(
             "{} % of its area is {} than before, {} % {}. ",
             number(100.0 * less, 3),

@@ -59,9 +59,13 @@ pub fn text(disk: &Arc<dyn Disk>, directory: &Path, path: &Path) -> Result<Strin
 
 /// The way from the folder of a file to a directory, with a slash at its end; nothing where they are the same.
 fn way(file: &Path, directory: &Path) -> String {
-    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let (from, to) = (whole(file), whole(directory));
-    let from: Vec<_> = from.parent().map(|folder| folder.components().collect()).unwrap_or_default();
+    // Links and `..` are followed where there is something; what is not there yet is taken as written.
+    let whole = |path: &Path| {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.to_owned())
+    };
+    let (from, to) = (file.parent().map(whole).unwrap_or_default(), whole(directory));
+    let from: Vec<_> = from.components().collect();
     let to: Vec<_> = to.components().collect();
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
     let mut way = "../".repeat(from.len() - same);

@@ -4,8 +4,10 @@ use super::data::RunData;
 use super::html::Html;
 use super::surface::Surface;
 use super::ticks::{duration, number, trimmed};
+use super::words::capital;
 use super::{convergence, field, histogram, map, paper, tables, words};
-use crate::output::{RunResult, RunStatus, StopReason, resume_command};
+use crate::config::{MeshConfig, Objective};
+use crate::output::{RunResult, RunStatus, StopReason, extend_command, resume_command};
 
 const STYLE: &str = include_str!("style.css");
 const VIEW: &str = include_str!("view.js");
@@ -195,6 +197,11 @@ fn status(data: &RunData) -> (&'static str, String) {
     }
 }
 
+/// The unit of the objective, where all its terms have the same.
+fn unit(data: &RunData) -> &'static str {
+    data.config.objective.as_ref().and_then(Objective::si_unit).unwrap_or_default()
+}
+
 /// Key figures: name, value, remark.
 fn figures(data: &RunData) -> Vec<(String, String, String)> {
     let mut all = Vec::new();
@@ -203,7 +210,7 @@ fn figures(data: &RunData) -> Vec<(String, String, String)> {
     if data.is_run() {
         if let Some(ratio) = data.ratio() {
             let note = match objective {
-                Some(o) => format!("{} → {}", number(o.initial, 4), number(o.best, 4)),
+                Some(o) => format!("{} → {} {}", number(o.initial, 4), number(o.best, 4), unit(data)),
                 None => "so far".to_owned(),
             };
             add("objective F / F₀", number(ratio, 4), note);
@@ -220,16 +227,22 @@ fn figures(data: &RunData) -> Vec<(String, String, String)> {
                 },
             );
             add("on a fresh mesh", number(verified, 4), note);
+        } else if objective.is_some() {
+            let note = match data.config.mesh {
+                MeshConfig::File { .. } => "the mesh is from a file: solve both shapes on another one",
+                _ => "see what the run told at its end",
+            };
+            add("on a fresh mesh", "not checked".to_owned(), note.to_owned());
         }
         let (evaluations, iterations) = match (&data.result, data.history.last()) {
             (Some(result), _) => (result.evaluations, result.iterations),
-            (None, Some(row)) => (row.evaluation + 1, row.iteration),
+            (None, Some(row)) => (row.evaluation.saturating_add(1), row.iteration),
             (None, None) => (0, 0),
         };
         let best = data.best.map_or(String::new(), |best| format!("; best: {best}"));
         add("evaluations", evaluations.to_string(), format!("{iterations} iterations improved{best}"));
     } else if let Some(objective) = objective {
-        add("objective F", number(objective.best, 5), "SI units".to_owned());
+        add("objective F", number(objective.best, 5), unit(data).to_owned());
     }
     if let Some(seconds) = data.manifest.seconds {
         add("time", duration(seconds), format!("on {} threads", data.manifest.threads));
@@ -317,15 +330,13 @@ fn view(html: &mut Html, data: &RunData, surface: &Surface) {
             caption += &format!("The motion is drawn {} times as large. ", trimmed(surface.exaggeration, 0));
         }
         caption += "Drag to turn, wheel or two fingers to zoom, arrow keys when selected; the slider goes from the initial \
-                    shape to the best one. |B| is that of the body where it is meshed, else that of the air at its surface.";
+                    shape to the best one.";
+        if data.fields[1].is_ok() {
+            caption += " |B| is that of the body where it is meshed, else that of the air at its surface.";
+        }
         html.leaf("figcaption", &[], &caption);
         html.data("surface", &surface.json);
     });
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 fn files(html: &mut Html, data: &RunData, links: &str) {
@@ -390,7 +401,7 @@ fn go_on(data: &RunData) -> Option<(String, String)> {
             StopReason::MaxEvaluations => Some((
                 "The search stopped at its limit of evaluations; with more of them it goes on from here:"
                     .to_owned(),
-                format!("{command} --max-evaluations {}", 2 * result.evaluations),
+                extend_command(&data.directory, result.evaluations),
             )),
             _ => None,
         },

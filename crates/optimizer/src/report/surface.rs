@@ -80,7 +80,7 @@ impl Surface {
         let farthest = (0..nodes.len()).map(moved).fold(0.0, f64::max);
         let exaggeration = enlargement(farthest, span(&places[0]));
         let colourings = colourings(data, outline, design, &nodes, &places);
-        let json = pack(data, outline, design, (&nodes, &triangles), &places, &colourings, exaggeration);
+        let json = pack(data, design, (&nodes, &triangles), &places, &colourings, exaggeration);
         Ok(Self { json, triangles: triangles.len(), what, exaggeration })
     }
 }
@@ -185,7 +185,7 @@ fn colourings(
     if let Ok(after) = &data.fields[1] {
         let before = data.fields[0].as_ref().ok();
         let of = |field: &Snapshot| flux_density(outline, design, nodes, field);
-        let values = [before.map_or_else(|| of(after), of), of(after)];
+        let values = [before.map_or_else(|| vec![None; nodes.len()], of), of(after)];
         all.push(Colouring {
             name: "|B|".to_owned(),
             unit: "mT",
@@ -221,7 +221,6 @@ fn flux_density(
 /// What `view.js` reads; lengths in millimetres.
 fn pack(
     data: &RunData,
-    outline: &Outline,
     design: &OutlinedDesign,
     (nodes, triangles): (&[NodeId], &[[NodeId; 3]]),
     places: &[Vec<Point>; 2],
@@ -252,7 +251,7 @@ fn pack(
         "after": packed(&places[1]),
         "wide": wide,
         "triangles": triangles,
-        "up": view_normal(data, outline, design),
+        "up": view_normal(data, design),
         "exaggeration": exaggeration,
         "mirrors": mirrors,
         "colours": colourings.iter().filter_map(Colouring::pack).collect::<Vec<_>>(),

@@ -1,12 +1,14 @@
 //! Tables of the page: evaluations, constraints, terms, losses, probes, skin depths, mesh, provenance.
 
+use std::path::Path;
+
 use super::data::RunData;
 use super::html::Html;
 use super::paper;
 use super::ticks::{duration, grouped, number, trimmed};
 use crate::config::RegionModel;
 use crate::observer::Evaluation;
-use crate::output::{ProbeResult, RunResult};
+use crate::output::{ProbeResult, RunResult, shell_word};
 use crate::setup::Outline;
 
 /// Rows of a table that is shown at once; a longer one is opened by the reader.
@@ -61,7 +63,7 @@ pub(super) fn evaluations(html: &mut Html, data: &RunData) {
     let constraints: Vec<&String> =
         rows.first().map(|row| row.constraints.keys().collect()).unwrap_or_default();
     let mut head =
-        vec!["evaluation", "iteration", "F", "F / F₀", "‖dF/dp‖ [1/m]", "step [mm]", "worst quality"];
+        vec!["evaluation", "iteration", "F", "F / F₀", "‖dF/dp‖ [F/m]", "step [mm]", "worst quality"];
     let has_thickness = rows.iter().any(|row| row.min_thickness_m.is_some());
     if has_thickness {
         head.push("thickness [mm]");
@@ -164,7 +166,7 @@ pub(super) fn outcome(html: &mut Html, data: &RunData, result: &RunResult) {
         })
         .collect();
     if !losses.is_empty() {
-        html.leaf("h3", &[], "Eddy-current losses of the meshed part");
+        html.leaf("h3", &[], "Eddy-current losses of the part that is modelled");
         table(html, &["region", "frequency", "loss [W]"], &losses, None);
     }
     let mut probes: Vec<Vec<String>> =
@@ -186,13 +188,15 @@ pub(super) fn outcome(html: &mut Html, data: &RunData, result: &RunResult) {
 
 /// The rows of one probe.
 fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
-    let fields = probe.b_re_t.iter().zip(&probe.b_im_t);
-    let row = |(point, (re, im)): (&[f64; 3], (&Option<[f64; 3]>, &Option<[f64; 3]>))| {
+    // A file may be cut short.
+    let count = probe.points_m.len().min(probe.b_re_t.len()).min(probe.b_im_t.len());
+    let row = |k: usize| {
+        let (point, re, im) = (probe.points_m[k], probe.b_re_t[k], probe.b_im_t[k]);
         let place = point.map(|c| trimmed(1e3 * c, 2)).join(", ");
         let mut cells = vec![probe.name.clone(), place, format!("{} Hz", trimmed(frequency, 6))];
         match (re, im) {
             (Some(re), Some(im)) => {
-                let size = re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt();
+                let size = re.iter().chain(&im).map(|c| c * c).sum::<f64>().sqrt();
                 cells.push(number(1e3 * size, 4));
                 for d in 0..3 {
                     let real = number(1e3 * re[d], 3);
@@ -213,7 +217,7 @@ fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
         }
         cells
     };
-    probe.points_m.iter().zip(fields).map(row).collect()
+    (0..count).map(row).collect()
 }
 
 /// The comparison with the paper; nothing for other cases.
@@ -310,9 +314,9 @@ pub(super) fn provenance(html: &mut Html, data: &RunData) {
     let mut add = |name: &str, value: String| rows.push((name.to_owned(), value));
     add("program", format!("fluxmorph {}", manifest.version));
     let given = manifest.config.as_ref().map(|config| config.path.clone()).unwrap_or_default();
-    let mut command = format!("fluxmorph {} {given}", manifest.command);
+    let mut command = format!("fluxmorph {} {}", manifest.command, shell_word(Path::new(&given)));
     for overlay in &manifest.overrides {
-        command += &format!(" --set '{}'", overlay.trim());
+        command += &format!(" --set {}", shell_word(Path::new(overlay.trim())));
     }
     add("command", command);
     if let Some(limits) = &manifest.limits {

@@ -9,6 +9,9 @@ pub(super) enum Count {
     Logarithmic,
 }
 
+/// Steps from zero beyond which ticks would all look alike.
+const LARGEST_COUNT: f64 = 1e12;
+
 /// Round numbers inside `low ..= high`, at most about `most` of them.
 pub(super) fn linear(low: f64, high: f64, most: usize) -> Vec<f64> {
     let span = high - low;
@@ -19,6 +22,10 @@ pub(super) fn linear(low: f64, high: f64, most: usize) -> Vec<f64> {
     let power = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= rough * (1.0 - 1e-9));
     let step = step.unwrap_or(10.0 * power);
+    // A span of the smallest numbers has no steps, one between large neighbours none that rounding leaves.
+    if !step.is_normal() || (low / step).abs().max((high / step).abs()) > LARGEST_COUNT {
+        return vec![low];
+    }
     // The ends belong to the axis though they carry rounding.
     let (first, last) = ((low / step - 1e-6).ceil() as i64, (high / step + 1e-6).floor() as i64);
     (first..=last).map(|k| k as f64 * step).collect()
@@ -95,7 +102,7 @@ pub(super) fn grouped(count: usize) -> String {
     }
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             text.push('\u{202f}');
         }
         text.push(digit);

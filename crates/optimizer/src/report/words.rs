@@ -87,11 +87,12 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
 pub(super) fn constraint(constraint: &Constraint) -> String {
     let upper = |bound: &UpperBound, unit: &str| match bound {
         UpperBound::Value(value) => format!("at most {}{unit}", number(*value, 4)),
-        UpperBound::Ratio(ratio) => format!("at most {} of its initial value", trimmed(*ratio, 6)),
+        UpperBound::Ratio(ratio) => format!("at most {} times its initial value", trimmed(*ratio, 6)),
     };
     match &constraint.limit {
         Limit::Field { functional: measured, bound } => {
-            format!("{} {}", functional(measured), upper(bound, ""))
+            let unit = format!(" {}", measured.dimension().si_unit());
+            format!("{} {}", functional(measured), upper(bound, &unit))
         }
         Limit::Body { kind: BodyKind::Volume, region, bound } => {
             format!("the volume of {region} {}", upper(bound, " m³"))
@@ -137,6 +138,12 @@ pub(super) fn summary(config: &Config, variables: Option<usize>, is_run: bool) -
         text += &format!(", subject to {}", all.join("; "));
     }
     text + &format!(", with {}.", algorithm(config.optimizer.algorithm))
+}
+
+/// A text as a sentence begins.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

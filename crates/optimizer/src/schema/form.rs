@@ -95,8 +95,8 @@ pub(crate) fn of_some_dimension(schema: &mut Schema) {
 
 /// A name that can stand in the header of a table: letters, digits, `_` and `-`.
 pub(crate) fn column_name(schema: &mut Schema) {
-    // Letters of other scripts are letters too; the pattern lets every character beyond ASCII pass.
-    replace(schema, json!({ "type": "string", "pattern": "^(?:[A-Za-z0-9_-]|[^\\u0000-\\u007f])+$" }));
+    // Letters of other scripts are letters too; the pattern lets every character beyond ASCII pass but spaces.
+    replace(schema, json!({ "type": "string", "pattern": "^(?:[A-Za-z0-9_-]|[^\\u0000-\\u007f\\s])+$" }));
 }
 
 /// A factor, or 0 for none.

@@ -75,7 +75,10 @@ fn file_fault(error: MeshError, source: &Source) -> Error {
 /// A fault of a mesh file is shown in the file where that is text, and at the key that names it.
 fn msh_fault(path: &Path, error: &MshError, source: &Source) -> ConfigError {
     let file = path.display().to_string();
-    let fault = with_advice(source.fault("mesh.file", format!("mesh file `{file}`, {error}")));
+    let mut fault = with_advice(source.fault("mesh.file", format!("mesh file `{file}`, {error}")));
+    if path.extension().is_some_and(|extension| extension == "geo") {
+        fault.help = Some("this is the geometry: `gmsh -3 -format msh41` makes the mesh of it".to_owned());
+    }
     let (MshPlace::Line(first_line), Some(excerpt)) = (error.place, &error.excerpt) else {
         return source.error(vec![fault]);
     };

@@ -108,7 +108,17 @@ pub fn set_up_watched(
 fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> Result<Setup, Error> {
     told(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
-    source.check(name_faults(config, source, full_mesh.topology()))?;
+    let mut faults = name_faults(config, source, full_mesh.topology());
+    if let Some(first) = faults.first_mut() {
+        // What was left out of the file is often why a name is not there.
+        let said = first
+            .help
+            .take()
+            .into_iter()
+            .chain(warnings.iter().map(|notice| format!("of the mesh: {notice}")));
+        first.help = Some(said.collect::<Vec<_>>().join("\n")).filter(|help| !help.is_empty());
+    }
+    source.check(faults)?;
 
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
@@ -213,6 +223,9 @@ fn phasor(coil: &config::Coil) -> c64 {
     c64::from_polar(coil.ampere_turns, coil.phase)
 }
 
+/// Faults of a text from which on its names are not looked at as well.
+const MOST_BESIDE: usize = 100;
+
 /// A report of what is wrong with the text of a configuration, with what is wrong with its names in the mesh as well.
 ///
 /// That is looked at where the tables of the mesh are sound. What could be read stands in for the rest: a name that is
@@ -230,7 +243,8 @@ fn report_with_names(report: FaultReport) -> FaultReport {
         let path = fault.path.as_str();
         path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
     };
-    let Some(config) = unfinished.filter(|_| !faults.iter().any(of_mesh)) else {
+    let is_short = faults.len() <= MOST_BESIDE;
+    let Some(config) = unfinished.filter(|_| is_short && !faults.iter().any(of_mesh)) else {
         return FaultReport { source, faults, of, unfinished: None };
     };
     let confined = source.confined(config::OutputNamedBy::User).is_ok();

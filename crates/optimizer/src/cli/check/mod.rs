@@ -2,6 +2,7 @@
 //!
 //! `summary` finds it, `text` puts it into words, `table` aligns columns.
 
+mod advice;
 mod summary;
 mod table;
 mod text;
@@ -23,9 +24,13 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
     let work = &args.common.work;
     with_threads(work.threads, |_| {
         // A mesh of a million elements takes some seconds; lines of progress would only hide the table.
-        let mut observer: Box<dyn Observer> = match (work.progress(), Bar::stderr()) {
-            (Progress::Auto | Progress::Bar, Some(bar)) => Box::new(bar),
-            _ => Box::new(Silent),
+        let bar = match work.progress() {
+            Progress::Auto | Progress::Bar => Bar::stderr(),
+            Progress::Plain | Progress::None => None,
+        };
+        let mut observer: Box<dyn Observer> = match bar {
+            Some(bar) => Box::new(bar),
+            None => Box::new(Silent),
         };
         let told = &mut |stage| observer.stage(stage);
         let summary = summary::summary(&config, &source, work.older_run(), told)?;

@@ -6,6 +6,7 @@ use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
 use serde::Serialize;
 
+use super::advice::advice;
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
     Remesh, Source,
@@ -14,7 +15,6 @@ use crate::error::Error;
 use crate::memory_estimate::{of_evaluation, of_run};
 use crate::memory_limit;
 use crate::morph::{self, MotionSummary};
-use crate::observer::unit_of;
 use crate::output::OlderRun;
 use crate::setup::{Purpose, Setup, set_up_watched};
 use crate::stage::Told;
@@ -153,6 +153,8 @@ pub(super) fn summary<'a>(
         })
         .collect();
     let reference = problem.original.topology();
+    let mut warnings = advice(config, &setup);
+    warnings.splice(0..0, setup.warnings.iter().cloned());
     Ok(Summary {
         title: &config.title,
         mesh_origin: origin(&config.mesh),
@@ -180,7 +182,7 @@ pub(super) fn summary<'a>(
         coils: &config.coils,
         boundaries: &config.boundaries,
         objective: config.objective.as_ref(),
-        objective_unit: config.objective.as_ref().and_then(objective_unit),
+        objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,
         design: config.design.as_ref(),
         remesh: config.remesh.as_ref(),
@@ -188,7 +190,7 @@ pub(super) fn summary<'a>(
         probes: &config.probes,
         output_directory: config.output.directory.display().to_string(),
         memory_estimate_bytes: of_run(config, problem),
-        warnings: setup.warnings,
+        warnings,
     })
 }
 
@@ -208,13 +210,6 @@ fn field_problem(config: &Config) -> FieldProblem {
     let conditions = !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some();
     let is_given = conditions || !config.coils.is_empty() || config.objective.is_some();
     if config.morph.is_some() && !is_given { FieldProblem::None } else { FieldProblem::Given }
-}
-
-/// Unit of an objective in SI, where all its terms have the same.
-fn objective_unit(objective: &Objective) -> Option<&'static str> {
-    let mut units = objective.terms().iter().map(|term| unit_of(term.functional.dimension()));
-    let first = units.next()?;
-    units.all(|unit| unit == first).then_some(first)
 }
 
 fn regions(config: &Config, mesh: &Mesh) -> Vec<RegionSummary> {

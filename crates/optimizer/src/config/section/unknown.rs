@@ -28,6 +28,9 @@ impl Section<'_> {
         };
         let own = keys::keys_at(&self.path);
         let fault = fault(format!("unknown key `{}`{table}", shown(key)));
+        if self.faults.are_many() {
+            return fault;
+        }
         if own.contains(&key) {
             return fault.help(format!(
                 "`{key}` has a use beside other values of this table only, such as another shape or kind: take it out, or \

@@ -69,9 +69,9 @@ impl<'t> Line<'t> {
         Some(start + lead..start + lead + rest.trim().len())
     }
 
-    /// The first `=` that is in no quotes.
+    /// The first `=` that is in no quotes and no comment.
     pub(super) fn equals(&self) -> Option<usize> {
-        self.outside_quotes().find(|(_, c)| *c == '=').map(|(at, _)| at)
+        self.outside_quotes().take_while(|(_, c)| *c != '#').find(|(_, c)| *c == '=').map(|(at, _)| at)
     }
 
     /// The quote that is not closed on the line; three quotes in a row open a text of several lines.
