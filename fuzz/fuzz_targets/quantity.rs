@@ -6,28 +6,11 @@ use fluxmorph_fuzz::in_time;
 use fluxmorph_optimizer::config::{Dimension, parse_quantity};
 use libfuzzer_sys::fuzz_target;
 
-const DIMENSIONS: [Dimension; 14] = [
-    Dimension::Length,
-    Dimension::Frequency,
-    Dimension::Conductivity,
-    Dimension::MassDensity,
-    Dimension::Current,
-    Dimension::FluxDensity,
-    Dimension::Angle,
-    Dimension::Duration,
-    Dimension::FluxDensitySquared,
-    Dimension::FluxDensityIntegral,
-    Dimension::Power,
-    Dimension::Energy,
-    Dimension::Volume,
-    Dimension::Mass,
-];
-
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));
 
 fn check(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
-    for dimension in DIMENSIONS {
+    for dimension in Dimension::ALL {
         match parse_quantity(text, dimension) {
             Ok(value) => {
                 assert!(value.is_finite(), "{text}: {value}");

@@ -16,6 +16,7 @@ mod finite;
 pub mod fresh_mesh;
 pub mod geometric;
 pub mod journal;
+mod lap;
 pub mod memory;
 pub mod memory_estimate;
 mod memory_limit;

@@ -20,9 +20,10 @@ use crate::constraint::{Bound, Constraint, Limit, Quantity};
 use crate::design::DesignSurface;
 use crate::error::Error;
 use crate::finite;
+use crate::lap::Lap;
 use crate::memory::Memory;
 use crate::objective::{Term, WeightedSum};
-use crate::stage::{Lap, Stage, Told};
+use crate::stage::{Stage, Told};
 use crate::thickness::Thickness;
 
 /// What moves, how the mesh follows, and within which bounds.

@@ -1,9 +1,7 @@
-//! The stages of a long piece of work, as told to whoever watches it, and a stop watch for them.
+//! The stages of a long piece of work, as told to whoever watches it.
 //!
 //! Whoever computes tells through a function that a stage begins; what comes of it (a word on a terminal, or nothing) is
 //! decided in [`crate::observer`].
-
-use std::time::Instant;
 
 /// What is being computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,19 +51,3 @@ impl Stage {
 
 /// A function that is told of stages.
 pub type Told<'a> = &'a mut dyn FnMut(Stage);
-
-/// A stop watch with intermediate times.
-pub(crate) struct Lap(Instant);
-
-impl Lap {
-    pub(crate) fn start() -> Self {
-        Self(Instant::now())
-    }
-
-    /// Seconds since the start or the last lap.
-    pub(crate) fn lap(&mut self) -> f64 {
-        let seconds = self.0.elapsed().as_secs_f64();
-        self.0 = Instant::now();
-        seconds
-    }
-}

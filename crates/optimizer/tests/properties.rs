@@ -214,26 +214,9 @@ proptest! {
     }
 }
 
-const DIMENSIONS: [Dimension; 14] = [
-    Dimension::Length,
-    Dimension::Frequency,
-    Dimension::Conductivity,
-    Dimension::MassDensity,
-    Dimension::Current,
-    Dimension::FluxDensity,
-    Dimension::Angle,
-    Dimension::Duration,
-    Dimension::FluxDensitySquared,
-    Dimension::FluxDensityIntegral,
-    Dimension::Power,
-    Dimension::Energy,
-    Dimension::Volume,
-    Dimension::Mass,
-];
-
 /// Reads a text as every dimension; what is accepted must be finite, and the same when it is written in SI.
 fn measure(text: &str) {
-    for dimension in DIMENSIONS {
+    for dimension in Dimension::ALL {
         match parse_quantity(text, dimension) {
             Ok(value) => {
                 assert!(value.is_finite(), "{text}: {value}");
@@ -251,7 +234,7 @@ fn units() -> Vec<(Dimension, String)> {
         let units = dimension.accepted_units();
         units.split(", ").map(|unit| (dimension, unit.to_owned())).collect::<Vec<_>>()
     };
-    DIMENSIONS.into_iter().flat_map(of).collect()
+    Dimension::ALL.into_iter().flat_map(of).collect()
 }
 
 proptest! {
@@ -285,7 +268,7 @@ proptest! {
 
     #[test]
     fn a_quantity_of_another_dimension_is_refused(number in -1e9_f64..1e9, unit in select(units())) {
-        for dimension in DIMENSIONS.into_iter().filter(|dimension| *dimension != unit.0) {
+        for dimension in Dimension::ALL.into_iter().filter(|dimension| *dimension != unit.0) {
             let quantity = parse_quantity(&format!("{number} {}", unit.1), dimension);
             prop_assert!(quantity.is_err());
         }

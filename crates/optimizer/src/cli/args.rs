@@ -219,6 +219,14 @@ pub struct ReportArgs {
     /// Show errors and warnings only
     #[arg(long, short)]
     pub quiet: bool,
+
+    /// Let the mesh of the run lie outside of the folder of its configuration
+    #[arg(long)]
+    pub allow_outside: bool,
+
+    /// Go on where the memory seems too small
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Options of `init`.

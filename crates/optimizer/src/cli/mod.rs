@@ -77,7 +77,7 @@ fn message(error: &Error) -> String {
 /// Who shows the progress.
 fn observer(args: &WorkArgs) -> Box<dyn Observer> {
     match args.progress() {
-        Progress::None => Box::new(Quiet(std::io::stderr())),
+        Progress::None => Box::new(Quiet::stderr()),
         Progress::Plain => Box::new(Console::stderr()),
         Progress::Auto | Progress::Bar => match Bar::stderr() {
             Some(bar) => Box::new(bar),

@@ -2,17 +2,28 @@
 
 use super::args::ReportArgs;
 use super::exit::ExitCode;
+use crate::config::OutputNamedBy;
 use crate::error::Error;
+use crate::memory_limit;
 use crate::observer::{Console, Observer};
 use crate::output::system_disk;
-use crate::report;
+use crate::report::ReportedRun;
 
 /// Do what the command line says.
 ///
 /// # Errors
-/// When the directory holds no run, its files are damaged, or the page cannot be written.
+/// When the directory holds no run, its mesh leads out of its folder without `--allow-outside`, its files are damaged, or
+/// the page cannot be written.
 pub(super) fn report(args: &ReportArgs) -> Result<ExitCode, Error> {
-    let path = report::write(&system_disk(), &args.directory, args.out.as_deref())?;
+    let run = ReportedRun::open(&system_disk(), &args.directory)?;
+    let (config, source) = run.config();
+    if !args.allow_outside {
+        source.confined(OutputNamedBy::User)?;
+    }
+    if !args.force {
+        memory_limit::check_mesh(config, source)?;
+    }
+    let path = run.write(args.out.as_deref())?;
     if !args.quiet {
         Console::stderr().note(&format!("report: {}", path.display()));
     }

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::report;
+use crate::report::ReportedRun;
 use crate::session::{self, Limits, Options, SavedRun};
 
 /// Do what the command line says.
@@ -89,7 +89,7 @@ fn concluded(
     }
     if let Some(disk) = ended.report {
         // The result is worth more than a page about it: not even a mistake of the program in it ends the run otherwise.
-        match catch_unwind(AssertUnwindSafe(|| report::write(disk, directory, None))) {
+        match catch_unwind(AssertUnwindSafe(|| ReportedRun::open(disk, directory)?.write(None))) {
             Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
             Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
             Err(_) => observer.warning("the report is not written: a mistake of the program, told above"),

@@ -191,7 +191,7 @@ impl Dimension {
     }
 
     /// All of them.
-    pub(crate) const ALL: [Self; 14] = [
+    pub const ALL: [Self; 14] = [
         Length,
         Frequency,
         Conductivity,

@@ -121,11 +121,3 @@ fn visible(text: &str, span: &Range<usize>) -> Range<usize> {
     let far = text[start..].char_indices().nth(LONGEST_UNDERLINED).map_or(text.len(), |(end, _)| start + end);
     start..floor(span.end).clamp(start, line_end.min(far).max(start))
 }
-
-/// Line and column of a byte of a text, both counted from 1; columns are characters.
-pub fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
-    let before: String = text.char_indices().take_while(|(index, _)| *index < byte).map(|(_, c)| c).collect();
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().map_or(0, |last| last.chars().count()) + 1;
-    (line, column)
-}

@@ -14,7 +14,6 @@ use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Colour, Evaluation, Observer, Paint, Started, show};
 use crate::output::RunResult;
-use crate::rounds::RoundEvent;
 use crate::stage::Stage;
 
 /// How often times on the bar move on.
@@ -99,16 +98,6 @@ impl<W: Write> Bar<W> {
         Self { bar, writer, paint: Paint::PLAIN, named: Named::default(), header_is_shown: false, shown }
     }
 
-    /// A line above the bar.
-    fn line(&mut self, text: &str) {
-        let Self { bar, writer, .. } = self;
-        if bar.is_finished() {
-            show(writer, text);
-        } else {
-            bar.suspend(|| show(writer, text));
-        }
-    }
-
     /// Changes what the bar says, and draws it.
     fn tell(&self, change: impl FnOnce(&mut Shown)) {
         change(&mut self.shown.lock().unwrap_or_else(PoisonError::into_inner));
@@ -178,6 +167,16 @@ fn duration(seconds: f64) -> String {
 }
 
 impl<W: Write> Observer for Bar<W> {
+    // Above the bar.
+    fn line(&mut self, text: &str) {
+        let Self { bar, writer, .. } = self;
+        if bar.is_finished() {
+            show(writer, text);
+        } else {
+            bar.suspend(|| show(writer, text));
+        }
+    }
+
     fn started(&mut self, started: &Started<'_>) {
         let mut lines = announced(started);
         lines[0] = self.paint.paint(Colour::Strong, &lines[0]);
@@ -193,10 +192,6 @@ impl<W: Write> Observer for Bar<W> {
 
     fn stage(&mut self, stage: Stage) {
         self.tell(|shown| (shown.phase, shown.stage) = (None, Some((stage, Instant::now()))));
-    }
-
-    fn note(&mut self, message: &str) {
-        self.line(message);
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
@@ -217,14 +212,6 @@ impl<W: Write> Observer for Bar<W> {
             (shown.evaluations, shown.last) = (row.evaluation + 1, Some(now));
             (shown.ratio, shown.worst_quality) = (Some(row.ratio), Some(row.worst_quality));
         });
-    }
-
-    fn round(&mut self, event: &RoundEvent) {
-        self.line(&event.describe());
-    }
-
-    fn notice(&mut self, message: &str) {
-        self.line(&format!("note: {message}"));
     }
 
     fn warning(&mut self, message: &str) {

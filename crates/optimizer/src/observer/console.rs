@@ -7,7 +7,6 @@ use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Evaluation, Observer, Paint, Started, show};
 use crate::output::RunResult;
-use crate::rounds::RoundEvent;
 use crate::stage::Stage;
 
 /// A stage that takes longer [s] is told with its time, outside of evaluations: people begin to wonder then.
@@ -45,10 +44,6 @@ impl<W: Write> Console<W> {
         }
     }
 
-    fn line(&mut self, text: &str) {
-        show(&mut self.writer, text);
-    }
-
     /// Tells of the stage in hand that it is over, if it was long.
     fn end_stage(&mut self) {
         if let Some((stage, began)) = self.stage.take() {
@@ -75,6 +70,10 @@ pub(super) fn announced(started: &Started<'_>) -> Vec<String> {
 }
 
 impl<W: Write> Observer for Console<W> {
+    fn line(&mut self, text: &str) {
+        show(&mut self.writer, text);
+    }
+
     fn started(&mut self, started: &Started<'_>) {
         self.end_stage();
         self.has_evaluations = started.optimizer.is_some();
@@ -94,24 +93,12 @@ impl<W: Write> Observer for Console<W> {
         }
     }
 
-    fn note(&mut self, message: &str) {
-        self.line(message);
-    }
-
     fn evaluation(&mut self, row: &Evaluation) {
         if !self.header_is_shown {
             self.header_is_shown = true;
             self.line(&table::header(row, Columns::All));
         }
         self.line(&table::row(row, Columns::All));
-    }
-
-    fn round(&mut self, event: &RoundEvent) {
-        self.line(&event.describe());
-    }
-
-    fn notice(&mut self, message: &str) {
-        self.line(&format!("note: {message}"));
     }
 
     fn warning(&mut self, message: &str) {

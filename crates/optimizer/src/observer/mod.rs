@@ -112,8 +112,14 @@ pub struct Started<'a> {
     pub directory: Option<&'a Path>,
 }
 
-/// Is told what happens during a run. Every method does nothing unless it is overridden.
+/// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
+/// through [`Observer::line`].
 pub trait Observer {
+    /// Shows a line.
+    fn line(&mut self, text: &str) {
+        let _ = text;
+    }
+
     /// The problem is set up.
     fn started(&mut self, started: &Started<'_>) {
         let _ = started;
@@ -131,7 +137,7 @@ pub trait Observer {
 
     /// Something has happened, in a line.
     fn note(&mut self, message: &str) {
-        let _ = message;
+        self.line(message);
     }
 
     /// An evaluation is complete.
@@ -141,12 +147,12 @@ pub trait Observer {
 
     /// The mesh has a new reference, or a remedy was taken.
     fn round(&mut self, event: &RoundEvent) {
-        let _ = event;
+        self.line(&event.describe());
     }
 
     /// Something that was left out, and why; nothing to act on.
     fn notice(&mut self, message: &str) {
-        let _ = message;
+        self.line(&format!("note: {message}"));
     }
 
     /// Something the user should know; the run goes on.

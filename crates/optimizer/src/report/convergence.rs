@@ -2,6 +2,7 @@
 
 use super::data::RunData;
 use super::html::Html;
+use super::plane::extremes;
 use super::plot::{BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, dot, grid, line, polyline, svg, text};
 use super::ticks::{Count, number};
 use super::words::capital;
@@ -77,8 +78,7 @@ impl Series<'_> {
     }
 
     fn scale(&self) -> Scale {
-        let values = self.known().map(|(_, v)| v).chain(self.bound);
-        let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        let [low, high] = extremes(self.known().map(|(_, v)| v).chain(self.bound));
         let pixels = [TOP + HEIGHT, TOP];
         if !(low.is_finite() && high.is_finite()) {
             return Scale { low: 0.0, high: 1.0, count: Count::Linear, pixels };

@@ -1,18 +1,16 @@
 //! What a run directory holds, read for a page. What is missing is told with its reason; what is damaged is an error.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use fluxmorph_geometry::io::{VtuArray, vtu_contents};
 use fluxmorph_geometry::tet4::Point;
 
-use crate::config::{Config, FieldsKept, OutputNamedBy};
+use super::ReportedRun;
+use crate::config::{Config, FieldsKept};
 use crate::error::Error;
 use crate::journal::Journal;
-use crate::memory_limit;
 use crate::observer::Evaluation;
-use crate::output::{Disk, Manifest, OutputError, RunDirectory, RunResult};
-use crate::session;
+use crate::output::{Manifest, OutputError, RunDirectory, RunResult};
 use crate::setup::{Outline, outline};
 
 /// Largest history, result and configuration that are read [bytes].
@@ -57,26 +55,12 @@ pub(super) struct Snapshot {
 }
 
 impl RunData {
-    /// Reads the directory of a `run` or a `solve`.
+    /// Reads the directory.
     ///
     /// # Errors
-    /// [`Error::NoReport`] for what another command has written, [`OutputError::Damaged`], faults of the configuration.
-    pub(super) fn read(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
-        let directory = RunDirectory::open(disk, path)?;
-        let manifest = Manifest::read(&directory)?;
-        let refused = |cause: String| Error::NoReport { path: path.to_owned(), cause };
-        if !matches!(manifest.command.as_str(), "run" | "solve") {
-            let command = &manifest.command;
-            return Err(refused(format!(
-                "it holds a `{command}`; a report is made of the directory that `fluxmorph run` or `fluxmorph solve` has written"
-            )));
-        }
-        if !directory.holds_configuration() {
-            return Err(refused(
-                "it was broken off before its configuration was saved; start it again".into(),
-            ));
-        }
-        let (config, source) = session::configuration(&directory, &manifest)?;
+    /// [`OutputError::Damaged`], and files that cannot be read.
+    pub(super) fn read(run: ReportedRun) -> Result<Self, Error> {
+        let ReportedRun { directory, manifest, config, source } = run;
         let result: Option<RunResult> = match text(&directory, &directory.result())? {
             Some(text) => Some(serde_json::from_str(&text).map_err(damaged(&directory.result()))?),
             None => None,
@@ -87,12 +71,7 @@ impl RunData {
             Some(_) => Some(0),
             None => last_improved(&history),
         };
-        // How much memory is left is nothing that belongs into the page.
-        memory_limit::check_mesh(&config, &source)?;
-        let outline = source
-            .confined(OutputNamedBy::User)
-            .map_err(Error::from)
-            .and_then(|()| outline(&config, &source))
+        let outline = outline(&config, &source)
             .map_err(|error| format!("the mesh cannot be made again: {}", reason(&error)));
         let kept = directory.evaluations_with_fields()?;
         let fields = [Some(0).filter(|_| manifest.command == "run"), best].map(|evaluation| {
@@ -106,12 +85,13 @@ impl RunData {
         let mut files = vec!["fields.pvd".to_owned(), "optimum.msh".to_owned()];
         files.extend(manifest.surfaces.iter().cloned());
         files.extend(["history.csv", "result.json", "resolved.toml", "config.toml"].map(str::to_owned));
-        let there = disk.names(path).map_err(OutputError::io("read", path))?;
+        let there =
+            directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
         files.retain(|file| there.contains(file));
         files.extend(kept.iter().map(|&evaluation| directory.field_in_collection(evaluation)));
         Ok(Self {
             // However the path is typed, the page is the same.
-            directory: std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
+            directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
             resolved: text(&directory, &directory.resolved())?,
             designs: designs(&directory, &config, result.as_ref(), best, &outline),
             fields: [before?, after?],

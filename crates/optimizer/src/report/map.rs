@@ -5,7 +5,7 @@ use fluxmorph_geometry::tet4::{Point, area_vector, norm};
 use super::colour::ColourMap;
 use super::data::RunData;
 use super::html::Html;
-use super::plane::{Plane, images, mirrored, mirrors};
+use super::plane::{Plane, extremes, images, mirrored, mirrors};
 use super::plot::{BAR, BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, colour_bar, dot, line, svg, text};
 use super::raster::Raster;
 use super::ticks::{Count, number, trimmed};
@@ -52,8 +52,7 @@ impl SurfaceValues {
 
     /// Least and greatest value before and after; zero in the middle for displacements of both signs.
     pub(super) fn range(&self) -> Option<[f64; 2]> {
-        let all = self.values.iter().flatten().flatten().flatten();
-        let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
+        let [low, high] = extremes(self.values.iter().flatten().flatten().flatten().copied());
         if !(low.is_finite() && high.is_finite()) {
             return None;
         }
@@ -134,17 +133,14 @@ impl Drawing {
                 triangles.push((corners, triangle.map(place)));
             }
         }
-        let [low, high] = triangles
-            .iter()
-            .flat_map(|(corners, _)| corners)
-            .fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], p| {
-                [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
-            });
-        let extent = [high[0] - low[0], high[1] - low[1]].map(|e| e.max(1e-9));
+        let corners = || triangles.iter().flat_map(|(corners, _)| corners);
+        let ends = [0, 1].map(|d| extremes(corners().map(|p| p[d])));
+        let extent = ends.map(|[low, high]| (high - low).max(1e-9));
         let per_mm = ((WIDTH - LEFT - RIGHT) / extent[0]).min(TALLEST / extent[1]);
         let (width, height) = (extent[0] * per_mm, extent[1] * per_mm);
         let left = LEFT + 0.5 * (WIDTH - LEFT - RIGHT - width);
-        let axis = |k: usize, pixels| Scale { low: low[k], high: high[k], count: Count::Linear, pixels };
+        let axis =
+            |k: usize, pixels| Scale { low: ends[k][0], high: ends[k][1], count: Count::Linear, pixels };
         Self {
             x: axis(0, [left, left + width]),
             y: axis(1, [TOP + height, TOP]),
@@ -166,7 +162,7 @@ impl Drawing {
             image.triangle(corners.map(at), [a, b, c].map(|v| self.scale.share(v)));
         }
         let url = image.data_url(surface.colours());
-        let [least, most] = extremes(values);
+        let [least, most] = extremes(values.iter().flatten().copied());
         let label = format!(
             "Map of the {} {name}: from {} to {} millimetres",
             surface.name(),
@@ -209,26 +205,21 @@ impl Drawing {
         let is = |n: usize| values[n].is_some_and(|v| (v - extreme).abs() <= near);
         // Of the model itself, which comes before its images.
         let own = &self.triangles[..self.triangles.len() / if self.mirror_lines { 4 } else { 1 }];
-        let whole: Vec<[f64; 2]> = own
+        let centre =
+            |corners: &[[f64; 2]; 3]| [0, 1].map(|d| corners.iter().map(|c| c[d]).sum::<f64>() / 3.0);
+        let (whole, others): (Vec<_>, Vec<_>) = own
             .iter()
-            .filter(|(_, nodes)| nodes.iter().all(|&n| is(n)))
-            .map(|(corners, _)| [0, 1].map(|d| (corners[0][d] + corners[1][d] + corners[2][d]) / 3.0))
-            .collect();
-        let others: Vec<[f64; 2]> = own
-            .iter()
-            .filter(|(_, nodes)| !nodes.iter().all(|&n| is(n)))
-            .map(|(corners, _)| [0, 1].map(|d| (corners[0][d] + corners[1][d] + corners[2][d]) / 3.0))
-            .collect();
+            .map(|(corners, nodes)| (centre(corners), nodes))
+            .partition(|(_, nodes)| nodes.iter().all(|&n| is(n)));
         let apart = |p: &[f64; 2]| {
-            let to_other = others.iter().map(|o| (o[0] - p[0]).hypot(o[1] - p[1]));
+            let to_other = others.iter().map(|(o, _)| (o[0] - p[0]).hypot(o[1] - p[1]));
             let to_edge = [p[0] - self.x.low, self.x.high - p[0], p[1] - self.y.low, self.y.high - p[1]];
             to_other.chain(to_edge).fold(f64::INFINITY, f64::min)
         };
         // A thousand candidates tell where there is room.
         let step = whole.len().div_ceil(1000).max(1);
-        let Some(place) = whole.iter().step_by(step).max_by(|a, b| apart(a).total_cmp(&apart(b))) else {
-            return;
-        };
+        let candidates = whole.iter().step_by(step).map(|(place, _)| (apart(place), place));
+        let Some((_, place)) = candidates.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { return };
         let at = [self.x.at(place[0]), self.y.at(place[1])];
         dot(html, "spot", at, 2.2);
         let right = at[0] > self.x.pixels[1] - 60.0;
@@ -248,10 +239,6 @@ pub(super) fn view_normal(data: &RunData, design: &OutlinedDesign) -> Point {
     if norm(sum) > 0.2 * directions.len() as f64 { sum } else { [0.0, 0.0, 1.0] }
 }
 
-fn extremes(values: &[Option<f64>]) -> [f64; 2] {
-    values.iter().flatten().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)])
-}
-
 fn caption(
     data: &RunData,
     outline: &Outline,
@@ -260,7 +247,7 @@ fn caption(
     after: &[Option<f64>],
 ) -> String {
     let names = data.config.design.as_ref().map_or(String::new(), |d| d.surface.join(", "));
-    let [least, most] = extremes(after);
+    let [least, most] = extremes(after.iter().flatten().copied());
     let mut text = if surface.is_thickness {
         let body =
             design.bodies.first().map(|r| outline.full_mesh.topology().region_names()[r.index()].as_str());
@@ -269,7 +256,7 @@ fn caption(
         format!("Displacement of the surface {names} along its direction of motion")
     };
     if let Some(before) = &surface.values[0] {
-        let [low, high] = extremes(before);
+        let [low, high] = extremes(before.iter().flatten().copied());
         let range = if high - low < 1e-6 * high.abs().max(1e-3) {
             format!("{} mm everywhere", trimmed(low, 2))
         } else {

@@ -31,30 +31,63 @@ mod words;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::config::{Config, Source};
 use crate::error::Error;
-use crate::output::{Disk, RunDirectory};
+use crate::output::{Disk, Manifest, RunDirectory};
+use crate::session;
 use data::RunData;
 
-/// Writes the page of a run directory, into the directory or to `out`; where it is written.
-///
-/// # Errors
-/// [`Error::NoReport`] for a directory of another command; damaged files, faults of the configuration, or when the operating
-/// system refuses.
-pub fn write(disk: &Arc<dyn Disk>, directory: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
-    let run = RunDirectory::open(disk, directory)?;
-    let path = out.map_or_else(|| run.report(), Path::to_owned);
-    let page = text(disk, directory, &path)?;
-    run.write(&path, page.as_bytes())?;
-    Ok(path)
+/// A run directory that a page can be made of.
+#[derive(Debug)]
+pub struct ReportedRun {
+    directory: RunDirectory,
+    manifest: Manifest,
+    config: Config,
+    source: Source,
 }
 
-/// The page of a run directory as it is written to `path`, to which its links are relative.
-///
-/// # Errors
-/// As [`write`].
-pub fn text(disk: &Arc<dyn Disk>, directory: &Path, path: &Path) -> Result<String, Error> {
-    let data = RunData::read(disk, directory)?;
-    Ok(page::page(&data, &way(path, directory)))
+impl ReportedRun {
+    /// Reads manifest and configuration of the directory of a `run` or a `solve`.
+    ///
+    /// # Errors
+    /// [`Error::NoReport`] for what another command has written, faults of the configuration, files that are damaged or
+    /// cannot be read.
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
+        let directory = RunDirectory::open(disk, path)?;
+        let manifest = Manifest::read(&directory)?;
+        let refused = |cause: String| Error::NoReport { path: path.to_owned(), cause };
+        if !matches!(manifest.command.as_str(), "run" | "solve") {
+            let command = &manifest.command;
+            return Err(refused(format!(
+                "it holds a `{command}`; a report is made of the directory that `fluxmorph run` or `fluxmorph solve` has written"
+            )));
+        }
+        if !directory.holds_configuration() {
+            return Err(refused(
+                "it was broken off before its configuration was saved; start it again".into(),
+            ));
+        }
+        let (config, source) = session::configuration(&directory, &manifest)?;
+        Ok(Self { directory, manifest, config, source })
+    }
+
+    /// The configuration of the run, which names the mesh that is made or read again.
+    pub fn config(&self) -> (&Config, &Source) {
+        (&self.config, &self.source)
+    }
+
+    /// Writes the page into the directory or to `out`; where it is written.
+    ///
+    /// # Errors
+    /// Damaged files, or when the operating system refuses.
+    pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
+        let directory = self.directory.clone();
+        let path = out.map_or_else(|| directory.report(), Path::to_owned);
+        let data = RunData::read(self)?;
+        let page = page::page(&data, &way(&path, directory.path()));
+        directory.write(&path, page.as_bytes())?;
+        Ok(path)
+    }
 }
 
 /// The way from the folder of a file to a directory, with a slash at its end; nothing where they are the same.

@@ -80,6 +80,11 @@ pub(super) fn mirrored(image: &[Mirror], point: Point) -> Point {
     image.iter().fold(point, |point, mirror| mirror.image(point))
 }
 
+/// Least and greatest of some numbers; infinite, and the wrong way round, where there are none.
+pub(super) fn extremes(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 /// Lower and upper corner around points.
 pub(super) fn bounds(points: impl IntoIterator<Item = Point>) -> [Point; 2] {
     points.into_iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
@@ -98,10 +103,7 @@ fn unit(axis: usize) -> Point {
 }
 
 fn extent(points: &[Point], along: Point) -> f64 {
-    let [low, high] = points
-        .iter()
-        .map(|p| dot(*p, along))
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], c| [l.min(c), h.max(c)]);
+    let [low, high] = extremes(points.iter().map(|p| dot(*p, along)));
     high - low
 }
 

@@ -4,6 +4,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use super::colour::ColourMap;
+use super::plane::extremes;
 use super::png::png;
 
 /// A pixel whose centre lies this far outside of a triangle, in barycentric coordinates, still belongs to it: neighbours
@@ -33,7 +34,7 @@ impl Raster {
             return;
         }
         let range = |axis: usize, size: usize| {
-            let [low, high] = bounds(corners.map(|corner| corner[axis]));
+            let [low, high] = extremes(corners.map(|corner| corner[axis]));
             let first = (low - 0.5).ceil().clamp(0.0, size as f64) as usize;
             let end = (high - 0.5).floor().clamp(-1.0, size as f64 - 1.0) + 1.0;
             first..end as usize
@@ -62,10 +63,6 @@ impl Raster {
     pub(super) fn pixel(&self, column: usize, row: usize) -> u8 {
         self.pixels[row * self.width + column]
     }
-}
-
-fn bounds(values: [f64; 3]) -> [f64; 2] {
-    [values.into_iter().fold(f64::INFINITY, f64::min), values.into_iter().fold(f64::NEG_INFINITY, f64::max)]
 }
 
 /// Twice the signed area of a triangle.

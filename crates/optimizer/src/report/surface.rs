@@ -13,7 +13,7 @@ use super::colour::ColourMap;
 use super::cut::NodeMeans;
 use super::data::{RunData, Snapshot};
 use super::map::{SurfaceValues, view_normal};
-use super::plane::{bounds, mirrors};
+use super::plane::{bounds, extremes, mirrors};
 use super::ticks::Count;
 use crate::setup::{Outline, OutlinedDesign};
 
@@ -261,8 +261,7 @@ fn pack(
 impl Colouring {
     /// `None` where no node has a value.
     fn pack(&self) -> Option<Value> {
-        let known = self.values.iter().flatten().flatten();
-        let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &v| [l.min(v), h.max(v)]);
+        let [least, most] = extremes(self.values.iter().flatten().flatten().copied());
         if !(least.is_finite() && most.is_finite()) {
             return None;
         }

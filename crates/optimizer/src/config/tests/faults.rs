@@ -1,7 +1,6 @@
 //! One change, one fault, at the right place.
 
 use super::*;
-use crate::diagnostics::line_and_column;
 
 pub(super) fn report(text: &str) -> FaultReport {
     match Config::from_str(text, "small.toml") {
@@ -270,7 +269,7 @@ fn every_fault_is_named_at_its_place() {
         let report = report(&text);
         let fault = report.faults.iter().find(|fault| fault.path == *path && fault.message.contains(message));
         let fault = fault.unwrap_or_else(|| panic!("{to}: {path}: {message}\n{report}"));
-        let (found, _) = line_and_column(&text, fault.place.span.start);
+        let found = line_of(&text, fault.place.span.start);
         assert!(*line == 0 || found == *line, "{to}: line {found}, not {line}\n{report}");
         assert!(fault.message.chars().next().is_some_and(|c| !c.is_uppercase()), "{}", fault.message);
         assert!(!fault.message.ends_with('.'), "{}", fault.message);

@@ -9,6 +9,11 @@ use std::path::Path;
 
 use super::*;
 
+/// Line of a byte of a text, counted from 1.
+fn line_of(text: &str, byte: usize) -> usize {
+    text[..byte].matches('\n').count() + 1
+}
+
 /// A small complete configuration; every fault case changes it in one place.
 pub(super) const SMALL: &str = r#"[mesh]
 generator = "shield"

@@ -2,7 +2,6 @@
 
 use super::faults::report;
 use super::*;
-use crate::diagnostics::line_and_column;
 
 const MORPH: &str = r#"[mesh]
 generator = "block"
@@ -90,7 +89,7 @@ fn a_case_is_the_configuration_with_its_tables_laid_over_it() {
     assert_eq!(own.motion.len(), 1);
     // A fault that shows later points at the line of the case.
     let fault = source.case(0).fault("remesh.poisson", "too soft");
-    assert_eq!(line_and_column(source.text(), fault.place.span.start).0, 21);
+    assert_eq!(line_of(source.text(), fault.place.span.start), 21);
 }
 
 #[test]
@@ -163,7 +162,7 @@ fn every_fault_of_a_motion_is_found_once_at_its_place() {
         assert_eq!(found.len(), 1, "{from} -> {to}:\n{report}");
         assert!(found[0].message.contains(message), "{}", found[0].message);
         if line > 0 {
-            assert_eq!(line_and_column(&text, found[0].place.span.start).0, line, "{report}");
+            assert_eq!(line_of(&text, found[0].place.span.start), line, "{report}");
         }
     }
 }
