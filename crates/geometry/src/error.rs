@@ -95,6 +95,16 @@ pub enum MeshError {
         /// What the library said.
         cause: String,
     },
+    /// A mesh cannot be shared out over so many ranks.
+    #[error(
+        "{ranks} ranks cannot share a mesh of {nodes} nodes, since every rank owns at least one: take 1 to {nodes} ranks"
+    )]
+    Ranks {
+        /// Ranks asked for.
+        ranks: usize,
+        /// Nodes of the mesh.
+        nodes: usize,
+    },
     /// A value to be written is not finite.
     #[error("the array `{array}` holds {value} at position {position}: only finite values are written")]
     NotFiniteArray {

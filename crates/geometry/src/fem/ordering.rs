@@ -11,6 +11,7 @@ use faer::sparse::linalg::{amd, cholesky::simplicial, qr};
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
 use crate::ids::NodeId;
+use crate::metis;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
@@ -20,7 +21,7 @@ pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
 
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
-    weighted_dissection(structure, None)
+    metis::dissected(structure, None)
 }
 
 /// Nested dissection of the *nodes*, expanded to their unknowns; not postordered, `forward[new] = old`.
@@ -35,7 +36,7 @@ pub fn nested_dissection_of_nodes<const C: usize>(
     let (nodes, graph) = node_graph(structure, dofs);
     let unknowns = |node: NodeId| (0..C).filter_map(move |c| dofs.equation(node, c));
     let weights: Vec<i32> = nodes.iter().map(|&node| unknowns(node).count() as i32).collect();
-    let order = weighted_dissection(&graph, Some(weights))?;
+    let order = metis::dissected(&graph, Some(weights))?;
     Some(order.iter().flat_map(|&i| unknowns(nodes[i as usize])).map(|equation| equation as u32).collect())
 }
 
@@ -75,60 +76,6 @@ fn node_graph<const C: usize>(structure: &CsrStructure, dofs: &DofMap<C>) -> (Ve
     }
     let graph = CsrStructure { column_count: nodes.len(), row_starts, columns };
     (nodes, graph)
-}
-
-/// METIS's nested dissection of a graph, vertices counting by their weights or all the same.
-#[cfg(feature = "metis")]
-fn weighted_dissection(structure: &CsrStructure, weights: Option<Vec<i32>>) -> Option<Vec<u32>> {
-    use std::sync::Mutex;
-
-    /// METIS draws from a random generator of the process: one caller at a time gets the same numbers every time.
-    static METIS: Mutex<()> = Mutex::new(());
-
-    let n = structure.row_count();
-    let mut starts = vec![0i32];
-    let mut neighbours = Vec::with_capacity(structure.columns.len());
-    for row in 0..n {
-        let others = structure.columns[structure.row(row)].iter().filter(|&&c| c as usize != row);
-        for &c in others {
-            neighbours.push(i32::try_from(c).ok()?);
-        }
-        starts.push(i32::try_from(neighbours.len()).ok()?);
-    }
-    if neighbours.is_empty() {
-        return None;
-    }
-    let mut count = i32::try_from(n).ok()?;
-    let mut forward = vec![0i32; n];
-    let mut inverse = vec![0i32; n];
-    let mut options = [-1i32; metis_sys::METIS_NOPTIONS as usize];
-    options[metis_sys::moptions_et_METIS_OPTION_SEED as usize] = 1;
-    let mut weights = weights;
-    assert!(weights.as_ref().is_none_or(|weights| weights.len() == n), "one weight a vertex");
-    let guard = METIS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-    // SAFETY: all arrays outlive the call and have the lengths METIS_NodeND documents: n + 1 row starts, as many
-    // neighbours as the last of them says, n entries in each permutation, METIS_NOPTIONS options; a null pointer or n vertex
-    // weights, as asserted above.
-    #[allow(unsafe_code)]
-    let status = unsafe {
-        metis_sys::METIS_NodeND(
-            &mut count,
-            starts.as_mut_ptr(),
-            neighbours.as_mut_ptr(),
-            weights.as_mut().map_or(std::ptr::null_mut(), |weights| weights.as_mut_ptr()),
-            options.as_mut_ptr(),
-            forward.as_mut_ptr(),
-            inverse.as_mut_ptr(),
-        )
-    };
-    drop(guard);
-    (status == metis_sys::rstatus_et_METIS_OK).then(|| forward.into_iter().map(|i| i as u32).collect())
-}
-
-/// Without METIS there is no dissection, and the factorisation falls back to minimum degree.
-#[cfg(not(feature = "metis"))]
-fn weighted_dissection(_: &CsrStructure, _: Option<Vec<i32>>) -> Option<Vec<u32>> {
-    None
 }
 
 /// The inverse permutation: `inverse[old] = new`.
