@@ -66,7 +66,10 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
     if tets <= LARGEST_SOLVED {
         let analysis: Analysis =
             setup.problem.evaluate(&shape.initial, Want::Gradient).expect("it converges");
-        parts.push(("fields and VTU", timed(|| fields::vtu(&setup.problem, &analysis)).0));
+        parts.push((
+            "fields and VTU",
+            timed(|| fields::vtu(&setup.problem, &fields::FieldData::of(&analysis))).0,
+        ));
     }
     (tets, parts)
 }

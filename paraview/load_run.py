@@ -42,6 +42,10 @@ faces = np.frombuffer(base64.b64decode("{faces}"), dtype="<i4").reshape(-1, 3).a
 direction = np.array({direction})
 grid = self.GetInputDataObject(0, 0)
 points = support.vtk_to_numpy(grid.GetPoints().GetData())
+# Pieces of several ranks repeat the points on their borders.
+ids = grid.GetPointData().GetArray("GlobalPointIds")
+first = np.unique(support.vtk_to_numpy(ids), return_index=True)[1] if ids else np.arange(len(points))
+points = points[first]
 used, local = np.unique(faces, return_inverse=True)
 cells = np.hstack([np.full((len(faces), 1), 3), local.reshape(-1, 3)]).astype(np.int64)
 places = vtkPoints()
@@ -53,7 +57,7 @@ output.SetPoints(places)
 output.SetPolys(triangles)
 for name, label, scale in [("displacement", "displacement [mm]", 1e3), ("sensitivity", "sensitivity", 1.0)]:
     array = grid.GetPointData().GetArray(name)
-    vectors = scale * support.vtk_to_numpy(array)[used] if array else np.zeros((len(used), 3))
+    vectors = scale * support.vtk_to_numpy(array)[first][used] if array else np.zeros((len(used), 3))
     values = vectors @ direction if direction.any() else np.linalg.norm(vectors, axis=1)
     named = numpy_to_vtk(values.copy(), deep=1)
     named.SetName(label)
@@ -169,12 +173,29 @@ def hull_patches(points, faces):
     return np.isin(patch, hull)
 
 
-def body_faces(run, grid):
-    """The faces of the bodies that move, shape (n, 3); of all bodies where none moves."""
+def whole(grid):
+    """Points, tetrahedra, their regions and the displacements of the points, all in the order of the whole mesh.
+
+    Where several ranks have written pieces, each has its own copy of a point on their border; the numbers in the whole
+    mesh, which pieces carry, tell which points are one.
+    """
     points = vtk_to_numpy(grid.GetPoints().GetData())
     tets = vtk_to_numpy(grid.GetCells().GetConnectivityArray()).reshape(-1, 4)
     region = vtk_to_numpy(grid.GetCellData().GetArray("region"))
-    displacement = np.linalg.norm(vtk_to_numpy(grid.GetPointData().GetArray("displacement")), axis=1)
+    displacement = vtk_to_numpy(grid.GetPointData().GetArray("displacement"))
+    nodes, elements = grid.GetPointData().GetArray("GlobalPointIds"), grid.GetCellData().GetArray("GlobalCellIds")
+    if nodes and elements:
+        nodes, order = vtk_to_numpy(nodes), np.argsort(vtk_to_numpy(elements))
+        first = np.unique(nodes, return_index=True)[1]
+        points, displacement = points[first], displacement[first]
+        tets, region = nodes[tets][order], region[order]
+    return points, tets, region, displacement
+
+
+def body_faces(run, grid):
+    """The faces of the bodies that move, shape (n, 3); of all bodies where none moves."""
+    points, tets, region, displacement = whole(grid)
+    displacement = np.linalg.norm(displacement, axis=1)
     moved = displacement > MOVED * displacement.max()
     corners, sides = faces_of(tets)
     outside = sides[:, 1] < 0
@@ -264,7 +285,7 @@ def load(folder, time="last", by="displacement"):
     faces, direction = body_faces(run, grid), run.direction()
     # What is up in the view; bodies that move along their normals have no direction of their own.
     up = direction if direction.any() else np.array([0.0, 0.0, 1.0])
-    points = vtk_to_numpy(grid.GetPoints().GetData())
+    points = whole(grid)[0]
     body_points = points[np.unique(faces)] if len(faces) else points
 
     view = simple.GetActiveViewOrCreate("RenderView")

@@ -169,7 +169,8 @@ fn step(problem: &Problem, record: &mut Record) {
     if record.tets < 200_000 {
         let analysis =
             problem.analyse_with(&mut Memory::default(), &p, moved, Want::Value).expect("it converges");
-        record.fields = timed(|| fields::vtu(problem, &analysis).expect("it is finite")).0;
+        record.fields =
+            timed(|| fields::vtu(problem, &fields::FieldData::of(&analysis)).expect("it is finite")).0;
     }
 }
 

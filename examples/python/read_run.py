@@ -61,7 +61,25 @@ def field_of(folder, evaluation):
     reader = pyvista.get_reader(folder / "fields.pvd")
     times = list(reader.time_values)
     reader.set_active_time_value(float(evaluation) if evaluation in times else times[-1])
-    return reader.read()[0]
+    return joined(reader.read()[0])
+
+
+def joined(mesh):
+    """The mesh in its own order: where several ranks have written pieces, each has a copy of a point on their border."""
+    import numpy as np
+    import pyvista
+
+    if "GlobalPointIds" not in mesh.point_data:
+        return mesh
+    nodes, order = mesh.point_data["GlobalPointIds"], np.argsort(mesh.cell_data["GlobalCellIds"])
+    first = np.unique(nodes, return_index=True)[1]
+    tets = nodes[mesh.cells_dict[pyvista.CellType.TETRA]][order]
+    whole = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: tets}, mesh.points[first])
+    for name in mesh.point_data.keys():
+        whole.point_data[name] = mesh.point_data[name][first]
+    for name in mesh.cell_data.keys():
+        whole.cell_data[name] = mesh.cell_data[name][order]
+    return whole
 
 
 def print_line(mesh, result, points=6):

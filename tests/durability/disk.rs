@@ -247,6 +247,22 @@ impl Disk for SimulatedDisk {
         Ok(())
     }
 
+    fn remove_dir(&self, path: &Path) -> io::Result<()> {
+        let mut state = self.state();
+        state.operate("remove_dir")?;
+        match state.names.get(path) {
+            Some(Node::Folder) if state.names.keys().any(|name| name.parent() == Some(path)) => {
+                Err(io::ErrorKind::DirectoryNotEmpty.into())
+            }
+            Some(Node::Folder) => {
+                state.names.remove(path);
+                Ok(())
+            }
+            Some(Node::File(_)) => Err(io::ErrorKind::NotADirectory.into()),
+            None => Err(io::ErrorKind::NotFound.into()),
+        }
+    }
+
     fn sync_dir(&self, path: &Path) -> io::Result<()> {
         let mut state = self.state();
         state.operate("sync_dir")?;

@@ -42,6 +42,11 @@ pub fn qualities(mesh: &Mesh) -> Vec<f64> {
     mesh.topology().tets().par_iter().map(|tet| quality(tet.map(|n| mesh.point(n)))).collect()
 }
 
+/// Quality of some elements, in their order; the numbers that [`qualities`] has for them.
+pub fn qualities_of(mesh: &Mesh, elements: &[ElementId]) -> Vec<f64> {
+    elements.par_iter().map(|&e| quality(mesh.vertices(e))).collect()
+}
+
 /// How the quality of a set of elements is distributed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QualityReport {

@@ -1,14 +1,40 @@
-//! The arrays that a design leaves for ParaView (docs/configuration.md lists them with their units).
+//! The arrays that a design leaves for ParaView (docs/output.md lists them with their units), of the whole mesh or of a
+//! part of it.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::io::{ArrayData, Field, vtu_bytes};
-use fluxmorph_geometry::quality::qualities;
+use fluxmorph_geometry::io::{ArrayData, Field, VtuPiece, pvtu_text, vtu_bytes};
+use fluxmorph_geometry::quality::qualities_of;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, MeshError, NodeId};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
 
 use crate::problem::{Analysis, Problem};
+
+/// What the arrays of a design are made from; a rank has no more of it.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldData<'a> {
+    /// The moved mesh.
+    pub mesh: &'a Mesh,
+    /// Displacement of every node from the undeformed mesh [m], shape `(n_nodes, 3)`.
+    pub displacement: &'a [Point],
+    /// dF/dx at the nodes [unit of F per m], shape `(n_nodes, 3)`; `None` is written as zeros.
+    pub sensitivity: Option<&'a [Point]>,
+    /// One solution per state. For a piece only the potentials at its nodes matter.
+    pub solutions: &'a [FieldSolution],
+}
+
+impl<'a> FieldData<'a> {
+    /// Those of an analysed design.
+    pub fn of(analysis: &'a Analysis) -> Self {
+        Self {
+            mesh: &analysis.mesh,
+            displacement: &analysis.displacement,
+            sensitivity: analysis.sensitivity.as_deref(),
+            solutions: &analysis.solutions,
+        }
+    }
+}
 
 /// The VTU file of an analysed design: the moved mesh, potentials, displacement and sensitivity at its nodes; fields,
 /// loss, region and quality in its elements.
@@ -17,33 +43,74 @@ use crate::problem::{Analysis, Problem};
 ///
 /// # Errors
 /// [`MeshError::NotFiniteArray`] names an array that is not finite: nothing of it is written.
-pub fn vtu(problem: &Problem, analysis: &Analysis) -> Result<Vec<u8>, MeshError> {
-    let mesh = &analysis.mesh;
-    let states: Vec<StateArrays> = (0..problem.states.len())
-        .map(|index| StateArrays::new(&problem.states[index], &analysis.solutions[index], mesh, index))
-        .collect();
-    let zeros;
-    let sensitivity = match &analysis.sensitivity {
-        Some(sensitivity) => sensitivity,
-        None => {
-            zeros = vec![[0.0; 3]; mesh.points().len()];
-            &zeros
+pub fn vtu(problem: &Problem, data: &FieldData<'_>) -> Result<Vec<u8>, MeshError> {
+    let topology = data.mesh.topology();
+    let (nodes, elements): (Vec<_>, Vec<_>) = (topology.nodes().collect(), topology.elements().collect());
+    let arrays = Arrays::new(problem, data, &nodes, &elements);
+    vtu_bytes(data.mesh, &arrays.at_nodes(), &arrays.in_cells())
+}
+
+/// The VTU file of some elements of a design and the nodes that they touch: what [`vtu`] has for them, and their numbers
+/// in the whole mesh.
+///
+/// # Errors
+/// As [`vtu`], for values of the piece.
+pub fn piece(problem: &Problem, data: &FieldData<'_>, elements: &[ElementId]) -> Result<Vec<u8>, MeshError> {
+    let piece = VtuPiece::new(data.mesh.topology(), elements);
+    let arrays = Arrays::new(problem, data, piece.nodes(), piece.elements());
+    piece.bytes(data.mesh.points(), &arrays.at_nodes(), &arrays.in_cells())
+}
+
+/// The text of the PVTU file of pieces that [`piece`] made; their paths are relative to it.
+pub fn header(problem: &Problem, data: &FieldData<'_>, pieces: &[String]) -> String {
+    let arrays = Arrays::new(problem, data, &[], &[]);
+    pvtu_text(&arrays.at_nodes(), &arrays.in_cells(), pieces)
+}
+
+/// The arrays over some nodes and elements.
+struct Arrays {
+    states: Vec<StateArrays>,
+    displacement: Vec<Point>,
+    sensitivity: Vec<Point>,
+    region: Vec<i32>,
+    quality: Vec<f64>,
+}
+
+impl Arrays {
+    fn new(problem: &Problem, data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
+        let regions = data.mesh.topology().region_of();
+        let at = |values: &[Point]| nodes.iter().map(|n| values[n.index()]).collect();
+        let states = problem.states.iter().zip(data.solutions).enumerate();
+        Self {
+            states: states
+                .map(|(index, (model, solution))| {
+                    StateArrays::new(model, solution, data.mesh, index, nodes, elements)
+                })
+                .collect(),
+            displacement: at(data.displacement),
+            sensitivity: data.sensitivity.map_or_else(|| vec![[0.0; 3]; nodes.len()], at),
+            region: elements.iter().map(|e| regions[e.index()].0 as i32).collect(),
+            quality: qualities_of(data.mesh, elements),
         }
-    };
-    let region: Vec<i32> = mesh.topology().region_of().iter().map(|r| r.0 as i32).collect();
-    let quality = qualities(mesh);
-    let (first, others) = states.split_first().expect("a problem has a state");
-    let mut at_nodes: Vec<Field<'_>> = first.at_nodes().into();
-    at_nodes.push(Field { name: "displacement", data: ArrayData::Vector(&analysis.displacement) });
-    at_nodes.push(Field { name: "sensitivity", data: ArrayData::Vector(sensitivity) });
-    let mut in_cells: Vec<Field<'_>> = first.in_cells().into();
-    in_cells.push(Field { name: "region", data: ArrayData::Integer(&region) });
-    in_cells.push(Field { name: "quality", data: ArrayData::Scalar(&quality) });
-    for state in others {
-        at_nodes.extend(state.at_nodes());
-        in_cells.extend(state.in_cells());
     }
-    vtu_bytes(mesh, &at_nodes, &in_cells)
+
+    fn at_nodes(&self) -> Vec<Field<'_>> {
+        let (first, others) = self.states.split_first().expect("a problem has a state");
+        let mut fields: Vec<Field<'_>> = first.at_nodes().into();
+        fields.push(Field { name: "displacement", data: ArrayData::Vector(&self.displacement) });
+        fields.push(Field { name: "sensitivity", data: ArrayData::Vector(&self.sensitivity) });
+        fields.extend(others.iter().flat_map(StateArrays::at_nodes));
+        fields
+    }
+
+    fn in_cells(&self) -> Vec<Field<'_>> {
+        let (first, others) = self.states.split_first().expect("a problem has a state");
+        let mut fields: Vec<Field<'_>> = first.in_cells().into();
+        fields.push(Field { name: "region", data: ArrayData::Integer(&self.region) });
+        fields.push(Field { name: "quality", data: ArrayData::Scalar(&self.quality) });
+        fields.extend(others.iter().flat_map(StateArrays::in_cells));
+        fields
+    }
 }
 
 /// Names of the arrays of one state, in the order of [`StateArrays`].
@@ -63,13 +130,17 @@ struct StateArrays {
 }
 
 impl StateArrays {
-    fn new(model: &FieldModel, solution: &FieldSolution, mesh: &Mesh, index: usize) -> Self {
-        let potentials: Vec<[c64; 4]> = (0..mesh.points().len())
-            .into_par_iter()
-            .map(|i| solution.potentials(model, NodeId::new(i)))
-            .collect();
+    fn new(
+        model: &FieldModel,
+        solution: &FieldSolution,
+        mesh: &Mesh,
+        index: usize,
+        nodes: &[NodeId],
+        elements: &[ElementId],
+    ) -> Self {
+        let potentials: Vec<[c64; 4]> = nodes.par_iter().map(|&n| solution.potentials(model, n)).collect();
         let a: Vec<[c64; 3]> = potentials.par_iter().map(|p| [p[0], p[1], p[2]]).collect();
-        let b = parts(&solution.flux_densities(model, mesh));
+        let b = parts(&solution.flux_densities_of(model, mesh, elements));
         let magnitude = |(re, im): (&Point, &Point)| re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt();
         let b_abs = b[0].par_iter().zip(&b[1]).map(magnitude).collect();
         let suffix = match index {
@@ -83,8 +154,8 @@ impl StateArrays {
             psi: [potentials.iter().map(|p| p[3].re).collect(), potentials.iter().map(|p| p[3].im).collect()],
             b,
             b_abs,
-            j: parts(&solution.current_densities(model, mesh)),
-            loss: solution.loss_densities(model, mesh),
+            j: parts(&solution.current_densities_of(model, mesh, elements)),
+            loss: solution.loss_densities_of(model, mesh, elements),
         }
     }
 

@@ -120,16 +120,34 @@ impl FieldSolution {
 
     /// `B` [T] in every element, shape `(n_tets, 3)`.
     pub fn flux_densities(&self, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
-        let elements: Vec<ElementId> = model.topology().elements().collect();
-        elements.into_par_iter().map(|e| self.flux_density(model, mesh, e)).collect()
+        self.flux_densities_of(model, mesh, &all(model))
+    }
+
+    /// `B` [T] in some elements, in their order, shape `(n, 3)`.
+    pub fn flux_densities_of(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        elements: &[ElementId],
+    ) -> Vec<Complex3> {
+        elements.par_iter().map(|&e| self.flux_density(model, mesh, e)).collect()
     }
 
     /// `J = −jωσ(A + ∇ψ)` [A/m²] at the centroid of every element, shape `(n_tets, 3)`.
     pub fn current_densities(&self, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
-        let elements: Vec<ElementId> = model.topology().elements().collect();
+        self.current_densities_of(model, mesh, &all(model))
+    }
+
+    /// `J` [A/m²] at the centroids of some elements, in their order, shape `(n, 3)`.
+    pub fn current_densities_of(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        elements: &[ElementId],
+    ) -> Vec<Complex3> {
         elements
-            .into_par_iter()
-            .map(|e| {
+            .par_iter()
+            .map(|&e| {
                 let eddy = model.coefficients_of(e).eddy;
                 if eddy == c64::default() {
                     return [c64::default(); 3];
@@ -141,8 +159,12 @@ impl FieldSolution {
 
     /// Time-averaged loss density [W/m³] of every element: `½σ|E|²` averaged exactly over the element.
     pub fn loss_densities(&self, model: &FieldModel, mesh: &Mesh) -> Vec<f64> {
-        let elements: Vec<ElementId> = model.topology().elements().collect();
-        elements.into_par_iter().map(|e| self.loss_density(model, mesh, e)).collect()
+        self.loss_densities_of(model, mesh, &all(model))
+    }
+
+    /// Time-averaged loss density [W/m³] of some elements, in their order, shape `(n,)`.
+    pub fn loss_densities_of(&self, model: &FieldModel, mesh: &Mesh, elements: &[ElementId]) -> Vec<f64> {
+        elements.par_iter().map(|&e| self.loss_density(model, mesh, e)).collect()
     }
 
     fn loss_density(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> f64 {
@@ -203,6 +225,10 @@ impl FieldSolution {
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));
         losses
     }
+}
+
+fn all(model: &FieldModel) -> Vec<ElementId> {
+    model.topology().elements().collect()
 }
 
 /// The mean of `|A + ∇ψ|²` over an element [T² m²] by a rule.

@@ -22,7 +22,8 @@ fn partition(topology: &Topology, ranks: usize, kept: &[ElementId]) -> (Partitio
     (partition, report)
 }
 
-/// Edges of the plate between ranks.
+/// Edges of some elements between ranks.
+#[cfg(feature = "metis")]
 fn cut_in(topology: &Topology, partition: &Partition, elements: &[ElementId]) -> usize {
     let mut edges: Vec<[NodeId; 2]> = Vec::new();
     for &e in elements {

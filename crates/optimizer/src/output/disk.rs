@@ -49,6 +49,12 @@ pub trait Disk: Debug + Send + Sync {
     /// When the operating system refuses.
     fn remove(&self, path: &Path) -> io::Result<()>;
 
+    /// Removes an empty folder.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::DirectoryNotEmpty`], or when the operating system refuses.
+    fn remove_dir(&self, path: &Path) -> io::Result<()>;
+
     /// Waits until the names in a folder are on the disk.
     ///
     /// # Errors
@@ -124,6 +130,10 @@ impl Disk for SystemDisk {
 
     fn remove(&self, path: &Path) -> io::Result<()> {
         fs::remove_file(path)
+    }
+
+    fn remove_dir(&self, path: &Path) -> io::Result<()> {
+        fs::remove_dir(path)
     }
 
     /// Other systems than Unix keep names without being asked, and cannot open folders as files.

@@ -3,6 +3,7 @@
 mod csv;
 mod design_file;
 mod disk;
+mod field_files;
 mod files;
 mod history;
 mod json_place;
@@ -17,6 +18,7 @@ use std::path::PathBuf;
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFileError, read_design};
 pub use disk::{Disk, DiskFile, system_disk};
+pub use field_files::FieldForm;
 pub use files::SyncedLog;
 pub(crate) use files::write_whole;
 pub use history::History;

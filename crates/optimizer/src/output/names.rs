@@ -46,17 +46,6 @@ pub(super) fn is_case(name: &str) -> bool {
         .any(|digits| digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
-pub(super) fn field_name(evaluation: usize) -> String {
-    format!("eval_{evaluation:04}.vtu")
-}
-
-/// The evaluation of a field file.
-pub(super) fn field_number(name: &str) -> Option<usize> {
-    let digits = name.strip_prefix("eval_")?.strip_suffix(".vtu")?;
-    let is_ours = digits.len() >= 4 && digits.bytes().all(|byte| byte.is_ascii_digit());
-    digits.parse().ok().filter(|_| is_ours)
-}
-
 /// The command that goes on with a run, as a shell takes it.
 pub fn resume_command(directory: &Path) -> String {
     format!("fluxmorph resume {}", shell_word(directory))

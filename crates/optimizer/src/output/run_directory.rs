@@ -1,4 +1,5 @@
-//! The run directory: which folder may become one, and the names of the files in it.
+//! The run directory: which folder may become one, and the names of the files in it; those of the fields are in
+//! `field_files`.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,9 +7,10 @@ use std::sync::Arc;
 
 use super::OutputError;
 use super::disk::Disk;
+use super::field_files::is_fields;
 use super::files::{SyncedLog, UNFINISHED, folder_of, write_whole};
 use super::manifest::Manifest;
-use super::names::{field_name, field_number, is_case, is_surface, morph_name};
+use super::names::{is_case, is_surface, morph_name};
 
 /// What to do with an earlier run in the same folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +29,6 @@ pub struct RunDirectory {
 }
 
 const MANIFEST: &str = "manifest.json";
-const FIELDS: &str = "fields";
 const JOURNAL: &str = "journal.bin";
 const CONFIG: &str = "config.toml";
 /// What a damaged journal is kept as.
@@ -51,6 +52,7 @@ const FILES: &[&str] = &[
 ];
 const OPTIMUM: &str = "optimum.msh";
 const REPORT: &str = "report.html";
+
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
     ///
@@ -122,7 +124,7 @@ impl RunDirectory {
     }
 
     /// Makes a folder, and those above it that are missing; their names are on the disk then.
-    fn make(&self, path: &Path) -> Result<(), OutputError> {
+    pub(super) fn make(&self, path: &Path) -> Result<(), OutputError> {
         let is_missing = |folder: &&Path| {
             let names = self.disk.names(folder);
             !folder.as_os_str().is_empty()
@@ -194,25 +196,9 @@ impl RunDirectory {
         self.remove_fields(kept)
     }
 
-    fn remove_fields(&self, kept: &[usize]) -> Result<(), OutputError> {
-        let fields = self.fields();
-        // A link may lead to the fields of another run: those stay.
-        if self.disk.is_link(&fields) {
-            return Ok(());
-        }
-        self.remove_unfinished(&fields)?;
-        let removed =
-            |name: &&String| field_number(name).is_some_and(|evaluation| !kept.contains(&evaluation));
-        for name in self.entries(&fields)?.iter().filter(removed) {
-            self.remove(&fields.join(name))?;
-        }
-        Ok(())
-    }
-
     fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
-        let fields_are_empty = || Ok(self.entries(&self.fields())?.is_empty());
         for name in self.entries(&self.path)? {
-            let leftover = name.starts_with(UNFINISHED) || (name == FIELDS && fields_are_empty()?);
+            let leftover = name.starts_with(UNFINISHED) || (is_fields(&name) && self.has_no_fields()?);
             if !leftover {
                 return Ok(false);
             }
@@ -220,7 +206,7 @@ impl RunDirectory {
         Ok(true)
     }
 
-    fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
+    pub(super) fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
         for name in self.entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
             self.remove(&folder.join(name))?;
         }
@@ -228,7 +214,7 @@ impl RunDirectory {
     }
 
     /// Names in a folder, sorted; none when there is no folder.
-    fn entries(&self, folder: &Path) -> Result<Vec<String>, OutputError> {
+    pub(super) fn entries(&self, folder: &Path) -> Result<Vec<String>, OutputError> {
         match self.disk.names(folder) {
             Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
                 Ok(Vec::new())
@@ -272,17 +258,6 @@ impl RunDirectory {
     /// As [`SyncedLog::append`], and [`OutputError::InUse`].
     pub fn reopened(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
         SyncedLog::reopen(&*self.disk, path, length)
-    }
-
-    /// Evaluations with a field file, ascending.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
-    pub fn evaluations_with_fields(&self) -> Result<Vec<usize>, OutputError> {
-        let mut numbers: Vec<_> =
-            self.entries(&self.fields())?.iter().filter_map(|name| field_number(name)).collect();
-        numbers.sort_unstable();
-        Ok(numbers)
     }
 
     /// The disk that the folder is on.
@@ -370,22 +345,7 @@ impl RunDirectory {
         self.path.join(file)
     }
 
-    /// `fields`, the folder of the VTU files.
-    pub fn fields(&self) -> PathBuf {
-        self.path.join(FIELDS)
-    }
-
-    /// The VTU file of one evaluation.
-    pub fn field(&self, evaluation: usize) -> PathBuf {
-        self.fields().join(field_name(evaluation))
-    }
-
-    /// The VTU file of one evaluation as the collection names it, relative to the run directory.
-    pub fn field_in_collection(&self, evaluation: usize) -> String {
-        format!("{FIELDS}/{}", field_name(evaluation))
-    }
-
-    /// `fields.pvd`, the collection of the VTU files.
+    /// `fields.pvd`, the collection of the field files.
     pub fn collection(&self) -> PathBuf {
         self.path.join("fields.pvd")
     }
@@ -411,8 +371,6 @@ mod tests {
         let run =
             RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OlderRun::Keep).expect("made");
         assert!(run.fields().is_dir());
-        assert!(run.field(7).ends_with("fields/eval_0007.vtu"));
-        assert_eq!(run.field_in_collection(12345), "fields/eval_12345.vtu");
         // Broken off before the manifest: still nothing of anybody.
         std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
         assert!(RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).is_ok());

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::io::{VtuArray, vtu_contents};
+use fluxmorph_geometry::io::VtuArray;
 use fluxmorph_geometry::tet4::Point;
 
 use super::ReportedRun;
+use super::field_file::field_contents;
 use crate::config::{Config, FieldsKept};
 use crate::error::Error;
 use crate::journal::Journal;
@@ -15,9 +16,6 @@ use crate::setup::{Outline, outline};
 
 /// Largest history, result and configuration that are read [bytes].
 const LARGEST_TEXT: u64 = 1 << 28;
-
-/// Largest field file that is read [bytes].
-const LARGEST_FIELD: u64 = 1 << 34;
 
 /// A run as its directory tells it.
 #[derive(Debug)]
@@ -88,7 +86,7 @@ impl RunData {
         let there =
             directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
         files.retain(|file| there.contains(file));
-        files.extend(kept.iter().map(|&evaluation| directory.field_in_collection(evaluation)));
+        files.extend(directory.fields_in_collection(&kept)?);
         Ok(Self {
             // However the path is typed, the page is the same.
             directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
@@ -149,7 +147,7 @@ fn text(directory: &RunDirectory, path: &Path) -> Result<Option<String>, OutputE
     }
 }
 
-fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> OutputError {
+pub(super) fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> OutputError {
     let path = path.to_owned();
     move |error| OutputError::Damaged { path, message: error.to_string() }
 }
@@ -213,10 +211,7 @@ impl Snapshot {
             Ok(outline) => outline,
             Err(cause) => return Ok(Err(cause.clone())),
         };
-        let path = directory.field(evaluation);
-        let bytes = directory.disk().read(&path, LARGEST_FIELD).map_err(OutputError::io("read", &path))?;
-        let mut contents = vtu_contents(&bytes).map_err(damaged(&path))?;
-        drop(bytes);
+        let (path, mut contents) = field_contents(directory, evaluation)?;
         let topology = outline.mesh.topology();
         if contents.points.len() != topology.node_count() || contents.tets != topology.tets() {
             return Ok(Err(

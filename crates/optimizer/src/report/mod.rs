@@ -1,6 +1,6 @@
 //! `report.html`: one page about a run, made from its directory alone, that can be sent and read anywhere.
 //!
-//! `data` reads the directory, `page` puts the sections in their order, and the others draw one thing each: `map`, `field`,
+//! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others draw one thing each: `map`, `field`,
 //! `convergence`, `histogram`, `surface`, `tables`, `paper`. Underneath are `plot` (axes), `ticks` (numbers), `colour`,
 //! `raster` and `png` (images), `cut`, `coils` and `plane` (geometry), `words` (the configuration in plain words). Markup is
 //! written by `html` alone, which escapes. The page holds its style and its script (`style.css`, `view.js`), asks no network,
@@ -14,6 +14,7 @@ mod convergence;
 mod cut;
 mod data;
 mod field;
+mod field_file;
 mod histogram;
 mod html;
 mod map;

@@ -10,7 +10,7 @@ use fluxmorph_geometry::io::pvd_text;
 use crate::config::FieldsKept;
 use crate::driver::Recorder;
 use crate::error::Error;
-use crate::fields;
+use crate::fields::{self, FieldData};
 use crate::journal::{Contents, Identity, Journal, Record};
 use crate::observer::Evaluation;
 use crate::output::{History, RunDirectory};
@@ -117,13 +117,13 @@ pub(super) fn write_field(
     problem: &Problem,
     analysis: &Analysis,
 ) -> Result<(), Error> {
-    let bytes = fields::vtu(problem, analysis)?;
-    Ok(directory.write(&directory.field(evaluation), &bytes)?)
+    let bytes = fields::vtu(problem, &FieldData::of(analysis))?;
+    Ok(directory.write_field(evaluation, &bytes)?)
 }
 
 /// Writes the PVD file over all field files; its time is the evaluation number.
 pub(super) fn write_collection(directory: &RunDirectory, evaluations: &[usize]) -> Result<(), Error> {
-    let files: Vec<String> = evaluations.iter().map(|&e| directory.field_in_collection(e)).collect();
+    let files = directory.fields_in_collection(evaluations)?;
     let text = pvd_text(evaluations.iter().zip(&files).map(|(&e, file)| (e as f64, file.as_str())))?;
     Ok(directory.write(&directory.collection(), text.as_bytes())?)
 }

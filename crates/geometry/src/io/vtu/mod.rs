@@ -1,8 +1,11 @@
-//! VTK XML files of tetrahedral meshes (`.vtu`), made in `writer` and read in `reader`.
+//! VTK XML files of tetrahedral meshes (`.vtu`), made in `writer` and read in `reader`; parts of a mesh in `piece`, with the
+//! header that names them (`.pvtu`), and put together again in `join`.
 //!
 //! Arrays are inline in base64, compressed by zlib, headers of 64 bits, little endian: what every reader since
 //! ParaView 5 understands (appended raw data is not). Equal input makes equal bytes, for any number of threads.
 
+mod join;
+mod piece;
 mod reader;
 mod writer;
 
@@ -11,7 +14,9 @@ use std::collections::BTreeMap;
 use crate::error::MeshError;
 use crate::ids::NodeId;
 use crate::tet4::Point;
-pub use reader::{read_vtu, vtu_contents};
+pub use join::joined;
+pub use piece::{VtuPiece, pvtu_text};
+pub use reader::{pvtu_pieces, read_vtu, vtu_contents};
 pub use writer::{vtu_bytes, vtu_bytes_at, write_vtu};
 
 /// The values of one array to be written, one entry a node or an element.
@@ -23,6 +28,8 @@ pub enum ArrayData<'a> {
     Vector(&'a [Point]),
     /// One whole number each, shape `(n,)`: region numbers, flags.
     Integer(&'a [i32]),
+    /// The number in the whole mesh of each node or element of a part of it, shape `(n,)`; ParaView knows them as such.
+    GlobalIds(&'a [u32]),
 }
 
 /// A named array to be written.
@@ -46,7 +53,7 @@ pub enum VtuArray {
 }
 
 /// A tetrahedral mesh with arrays, as read from a file; its volumes are not checked.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct VtuContents {
     /// Coordinates [m], shape `(n_nodes, 3)`.
     pub points: Vec<Point>,
@@ -73,6 +80,11 @@ impl VtuArray {
         self.len() == 0
     }
 }
+
+/// The array over the nodes of a piece that holds their numbers in the whole mesh.
+const GLOBAL_NODES: &str = "GlobalPointIds";
+/// The array over the elements of a piece that holds their numbers in the whole mesh.
+const GLOBAL_ELEMENTS: &str = "GlobalCellIds";
 
 fn refused(cause: impl std::fmt::Display) -> MeshError {
     MeshError::Vtu { cause: cause.to_string() }

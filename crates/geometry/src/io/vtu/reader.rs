@@ -1,15 +1,21 @@
-//! Reads VTU files of tetrahedra: the only file that names vtkio.
+//! Reads VTU files of tetrahedra and the headers of their pieces: the only file that names vtkio.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use vtkio::model::{Attribute, CellType, DataSet, IOBuffer, Piece, Vtk};
+use vtkio::model::{Attribute, CellType, DataSet, IOBuffer, Piece, UnstructuredGridPiece, Vtk};
 
 use super::{VtuArray, VtuContents, refused};
 use crate::error::MeshError;
 use crate::ids::NodeId;
 use crate::tet4::Point;
+
+/// How the writer begins a mesh of no elements.
+const NOTHING: &[u8] = b"<Piece NumberOfPoints=\"0\" NumberOfCells=\"0\">";
+
+/// Bytes within which it stands.
+const START: usize = 1024;
 
 /// Reads a VTU file of tetrahedra.
 ///
@@ -26,14 +32,12 @@ pub fn read_vtu(path: &Path) -> Result<VtuContents, MeshError> {
 /// [`MeshError::Vtu`] if they are damaged, of another kind, or hold other cells than tetrahedra;
 /// [`MeshError::DanglingNode`].
 pub fn vtu_contents(bytes: &[u8]) -> Result<VtuContents, MeshError> {
-    // The library indexes decoded data without a check: a cut file would end the program.
-    let vtk = catch_unwind(AssertUnwindSafe(|| Vtk::parse_xml(bytes)))
-        .map_err(|_| refused("the file is damaged"))?
-        .map_err(refused)?;
-    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else {
-        return Err(refused("an unstructured grid is expected"));
-    };
-    let Ok([Piece::Inline(piece)]) = <[_; 1]>::try_from(pieces) else {
+    // The library cannot decode arrays without a number, which a piece without elements has.
+    let start = &bytes[..bytes.len().min(START)];
+    if start.windows(NOTHING.len()).any(|window| window == NOTHING) {
+        return Ok(VtuContents::default());
+    }
+    let Ok([Piece::Inline(piece)]) = <[_; 1]>::try_from(pieces_of(bytes)?) else {
         return Err(refused("one piece with inline data is expected"));
     };
     let points = vectors(piece.points.cast_into().ok_or_else(|| refused("points are not numbers"))?);
@@ -55,6 +59,29 @@ pub fn vtu_contents(bytes: &[u8]) -> Result<VtuContents, MeshError> {
     let point_data = arrays(piece.data.point, points.len())?;
     let cell_data = arrays(piece.data.cell, elements)?;
     Ok(VtuContents { points, tets, point_data, cell_data })
+}
+
+/// The files that the bytes of a PVTU file name, in its order, as it names them: relative to it.
+///
+/// # Errors
+/// [`MeshError::Vtu`] if they are damaged or of another kind.
+pub fn pvtu_pieces(bytes: &[u8]) -> Result<Vec<String>, MeshError> {
+    let source = |piece| match piece {
+        Piece::Source(path, _) => Ok(path),
+        _ => Err(refused("the names of pieces are expected")),
+    };
+    pieces_of(bytes)?.into_iter().map(source).collect()
+}
+
+fn pieces_of(bytes: &[u8]) -> Result<Vec<Piece<UnstructuredGridPiece>>, MeshError> {
+    // The library indexes decoded data without a check: a cut file would end the program.
+    let vtk = catch_unwind(AssertUnwindSafe(|| Vtk::parse_xml(bytes)))
+        .map_err(|_| refused("the file is damaged"))?
+        .map_err(refused)?;
+    match vtk.data {
+        DataSet::UnstructuredGrid { pieces, .. } => Ok(pieces),
+        _ => Err(refused("an unstructured grid is expected")),
+    }
 }
 
 fn arrays(attributes: Vec<Attribute>, length: usize) -> Result<BTreeMap<String, VtuArray>, MeshError> {

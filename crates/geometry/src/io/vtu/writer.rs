@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use super::{ArrayData, Field, refused};
 use crate::error::MeshError;
+use crate::ids::NodeId;
 use crate::mesh::Mesh;
 use crate::tet4::Point;
 use crate::topology::Topology;
@@ -50,16 +51,30 @@ pub fn vtu_bytes_at(
     point_data: &[Field<'_>],
     cell_data: &[Field<'_>],
 ) -> Result<Vec<u8>, MeshError> {
+    let (length, expected) = (points.len(), topology.node_count());
+    if length != expected {
+        return Err(MeshError::ArrayLength { array: "points".to_owned(), length, expected });
+    }
+    file_bytes(topology.tets(), points, point_data, cell_data)
+}
+
+/// The bytes of a file of tetrahedra between points.
+pub(super) fn file_bytes(
+    tets: &[[NodeId; 4]],
+    points: &[Point],
+    point_data: &[Field<'_>],
+    cell_data: &[Field<'_>],
+) -> Result<Vec<u8>, MeshError> {
     let places = Field { name: "points", data: ArrayData::Vector(points) };
-    check(&[places], topology.node_count())?;
-    check(point_data, topology.node_count())?;
-    check(cell_data, topology.tets().len())?;
+    check(&[places], points.len())?;
+    check(point_data, points.len())?;
+    check(cell_data, tets.len())?;
 
     let own = [
         Array { name: "Points", values: Values::Given(places.data) },
-        Array { name: "connectivity", values: Values::Connectivity(topology) },
-        Array { name: "offsets", values: Values::Offsets(topology.tets().len()) },
-        Array { name: "types", values: Values::Types(topology.tets().len()) },
+        Array { name: "connectivity", values: Values::Connectivity(tets) },
+        Array { name: "offsets", values: Values::Offsets(tets.len()) },
+        Array { name: "types", values: Values::Types(tets.len()) },
     ];
     let given = point_data.iter().chain(cell_data);
     let given = given.map(|field| Array { name: field.name, values: Values::Given(field.data) });
@@ -73,17 +88,47 @@ pub fn vtu_bytes_at(
     let mut text = String::with_capacity(length + 1024);
     text += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" ";
     text += "header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n";
-    let (n_nodes, n_tets) = (points.len(), topology.tets().len());
+    let (n_nodes, n_tets) = (points.len(), tets.len());
     writeln!(text, "<Piece NumberOfPoints=\"{n_nodes}\" NumberOfCells=\"{n_tets}\">").map_err(refused)?;
-    for (tag, elements) in
-        [("PointData", in_points), ("CellData", in_cells), ("Points", places), ("Cells", cells)]
-    {
-        writeln!(text, "<{tag}>").map_err(refused)?;
+    for (tag, elements, fields) in [
+        ("PointData", in_points, point_data),
+        ("CellData", in_cells, cell_data),
+        ("Points", places, &[]),
+        ("Cells", cells, &[]),
+    ] {
+        push_start(&mut text, tag, fields);
         elements.iter().for_each(|element| text += element);
         writeln!(text, "</{tag}>").map_err(refused)?;
     }
     text += "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
     Ok(text.into_bytes())
+}
+
+/// The start of an element with arrays, which says which of them holds global numbers.
+pub(super) fn push_start(text: &mut String, tag: &str, fields: &[Field<'_>]) {
+    text.push('<');
+    *text += tag;
+    if let Some(field) = fields.iter().find(|field| matches!(field.data, ArrayData::GlobalIds(_))) {
+        *text += " GlobalIds=\"";
+        push_escaped(text, field.name);
+        text.push('"');
+    }
+    *text += ">\n";
+}
+
+/// The type, name and components of an array, as attributes.
+pub(super) fn push_layout(text: &mut String, name: &str, data: ArrayData<'_>) {
+    let (kind, _, components, _) = Values::Given(data).layout();
+    push_attributes(text, name, kind, components);
+}
+
+fn push_attributes(text: &mut String, name: &str, kind: &str, components: usize) {
+    *text += " type=\"";
+    *text += kind;
+    *text += "\" Name=\"";
+    push_escaped(text, name);
+    *text += "\" NumberOfComponents=\"";
+    *text += if components == 3 { "3\"" } else { "1\"" };
 }
 
 /// Writes what [`vtu_bytes`] makes.
@@ -109,7 +154,7 @@ struct Array<'a> {
 enum Values<'a> {
     Given(ArrayData<'a>),
     /// Four nodes an element.
-    Connectivity(&'a Topology),
+    Connectivity(&'a [[NodeId; 4]]),
     /// 4, 8, 12, … for so many elements.
     Offsets(usize),
     /// The type of so many elements.
@@ -123,7 +168,8 @@ impl Values<'_> {
             Self::Given(ArrayData::Scalar(values)) => ("Float64", 8, 1, values.len()),
             Self::Given(ArrayData::Vector(values)) => ("Float64", 8, 3, 3 * values.len()),
             Self::Given(ArrayData::Integer(values)) => ("Int32", 4, 1, values.len()),
-            Self::Connectivity(topology) => ("Int64", 8, 1, 4 * topology.tets().len()),
+            Self::Given(ArrayData::GlobalIds(values)) => ("Int64", 8, 1, values.len()),
+            Self::Connectivity(tets) => ("Int64", 8, 1, 4 * tets.len()),
             Self::Offsets(elements) => ("Int64", 8, 1, *elements),
             Self::Types(elements) => ("UInt8", 1, 1, *elements),
         }
@@ -164,8 +210,11 @@ impl Values<'_> {
             Self::Given(ArrayData::Integer(values)) => {
                 values[numbers].iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()));
             }
-            Self::Connectivity(topology) => {
-                let nodes = &topology.tets().as_flattened()[numbers];
+            Self::Given(ArrayData::GlobalIds(values)) => {
+                values[numbers].iter().for_each(|v| bytes.extend_from_slice(&i64::from(*v).to_le_bytes()));
+            }
+            Self::Connectivity(tets) => {
+                let nodes = &tets.as_flattened()[numbers];
                 nodes.iter().for_each(|n| bytes.extend_from_slice(&i64::from(n.0).to_le_bytes()));
             }
             Self::Offsets(_) => {
@@ -204,13 +253,9 @@ fn element(array: &Array<'_>, blocks: &[Vec<u8>]) -> String {
     let header: Vec<u8> = sizes.flat_map(|n| (n as u64).to_le_bytes()).collect();
     let data = blocks.concat();
     let mut text = String::with_capacity((header.len() + data.len()) * 4 / 3 + 256 + array.name.len());
-    text += "<DataArray type=\"";
-    text += kind;
-    text += "\" Name=\"";
-    push_escaped(&mut text, array.name);
-    text += "\" NumberOfComponents=\"";
-    text += if components == 3 { "3" } else { "1" };
-    text += "\" format=\"binary\">";
+    text += "<DataArray";
+    push_attributes(&mut text, array.name, kind, components);
+    text += " format=\"binary\">";
     STANDARD.encode_string(&header, &mut text);
     STANDARD.encode_string(&data, &mut text);
     text += "</DataArray>\n";
@@ -218,7 +263,7 @@ fn element(array: &Array<'_>, blocks: &[Vec<u8>]) -> String {
 }
 
 /// Text in an attribute: the characters that XML reserves there are written as entities.
-fn push_escaped(text: &mut String, name: &str) {
+pub(super) fn push_escaped(text: &mut String, name: &str) {
     for c in name.chars() {
         match c {
             '&' => *text += "&amp;",
@@ -271,6 +316,7 @@ fn check(fields: &[Field<'_>], expected: usize) -> Result<(), MeshError> {
             ArrayData::Scalar(values) => (values.len(), values),
             ArrayData::Vector(values) => (values.len(), values.as_flattened()),
             ArrayData::Integer(values) => (values.len(), &[]),
+            ArrayData::GlobalIds(values) => (values.len(), &[]),
         };
         let array = || field.name.to_owned();
         if length != expected {
