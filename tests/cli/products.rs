@@ -105,7 +105,8 @@ fn there_is_a_man_page_for_every_command() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     assert_eq!(fluxmorph(folder.path(), &["generate", "man", "--out", "a/man1"]).code, Some(0));
     let all = fluxmorph(folder.path(), &["generate", "man"]).stdout;
-    let commands = ["", "-run", "-resume", "-solve", "-morph", "-check", "-gradient", "-report", "-init"];
+    let commands =
+        ["", "-run", "-resume", "-sweep", "-solve", "-morph", "-check", "-gradient", "-report", "-init"];
     for command in commands.into_iter().chain(["-generate", "-generate-schema", "-generate-man"]) {
         let path = folder.path().join(format!("a/man1/fluxmorph{command}.1"));
         let page =

@@ -1,6 +1,7 @@
 //! Directories that there is no report of, and files that are damaged: named, with the exit codes of the documentation.
 
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use crate::program::{BLOCK, block, fluxmorph, report, repository};
 
@@ -51,17 +52,45 @@ fn a_damaged_file_is_named_and_the_older_page_stays() {
     assert_eq!(report(&out).as_bytes(), page);
 }
 
+/// The block with its mesh in a file, which the configuration calls `name`: the folder of the configuration.
+fn block_from_file(home: &Path, name: &str) -> PathBuf {
+    let first = block("solve", home, &[]);
+    let folder = home.join("second");
+    std::fs::create_dir(&folder).expect("made");
+    std::fs::copy(first.join("optimum.msh"), folder.join(name)).expect("copied");
+    let (before, rest) = BLOCK.split_once("[mesh]").expect("a mesh");
+    let (_, behind) = rest.split_once("[analysis]").expect("an analysis");
+    let text = format!("{before}[mesh]\nfile = \"{name}\"\nunit = \"mm\"\n\n[analysis]{behind}");
+    std::fs::write(folder.join("block.toml"), text).expect("written");
+    folder
+}
+
+#[test]
+fn a_mesh_from_elsewhere_is_shown_where_the_user_allows_it() {
+    let home = tempfile::tempdir().expect("a temporary folder");
+    let folder = block_from_file(home.path(), "../device.msh");
+    for (command, code) in [("run", 1), ("solve", 0)] {
+        let out = folder.join(command);
+        let config = folder.join("block.toml");
+        let arguments: [&dyn AsRef<OsStr>; 5] = [&command, &config, &"--out", &out, &"--quiet"];
+        fluxmorph(&arguments).with(3, &["which leads upwards by `..`", "--allow-outside"]);
+        fluxmorph(&[&arguments[..], &[&"--allow-outside"]].concat()).with(code, &[]);
+        // A run has made its page by itself.
+        let own = std::fs::read_to_string(out.join("report.html")).ok();
+        assert_eq!(own.is_some(), command == "run");
+        report_fails(&out, 3, &["which leads upwards by `..`", "--allow-outside"]);
+        fluxmorph(&[&"report", &out, &"--allow-outside"]).with(0, &["report.html"]);
+        let page = std::fs::read_to_string(out.join("report.html")).expect("the page");
+        assert!(own.is_none_or(|own| own == page), "{command}");
+        assert!(page.contains("<svg") && page.contains("data:image/png;base64,"), "{command}: no figures");
+        assert!(!page.contains("Not shown"), "{command}");
+    }
+}
+
 #[test]
 fn without_its_mesh_file_a_run_is_still_reported() {
     let home = tempfile::tempdir().expect("a temporary folder");
-    let first = block("solve", home.path(), &[]);
-    let folder = home.path().join("second");
-    std::fs::create_dir(&folder).expect("made");
-    std::fs::copy(first.join("optimum.msh"), folder.join("device.msh")).expect("copied");
-    let (before, rest) = BLOCK.split_once("[mesh]").expect("a mesh");
-    let (_, behind) = rest.split_once("[analysis]").expect("an analysis");
-    let text = format!("{before}[mesh]\nfile = \"device.msh\"\nunit = \"mm\"\n\n[analysis]{behind}");
-    std::fs::write(folder.join("block.toml"), text).expect("written");
+    let folder = block_from_file(home.path(), "device.msh");
     let out = folder.join("out");
     fluxmorph(&[&"solve", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).with(0, &[]);
     assert!(!report(&out).contains("Not shown"));

@@ -12,6 +12,7 @@ use crate::design::Apart;
 use crate::geometric::GeometricError;
 use crate::journal::Mismatch;
 use crate::output::{DesignFileError, OutputError};
+use crate::sweep::SweepError;
 
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +63,9 @@ pub enum Error {
     /// A starting configuration cannot be written.
     #[error(transparent)]
     Init(#[from] InitError),
+    /// A sweep cannot be begun.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
     /// The optimisation method refuses or fails.
     #[error("the optimisation failed: {cause}")]
     Optimisation {
@@ -211,6 +215,7 @@ impl Error {
             | Self::Remesh(_)
             | Self::Geometric(_)
             | Self::Design(_) => ExitCode::Configuration,
+            Self::Sweep(error) => error.exit_code(),
             Self::Threads { .. } | Self::Init(_) => ExitCode::Usage,
             Self::Interrupted | Self::InterruptedRun => ExitCode::Interrupted,
         }

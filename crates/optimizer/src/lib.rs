@@ -31,6 +31,7 @@ pub mod schema;
 pub mod session;
 pub mod setup;
 pub mod stage;
+pub mod sweep;
 pub mod thickness;
 pub mod verify;
 

@@ -1,5 +1,7 @@
 //! The command line as typed.
 
+mod sweep;
+
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -11,6 +13,8 @@ use crate::error::Error;
 use crate::memory_limit;
 use crate::output::OlderRun;
 use crate::setup::with_names;
+
+pub use sweep::{Scheduler, SweepArgs};
 
 /// Finds the shape of an electromagnetic device from a TOML file
 ///
@@ -34,6 +38,9 @@ pub enum Command {
     /// Go on with a run that was interrupted or broken off, as if it had not been
     #[command(after_help = examples::RESUME)]
     Resume(ResumeArgs),
+    /// Optimise once for every combination of some values, and compare the results
+    #[command(after_help = examples::SWEEP)]
+    Sweep(SweepArgs),
     /// One field analysis of the initial design, or of a given one
     #[command(after_help = examples::SOLVE)]
     Solve(SolveArgs),
@@ -419,6 +426,12 @@ mod tests {
             "fluxmorph resume runs/a --set a=1",
             "fluxmorph init a --template walk",
             "fluxmorph generate completions ksh",
+            "fluxmorph sweep",
+            "fluxmorph sweep a.toml --set b",
+            "fluxmorph sweep a.toml --jobs 0",
+            "fluxmorph sweep a.toml --scheduler slurm",
+            "fluxmorph sweep a.toml --script a.sh --only 1",
+            "fluxmorph sweep a.toml --script a.sh --json",
         ] {
             assert!(Cli::try_parse_from(line.split_whitespace()).is_err(), "{line}");
         }

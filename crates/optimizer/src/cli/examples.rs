@@ -26,6 +26,17 @@ Examples:
 
 Without limits those hold that the run was started or last resumed with.";
 
+pub(super) const SWEEP: &str = "\
+Examples:
+  fluxmorph sweep shield.toml --set design.upper='10 mm,20 mm' --jobs 2
+  fluxmorph sweep shield.toml --set optimizer.algorithm=mma,ccsaq --set analysis.frequency=50,60
+  fluxmorph sweep shield.toml --set design.grid='[7,13],[3,5]' --out runs/grids --max-evaluations 10
+  fluxmorph sweep shield.toml --set design.upper='10 mm,20 mm' --script sweep.sh && sbatch sweep.sh
+  fluxmorph sweep shield.toml --set design.upper='10 mm,20 mm' --compare
+
+The same command again goes on: finished runs are skipped, broken ones resumed, further values begun.
+The exit code is the worst of all runs, in this order: 4, 5, 3, 143, 130, 1, 0.";
+
 pub(super) const SOLVE: &str = "\
 Examples:
   fluxmorph solve shield.toml

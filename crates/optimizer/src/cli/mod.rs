@@ -14,6 +14,7 @@ mod report;
 mod run;
 mod solve;
 pub mod stdout;
+mod sweep;
 mod template;
 
 use std::io::Write;
@@ -50,6 +51,7 @@ fn done(cli: &Cli) -> ExitCode {
     let outcome = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Resume(args) => run::resume(args),
+        Command::Sweep(args) => sweep::sweep(args),
         Command::Solve(args) => solve::solve(args),
         Command::Morph(args) => morph::morph(args),
         Command::Check(args) => check::check(args),

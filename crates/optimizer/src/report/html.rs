@@ -5,16 +5,16 @@
 
 /// A piece of markup that grows.
 #[derive(Debug, Default)]
-pub(super) struct Html {
+pub(crate) struct Html {
     text: String,
 }
 
 /// Attributes of an element, by name.
-pub(super) type Attributes<'a> = &'a [(&'static str, &'a str)];
+pub(crate) type Attributes<'a> = &'a [(&'static str, &'a str)];
 
 impl Html {
     /// An element with what `content` writes into it.
-    pub(super) fn element(
+    pub(crate) fn element(
         &mut self,
         tag: &'static str,
         attributes: Attributes<'_>,
@@ -28,27 +28,27 @@ impl Html {
     }
 
     /// An element with text only.
-    pub(super) fn leaf(&mut self, tag: &'static str, attributes: Attributes<'_>, text: &str) {
+    pub(crate) fn leaf(&mut self, tag: &'static str, attributes: Attributes<'_>, text: &str) {
         self.element(tag, attributes, |html| html.text(text));
     }
 
     /// An element without content, such as `meta` or `path`.
-    pub(super) fn void(&mut self, tag: &'static str, attributes: Attributes<'_>) {
+    pub(crate) fn void(&mut self, tag: &'static str, attributes: Attributes<'_>) {
         self.tag(tag, attributes, "/>");
     }
 
     /// Text.
-    pub(super) fn text(&mut self, text: &str) {
+    pub(crate) fn text(&mut self, text: &str) {
         text.chars().for_each(|c| push_escaped(&mut self.text, c));
     }
 
     /// A line break in the source.
-    pub(super) fn newline(&mut self) {
+    pub(crate) fn newline(&mut self) {
         self.text.push('\n');
     }
 
     /// A style sheet of this program.
-    pub(super) fn style(&mut self, code: &'static str) {
+    pub(crate) fn style(&mut self, code: &'static str) {
         self.element("style", &[], |html| {
             html.text += "/*<![CDATA[*/\n";
             html.text += code;
@@ -57,7 +57,7 @@ impl Html {
     }
 
     /// A script of this program.
-    pub(super) fn script(&mut self, code: &'static str) {
+    pub(crate) fn script(&mut self, code: &'static str) {
         self.element("script", &[], |html| {
             html.text += "//<![CDATA[\n";
             html.text += code;
@@ -66,7 +66,7 @@ impl Html {
     }
 
     /// Data for a script, as JSON: what could end the element is written by its number.
-    pub(super) fn data(&mut self, id: &str, value: &serde_json::Value) {
+    pub(crate) fn data(&mut self, id: &str, value: &serde_json::Value) {
         self.element("script", &[("type", "application/json"), ("id", id)], |html| {
             for c in value.to_string().chars() {
                 match c {
@@ -78,13 +78,13 @@ impl Html {
     }
 
     /// The whole document.
-    pub(super) fn into_document(self) -> String {
+    pub(crate) fn into_document(self) -> String {
         format!("<!DOCTYPE html>\n{}\n", self.text)
     }
 
     /// The markup so far, for tests.
     #[cfg(test)]
-    pub(super) fn markup(&self) -> &str {
+    pub(crate) fn markup(&self) -> &str {
         &self.text
     }
 

@@ -9,7 +9,8 @@ use super::{convergence, field, histogram, map, paper, tables, words};
 use crate::config::{MeshConfig, Objective};
 use crate::output::{RunResult, RunStatus, StopReason, extend_command, resume_command};
 
-const STYLE: &str = include_str!("style.css");
+/// How pages of this program look.
+pub(crate) const STYLE: &str = include_str!("style.css");
 const VIEW: &str = include_str!("view.js");
 
 /// Field files that are listed one by one.
@@ -422,7 +423,7 @@ fn describe(file: &str) -> &'static str {
 }
 
 /// A path as an address: what is not plain is written by its bytes.
-pub(super) fn address(path: &str) -> String {
+pub(crate) fn address(path: &str) -> String {
     let mut text = String::new();
     for byte in path.bytes() {
         match byte {

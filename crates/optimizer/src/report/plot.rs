@@ -5,29 +5,29 @@ use super::html::Html;
 use super::ticks::{Count, labels, linear, logarithmic};
 
 /// Width of every figure: a phone shows it as it is, a larger screen larger.
-pub(super) const WIDTH: f64 = 360.0;
+pub(crate) const WIDTH: f64 = 360.0;
 
 /// Room for the labels of the vertical axis, and on the other side.
-pub(super) const LEFT: f64 = 46.0;
-pub(super) const RIGHT: f64 = 12.0;
+pub(crate) const LEFT: f64 = 46.0;
+pub(crate) const RIGHT: f64 = 12.0;
 
 /// Room for the title of the vertical axis, and for ticks and title of the horizontal one.
-pub(super) const TOP: f64 = 24.0;
-pub(super) const BOTTOM: f64 = 36.0;
+pub(crate) const TOP: f64 = 24.0;
+pub(crate) const BOTTOM: f64 = 36.0;
 
 /// Values along one axis, and where they are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
-    pub(super) low: f64,
-    pub(super) high: f64,
-    pub(super) count: Count,
+pub(crate) struct Scale {
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    pub(crate) count: Count,
     /// Places of the lowest and the highest value.
-    pub(super) pixels: [f64; 2],
+    pub(crate) pixels: [f64; 2],
 }
 
 impl Scale {
     /// Share of the scale at a value, 0 to 1 inside.
-    pub(super) fn share(&self, value: f64) -> f64 {
+    pub(crate) fn share(&self, value: f64) -> f64 {
         let share = match self.count {
             Count::Linear => (value - self.low) / (self.high - self.low),
             Count::Logarithmic => (value / self.low).ln() / (self.high / self.low).ln(),
@@ -36,12 +36,12 @@ impl Scale {
     }
 
     /// The place of a value.
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         self.pixels[0] + self.share(value).clamp(-1.0, 2.0) * (self.pixels[1] - self.pixels[0])
     }
 
     /// Places and texts of the ticks, at most about `most`.
-    pub(super) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
         let values = match self.count {
             Count::Linear => linear(self.low, self.high, most),
             Count::Logarithmic => logarithmic(self.low, self.high, most),
@@ -55,38 +55,38 @@ impl Scale {
 }
 
 /// A coordinate in the drawing.
-pub(super) fn px(value: f64) -> String {
+pub(crate) fn px(value: f64) -> String {
     let text = format!("{value:.1}");
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 
 /// A drawing that is read out as `label`.
-pub(super) fn svg(html: &mut Html, height: f64, label: &str, content: impl FnOnce(&mut Html)) {
+pub(crate) fn svg(html: &mut Html, height: f64, label: &str, content: impl FnOnce(&mut Html)) {
     let view = format!("0 0 {} {}", px(WIDTH), px(height));
     html.element("svg", &[("viewBox", &view), ("role", "img"), ("aria-label", label)], content);
     html.newline();
 }
 
 /// A text of a class at a place.
-pub(super) fn text(html: &mut Html, class: &str, x: f64, y: f64, text: &str) {
+pub(crate) fn text(html: &mut Html, class: &str, x: f64, y: f64, text: &str) {
     html.leaf("text", &[("class", class), ("x", &px(x)), ("y", &px(y))], text);
 }
 
 /// A line of a class between two places.
-pub(super) fn line(html: &mut Html, class: &str, from: [f64; 2], to: [f64; 2]) {
+pub(crate) fn line(html: &mut Html, class: &str, from: [f64; 2], to: [f64; 2]) {
     let path = format!("M{} {}L{} {}", px(from[0]), px(from[1]), px(to[0]), px(to[1]));
     html.void("path", &[("class", class), ("d", &path)]);
 }
 
 /// Lines across the drawing at the ticks of the vertical axis.
-pub(super) fn grid(html: &mut Html, x: &Scale, y: &Scale, ticks: usize) {
+pub(crate) fn grid(html: &mut Html, x: &Scale, y: &Scale, ticks: usize) {
     for (at, _) in y.ticks(ticks) {
         line(html, "grid", [x.pixels[0], at], [x.pixels[1], at]);
     }
 }
 
 /// Ticks, and titles with units of both axes; the title of the vertical axis stands above it.
-pub(super) fn axes(html: &mut Html, x: &Scale, y: &Scale, titles: [&str; 2], ticks: [usize; 2]) {
+pub(crate) fn axes(html: &mut Html, x: &Scale, y: &Scale, titles: [&str; 2], ticks: [usize; 2]) {
     let [left, right] = x.pixels;
     let [bottom, top] = y.pixels;
     for (at, label) in y.ticks(ticks[1]) {
@@ -107,7 +107,7 @@ pub(super) fn axes(html: &mut Html, x: &Scale, y: &Scale, titles: [&str; 2], tic
 const MOST_POINTS: usize = 600;
 
 /// A line through points; of very many the lowest and the highest of every group.
-pub(super) fn polyline(html: &mut Html, class: &str, points: &[[f64; 2]]) {
+pub(crate) fn polyline(html: &mut Html, class: &str, points: &[[f64; 2]]) {
     let group = (2 * points.len()).div_ceil(MOST_POINTS);
     let kept: Vec<[f64; 2]> = if points.len() <= MOST_POINTS {
         points.to_vec()
@@ -130,7 +130,7 @@ fn lowest_and_highest(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
 }
 
 /// A dot of a class.
-pub(super) fn dot(html: &mut Html, class: &str, [x, y]: [f64; 2], radius: f64) {
+pub(crate) fn dot(html: &mut Html, class: &str, [x, y]: [f64; 2], radius: f64) {
     html.void("circle", &[("class", class), ("cx", &px(x)), ("cy", &px(y)), ("r", &px(radius))]);
 }
 

@@ -2,7 +2,7 @@
 
 /// How an axis counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Count {
+pub(crate) enum Count {
     /// Evenly.
     Linear,
     /// By factors.
@@ -13,7 +13,7 @@ pub(super) enum Count {
 const LARGEST_COUNT: f64 = 1e12;
 
 /// Round numbers inside `low ..= high`, at most about `most` of them.
-pub(super) fn linear(low: f64, high: f64, most: usize) -> Vec<f64> {
+pub(crate) fn linear(low: f64, high: f64, most: usize) -> Vec<f64> {
     let span = high - low;
     if span.is_nan() || span <= 0.0 || most == 0 || !span.is_finite() {
         return vec![low];
@@ -33,7 +33,7 @@ pub(super) fn linear(low: f64, high: f64, most: usize) -> Vec<f64> {
 
 /// Powers of ten inside `low ..= high`, with 2 and 5 times of them where there are few, every second or third where there
 /// are many.
-pub(super) fn logarithmic(low: f64, high: f64, most: usize) -> Vec<f64> {
+pub(crate) fn logarithmic(low: f64, high: f64, most: usize) -> Vec<f64> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return vec![low];
     }
@@ -56,7 +56,7 @@ pub(super) fn logarithmic(low: f64, high: f64, most: usize) -> Vec<f64> {
 }
 
 /// Ticks of an axis as text, all with as many decimals as their step needs.
-pub(super) fn labels(ticks: &[f64]) -> Vec<String> {
+pub(crate) fn labels(ticks: &[f64]) -> Vec<String> {
     let step = ticks.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     let largest = ticks.iter().fold(0.0_f64, |largest, t| largest.max(t.abs()));
     if !step.is_finite() {
@@ -72,7 +72,7 @@ pub(super) fn labels(ticks: &[f64]) -> Vec<String> {
 }
 
 /// A number with so many significant digits, by a power of ten where it is very small or large.
-pub(super) fn number(value: f64, digits: usize) -> String {
+pub(crate) fn number(value: f64, digits: usize) -> String {
     let significant = format!("{value:.*e}", digits.saturating_sub(1));
     let Some((mantissa, exponent)) = significant.split_once('e') else { return significant };
     let exponent: i32 = exponent.parse().unwrap_or(0);
@@ -88,14 +88,14 @@ pub(super) fn number(value: f64, digits: usize) -> String {
 }
 
 /// A number with as many decimals as asked for, without zeros behind.
-pub(super) fn trimmed(value: f64, decimals: usize) -> String {
+pub(crate) fn trimmed(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value);
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     minus(if text == "-0" { "0" } else { text })
 }
 
 /// Thousands set apart by thin spaces.
-pub(super) fn grouped(count: usize) -> String {
+pub(crate) fn grouped(count: usize) -> String {
     let digits = count.to_string();
     if digits.len() < 5 {
         return digits;
@@ -111,7 +111,7 @@ pub(super) fn grouped(count: usize) -> String {
 }
 
 /// A time [s] in words.
-pub(super) fn duration(seconds: f64) -> String {
+pub(crate) fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 60.0 => format!("{} s", number(s, 3)),
         s if s < 3600.0 => format!("{} min {:02} s", (s / 60.0) as u64, (s % 60.0) as u64),
