@@ -97,6 +97,20 @@ dist:
 deny:
     cargo deny --locked check
 
+# Installs what `--features petsc` needs on Debian and Ubuntu: PETSc of complex numbers, MPI, a fast BLAS
+setup-petsc:
+    tools/setup_petsc
+
+# The program on several ranks, in a few minutes; needs `just setup-petsc`
+test-mpi:
+    cargo test --release --features petsc --test mpi -- --test-threads 1
+    cargo test --release -p fluxmorph-petsc --features link
+
+# The tables of docs/scale.md; needs `just setup-petsc` and takes an hour
+scale:
+    cargo build --release --features petsc
+    tools/scale.py
+
 # What must be green before a change is taken
 ci:
     .ci/run

@@ -68,7 +68,7 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
             setup.problem.evaluate(&shape.initial, Want::Gradient).expect("it converges");
         parts.push((
             "fields and VTU",
-            timed(|| fields::vtu(&setup.problem, &fields::FieldData::of(&analysis))).0,
+            timed(|| fields::vtu(&setup.problem.states, &fields::FieldData::of(&analysis))).0,
         ));
     }
     (tets, parts)

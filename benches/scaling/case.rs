@@ -154,10 +154,11 @@ fn step(problem: &Problem, record: &mut Record) {
     let (time, lambda) = timed(|| adjoint::solve(&mut system, &value.derivative).expect("it converges"));
     record.adjoint = time;
     record.iterations = [state.report().iterations, lambda.report().iterations];
-    record.method = system.method().name().to_owned();
+    record.method = model.method_name();
     record.preconditioner_bytes = system.preconditioner_bytes();
-    let (nodes, nodal) =
-        timed(|| adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion.moving()));
+    let (nodes, nodal) = timed(|| {
+        adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion.moving()).expect("it is here")
+    });
     record.gradient = evaluation + nodes;
     let (backward, gradient) =
         timed(|| shape.surface.gradient(&shape.motion.map().gradient(&nodal).expect("it converges")));
@@ -170,7 +171,8 @@ fn step(problem: &Problem, record: &mut Record) {
         let analysis =
             problem.analyse_with(&mut Memory::default(), &p, moved, Want::Value).expect("it converges");
         record.fields =
-            timed(|| fields::vtu(problem, &fields::FieldData::of(&analysis)).expect("it is finite")).0;
+            timed(|| fields::vtu(&problem.states, &fields::FieldData::of(&analysis)).expect("it is finite"))
+                .0;
     }
 }
 

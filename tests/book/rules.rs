@@ -29,7 +29,7 @@ enum Exists {
     Paths,
 }
 
-const NEVER_RUN: [Rule; 10] = [
+const NEVER_RUN: [Rule; 13] = [
     Rule { begins: "git clone ", reason: "needs the address of the repository", exists: Exists::Elsewhere },
     Rule { begins: "cd fluxmorph", reason: "the folder of the clone", exists: Exists::Elsewhere },
     Rule {
@@ -59,6 +59,9 @@ const NEVER_RUN: [Rule; 10] = [
         reason: "the tests have their own Python below target/",
         exists: Exists::Elsewhere,
     },
+    Rule { begins: "mpirun ", reason: "needs MPI; tests/mpi has it", exists: Exists::Elsewhere },
+    Rule { begins: "sbatch ", reason: "needs a cluster", exists: Exists::Elsewhere },
+    Rule { begins: "tools/scale.py", reason: "takes an hour, and needs MPI", exists: Exists::Elsewhere },
     Rule { begins: "mdbook ", reason: "mdBook is not needed to read the book", exists: Exists::Paths },
 ];
 

@@ -195,7 +195,7 @@ fn a_run_at_two_frequencies_writes_both() {
     let (config, source) = config("shield_two_frequencies.toml", &overrides);
     let disk = system_disk();
     let older_run = OlderRun::Keep;
-    let options = Options { disk: &disk, older_run, threads: 1, interrupted: &|| false };
+    let options = Options { disk: &disk, older_run, threads: 1, team: None, interrupted: &|| false };
     let result: RunResult =
         session::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);

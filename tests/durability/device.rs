@@ -55,12 +55,13 @@ pub(crate) fn shipped(name: &str) -> (Config, Source) {
 
 /// Runs a configuration from its start.
 pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, Source)) -> Result<RunResult, Error> {
-    let options = Options { disk, older_run: OlderRun::Replace, threads: 1, interrupted: &|| false };
+    let options =
+        Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
     session::run(config, source, options, &mut Silent)
 }
 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
-    let options = Options { disk, older_run: OlderRun::Keep, threads: 1, interrupted: &|| false };
+    let options = Options { disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
     session::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
 }

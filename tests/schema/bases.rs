@@ -35,6 +35,10 @@ const WRITTEN: [&str; 8] = [
     frequency = "60 Hz"
     penalty = 1.0
     order = 2
+    [analysis.petsc]
+    solver = "asm"
+    options = "-ksp_gmres_restart 300"
+
     [analysis.linear_solver]
     method = "direct"
     tolerance = 1e-11

@@ -101,7 +101,7 @@ pub(crate) fn solid(name: &str, order: Order, refinement: f64, bars: [f64; 3]) -
     let value = sphere.loss().evaluate(model, mesh, &solution).expect("a finite loss");
     let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
     let moving: Vec<ElementId> = mesh.topology().elements().collect();
-    let implicit = adjoint::node_gradient(model, mesh, &solution, &lambda, &moving);
+    let implicit = adjoint::node_gradient(model, mesh, &solution, &lambda, &moving).expect("one process");
     let explicit = value.explicit.expect("a loss of a region that moves");
     let derivative: f64 = mesh
         .topology()

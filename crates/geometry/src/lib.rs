@@ -19,6 +19,7 @@ pub mod mesh;
 mod metis;
 pub mod partition;
 pub mod quality;
+pub mod ranks;
 pub mod tet4;
 pub mod topology;
 

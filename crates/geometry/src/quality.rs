@@ -131,8 +131,45 @@ impl QualityReport {
         }
     }
 
-    /// The report on the elements of both.
-    fn with(mut self, other: Self) -> Self {
+    /// Numbers that say all of a report but the place of the worst element.
+    pub const NUMBERS: usize = HISTOGRAM_BINS + 6;
+
+    /// The report as numbers, to be sent to another process.
+    pub fn numbers(&self) -> [f64; Self::NUMBERS] {
+        let mut numbers = [0.0; Self::NUMBERS];
+        let counts = [self.elements, self.poor, self.fair, self.good];
+        let all = [self.worst, f64::from(self.worst_element.0)].into_iter();
+        let all = all.chain(counts.into_iter().chain(self.histogram).map(|count| count as f64));
+        numbers.iter_mut().zip(all).for_each(|(number, value)| *number = value);
+        numbers
+    }
+
+    /// The report that [`QualityReport::numbers`] says; the place of the worst element is to be found by
+    /// [`QualityReport::placed`].
+    ///
+    /// # Panics
+    /// If there are fewer than [`QualityReport::NUMBERS`].
+    pub fn of_numbers(numbers: &[f64]) -> Self {
+        let count = |i: usize| numbers[i] as usize;
+        Self {
+            worst: numbers[0],
+            worst_element: ElementId(numbers[1] as u32),
+            worst_centroid: [0.0; 3],
+            elements: count(2),
+            poor: count(3),
+            fair: count(4),
+            good: count(5),
+            histogram: std::array::from_fn(|bin| count(6 + bin)),
+        }
+    }
+
+    /// The report with the place of its worst element on a mesh.
+    pub fn placed(self, mesh: &Mesh) -> Self {
+        Self { worst_centroid: tet4::centroid(mesh.vertices(self.worst_element)), ..self }
+    }
+
+    /// The report on the elements of both, without a place.
+    pub fn with(mut self, other: Self) -> Self {
         if (other.worst, other.worst_element) < (self.worst, self.worst_element) {
             (self.worst, self.worst_element) = (other.worst, other.worst_element);
         }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use fluxmorph_geometry::MeshError;
+use fluxmorph_geometry::ranks::RankError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
@@ -147,6 +148,18 @@ pub enum Error {
     /// A signal ended a run before an evaluation that its journal does not have.
     #[error("interrupted before anything new was computed")]
     InterruptedRun,
+    /// A rank could not write its piece of a field.
+    #[error("the fields cannot be written: {cause}")]
+    Pieces {
+        /// Which rank, and why.
+        cause: RankError,
+    },
+    /// The ranks of a parallel program cannot work together.
+    #[error("several ranks: {cause}")]
+    Ranks {
+        /// Why, and what to do.
+        cause: String,
+    },
     /// A pool of threads cannot be made.
     #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
     Threads {
@@ -170,7 +183,7 @@ impl Error {
     pub fn leaves_a_run(&self) -> bool {
         match self {
             Self::Output(error) => matches!(error, OutputError::Io { .. }),
-            Self::InterruptedRun => true,
+            Self::InterruptedRun | Self::Pieces { .. } => true,
             other => other.exit_code() == ExitCode::Numerical,
         }
     }
@@ -181,7 +194,10 @@ impl Error {
             Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
                 ExitCode::Files
             }
-            Self::Output(_) | Self::Replay { .. } | Self::Init(InitError::Exists { .. }) => ExitCode::Files,
+            Self::Output(_)
+            | Self::Pieces { .. }
+            | Self::Replay { .. }
+            | Self::Init(InitError::Exists { .. }) => ExitCode::Files,
             // Of a motion; a file's or a generator's is a wrong mesh.
             Self::Remesh(RemeshError::Mesh(MeshError::NotFinite { .. } | MeshError::Inverted { .. })) => {
                 ExitCode::Numerical
@@ -196,11 +212,14 @@ impl Error {
             Self::Solver(
                 SolverError::NotConverged { .. }
                 | SolverError::NotFinite { .. }
-                | SolverError::OutOfRange { .. },
+                | SolverError::OutOfRange { .. }
+                | SolverError::Rank(_),
             )
             | Self::Field { .. }
             | Self::NotFinite { .. }
-            | Self::Remesh(RemeshError::NotConverged { .. } | RemeshError::NotFinite { .. })
+            | Self::Remesh(
+                RemeshError::NotConverged { .. } | RemeshError::NotFinite { .. } | RemeshError::Rank(_),
+            )
             | Self::Optimisation { .. }
             | Self::Certificate { .. } => ExitCode::Numerical,
             Self::Constraint { .. }
@@ -216,7 +235,7 @@ impl Error {
             | Self::Geometric(_)
             | Self::Design(_) => ExitCode::Configuration,
             Self::Sweep(error) => error.exit_code(),
-            Self::Threads { .. } | Self::Init(_) => ExitCode::Usage,
+            Self::Threads { .. } | Self::Ranks { .. } | Self::Init(_) => ExitCode::Usage,
             Self::Interrupted | Self::InterruptedRun => ExitCode::Interrupted,
         }
     }

@@ -9,7 +9,7 @@ use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
 
-use crate::problem::{Analysis, Problem};
+use crate::problem::Analysis;
 
 /// What the arrays of a design are made from; a rank has no more of it.
 #[derive(Clone, Copy, Debug)]
@@ -43,10 +43,10 @@ impl<'a> FieldData<'a> {
 ///
 /// # Errors
 /// [`MeshError::NotFiniteArray`] names an array that is not finite: nothing of it is written.
-pub fn vtu(problem: &Problem, data: &FieldData<'_>) -> Result<Vec<u8>, MeshError> {
+pub fn vtu(states: &[FieldModel], data: &FieldData<'_>) -> Result<Vec<u8>, MeshError> {
     let topology = data.mesh.topology();
     let (nodes, elements): (Vec<_>, Vec<_>) = (topology.nodes().collect(), topology.elements().collect());
-    let arrays = Arrays::new(problem, data, &nodes, &elements);
+    let arrays = Arrays::new(states, data, &nodes, &elements);
     vtu_bytes(data.mesh, &arrays.at_nodes(), &arrays.in_cells())
 }
 
@@ -55,15 +55,19 @@ pub fn vtu(problem: &Problem, data: &FieldData<'_>) -> Result<Vec<u8>, MeshError
 ///
 /// # Errors
 /// As [`vtu`], for values of the piece.
-pub fn piece(problem: &Problem, data: &FieldData<'_>, elements: &[ElementId]) -> Result<Vec<u8>, MeshError> {
+pub fn piece(
+    states: &[FieldModel],
+    data: &FieldData<'_>,
+    elements: &[ElementId],
+) -> Result<Vec<u8>, MeshError> {
     let piece = VtuPiece::new(data.mesh.topology(), elements);
-    let arrays = Arrays::new(problem, data, piece.nodes(), piece.elements());
+    let arrays = Arrays::new(states, data, piece.nodes(), piece.elements());
     piece.bytes(data.mesh.points(), &arrays.at_nodes(), &arrays.in_cells())
 }
 
 /// The text of the PVTU file of pieces that [`piece`] made; their paths are relative to it.
-pub fn header(problem: &Problem, data: &FieldData<'_>, pieces: &[String]) -> String {
-    let arrays = Arrays::new(problem, data, &[], &[]);
+pub fn header(states: &[FieldModel], data: &FieldData<'_>, pieces: &[String]) -> String {
+    let arrays = Arrays::new(states, data, &[], &[]);
     pvtu_text(&arrays.at_nodes(), &arrays.in_cells(), pieces)
 }
 
@@ -77,10 +81,10 @@ struct Arrays {
 }
 
 impl Arrays {
-    fn new(problem: &Problem, data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
+    fn new(states: &[FieldModel], data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
         let regions = data.mesh.topology().region_of();
         let at = |values: &[Point]| nodes.iter().map(|n| values[n.index()]).collect();
-        let states = problem.states.iter().zip(data.solutions).enumerate();
+        let states = states.iter().zip(data.solutions).enumerate();
         Self {
             states: states
                 .map(|(index, (model, solution))| {

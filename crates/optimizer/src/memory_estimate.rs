@@ -60,7 +60,7 @@ impl Evaluation {
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
-        for solver in problem.states.iter().map(FieldModel::linear_solver) {
+        for solver in problem.states.iter().filter_map(FieldModel::linear_solver) {
             let sizes =
                 (solver.matrix_bytes(), solver.preconditioner_bytes(solver.method()).unwrap_or_default());
             match solver.reuse() {
@@ -84,7 +84,7 @@ impl Evaluation {
     /// The same on a mesh with so many times the elements.
     fn grown(&self, problem: &Problem, growth: f64) -> usize {
         let times = |bytes: usize, factor: f64| (bytes as f64 * factor) as usize;
-        let solvers = || problem.states.iter().map(FieldModel::linear_solver);
+        let solvers = || problem.states.iter().filter_map(FieldModel::linear_solver);
         let unknowns = times(solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0), growth);
         let preconditioners = if solvers().any(|solver| is_factor(solver.method())) {
             let factor = times(self.preconditioners, growth.powf(FACTOR_GROWTH));

@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::quality::QualityReport;
+use fluxmorph_geometry::ranks::Share;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
@@ -58,6 +59,8 @@ pub struct Problem {
     pub constraints: Vec<Constraint>,
     /// What moves; `None` for a field analysis without design.
     pub shape: Option<Shape>,
+    /// The ranks among which the work is shared out; `None` for one process.
+    pub share: Option<Share>,
 }
 
 /// Wall time of the parts of an evaluation [s].
@@ -241,7 +244,7 @@ impl Problem {
         for (index, model) in self.states.iter().enumerate() {
             let mut clock = Lap::start();
             (work.told)(Stage::Assembling);
-            let (matrix, load) = (model.assemble(&mesh), model.load(&mesh));
+            let (matrix, load) = (model.assembled(&mesh), model.load(&mesh));
             work.timings.assembly += clock.lap();
             let named = || finite::of_field("the state", model);
             (work.told)(Stage::Factoring);
@@ -439,7 +442,7 @@ impl Gathered {
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
         (work.told)(Stage::Differentiating);
-        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving());
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving())?;
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
         Ok(())

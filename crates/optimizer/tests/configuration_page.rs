@@ -14,6 +14,9 @@ const FULL: [&str; 6] = [
     generator = "shield"
     [analysis]
     frequency = "60 Hz"
+    [analysis.petsc]
+    options = "-ksp_monitor"
+
     [materials.steel]
     conductivity = "7e6 S/m"
     density = "7850 kg/m3"
@@ -300,6 +303,7 @@ fn every_key_that_the_reader_asks_for_is_mentioned() {
         "[[mesh.boxes.surfaces]]",
         "[analysis]",
         "[analysis.linear_solver]",
+        "[analysis.petsc]",
         "[materials.a]",
         "[regions.a]",
         "[[coils]]",

@@ -7,11 +7,14 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup};
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::quality::QualityReport;
+use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
+use crate::body::Body;
 use crate::boundary::{Boundary, Constraints};
-use crate::elasticity::{Isotropic, Stiffness, stiffness};
+use crate::distributed::DistributedElastic;
 use crate::error::RemeshError;
 use crate::force::nodal_force;
 use crate::policy::StiffnessPolicy;
@@ -55,25 +58,27 @@ pub struct RemeshSetup {
     pub boundaries: Vec<Boundary>,
     /// Further nodes that do not move.
     pub fixed_nodes: Vec<NodeId>,
-    /// How the elastic system is solved.
+    /// How the elastic system is solved in one process.
     pub solver: SolverChoice,
+    /// The ranks among which it is shared out; `None` for one process.
+    pub share: Option<Share>,
 }
 
 /// What follows from topology and set-up alone, and outlives a new reference mesh.
 #[derive(Debug)]
 struct Plan {
     setup: RemeshSetup,
-    topology: Arc<Topology>,
-    /// Elements of the region, ascending, and the subregion of each.
-    elements: Vec<ElementId>,
-    subregion_of: Vec<u32>,
+    body: Arc<Body>,
     design_nodes: Vec<NodeId>,
-    unknowns: DofMap<3>,
+    unknowns: Arc<DofMap<3>>,
     prescribed: DofMap<3>,
-    stiffness: (BlockPattern<3>, BoundGroup<4>),
+    /// In one process.
+    stiffness: Option<(BlockPattern<3>, BoundGroup<4>)>,
     coupling: (BlockPattern<3>, BoundGroup<4>),
-    /// Positions in `elements` of the elements of `coupling`.
+    /// Positions in the body of the elements of `coupling`.
     coupled: Vec<u32>,
+    /// Elements of which a node may move, ascending.
+    moving: Arc<[ElementId]>,
     analysis: SolverAnalysis,
     force: Option<Vec<f64>>,
 }
@@ -109,33 +114,29 @@ impl ElasticMap {
     /// # Panics
     /// If the mesh has another topology.
     pub fn rebased(&self, reference: &Mesh, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
-        assert!(Arc::ptr_eq(reference.topology(), &self.plan.topology), "a rebase keeps the topology");
+        assert!(Arc::ptr_eq(reference.topology(), self.plan.topology()), "a rebase keeps the topology");
         Self::assembled(reference, Arc::clone(&self.plan), policy)
     }
 
     fn assembled(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
-        let weighting = policy.weighting(reference, &plan.elements);
-        let element_matrix = |i: usize| -> Stiffness {
-            let law = plan.setup.subregions[plan.subregion_of[i] as usize].law();
-            let vertices = reference.vertices(plan.elements[i]);
-            let (factor, tensor) = weighting.of(vertices);
-            let law = Isotropic { young: law.young * factor, ..law };
-            stiffness(&Tet4::new(vertices), &law, &tensor)
-        };
+        let body = &plan.body;
+        let weighting = policy.weighting(reference, &body.elements);
         let stiffness_matrix = || {
-            let (pattern, group) = &plan.stiffness;
+            let (pattern, group) = plan.stiffness.as_ref().expect("one process has the whole pattern");
             let mut matrix = CsrMatrix::zeros(pattern.structure());
-            pattern.assemble(group, &mut matrix.values, |e| element_matrix(e.index()));
+            let of = |e: ElementId| body.stiffness(reference, &weighting, e.index());
+            pattern.assemble(group, &mut matrix.values, of);
             matrix
         };
         let (pattern, group) = &plan.coupling;
         let mut coupling = CsrMatrix::zeros(pattern.structure());
-        pattern.assemble(group, &mut coupling.values, |e| element_matrix(plan.coupled[e.index()] as usize));
-        let solver = ElasticSolver::new(&plan.analysis, stiffness_matrix)?;
+        let of = |e: ElementId| body.stiffness(reference, &weighting, plan.coupled[e.index()] as usize);
+        pattern.assemble(group, &mut coupling.values, of);
+        let solver = ElasticSolver::new(&plan.analysis, stiffness_matrix, (reference, policy))?;
         let mut map = Self { plan, policy, solver, coupling, offset: Vec::new() };
         map.offset = match map.plan.force.clone() {
             Some(force) => map.solved(force)?,
-            None => vec![[0.0; 3]; map.plan.topology.node_count()],
+            None => vec![[0.0; 3]; map.plan.topology().node_count()],
         };
         Ok(map)
     }
@@ -190,7 +191,7 @@ impl ElasticMap {
     /// Solves for the unknowns and spreads them over the mesh nodes.
     fn solved(&self, mut unknowns: Vec<f64>) -> Result<Vec<Point>, RemeshError> {
         self.solver.solve_in_place(&mut unknowns, "displacement")?;
-        let topology = &self.plan.topology;
+        let topology = self.plan.topology();
         Ok(topology.nodes().map(|node| self.plan.unknowns.gather(&unknowns, node)).collect())
     }
 
@@ -235,7 +236,7 @@ impl ElasticMap {
 
     /// The elements of the remesh region, ascending.
     pub fn elements(&self) -> &[ElementId] {
-        &self.plan.elements
+        &self.plan.body.elements
     }
 
     /// Number of equations of Eq. 3 (the column "Equ. Num." of Table 2).
@@ -243,9 +244,34 @@ impl ElasticMap {
         self.plan.unknowns.count()
     }
 
-    /// Bytes of the solver at most: the factors, and the matrix where it is kept.
+    /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is shared out.
     pub fn solver_bytes(&self) -> usize {
-        self.plan.analysis.solver_bytes(self.plan.stiffness.0.structure())
+        let of = |(pattern, _): &(BlockPattern<3>, _)| self.plan.analysis.solver_bytes(pattern.structure());
+        self.plan.stiffness.as_ref().map_or(0, of)
+    }
+
+    /// Elements of the body, and those beside it that share a node that may move: faces at which the body ends move too
+    /// where they are listed as sliding or free. Ascending.
+    pub fn moving(&self) -> &Arc<[ElementId]> {
+        &self.plan.moving
+    }
+
+    /// Quality of the elements that may move, on a mesh of this topology.
+    pub fn quality(&self, mesh: &Mesh) -> QualityReport {
+        let own = || QualityReport::of_elements(mesh, self.moving()).expect("an elastic body has elements");
+        match &self.plan.analysis {
+            // Where a rank fails, the next order that needs it says so; this one does not.
+            SolverAnalysis::Distributed(shared) => shared.quality(mesh).ok().flatten().unwrap_or_else(own),
+            _ => own(),
+        }
+    }
+
+    /// The map of the same set-up on its first reference, the undeformed mesh.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::rebased`].
+    pub fn restarted(&self, original: &Mesh) -> Result<Self, RemeshError> {
+        self.rebased(original, self.plan.setup.policy)
     }
 
     /// Whether a displacement component at a node is an unknown of Eq. 3.
@@ -255,75 +281,79 @@ impl ElasticMap {
 }
 
 impl Plan {
-    fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
-        let topology = Arc::clone(reference.topology());
-        let (elements, subregion_of) = region_elements(&topology, &setup.subregions)?;
-        let constraints = Constraints::new(reference, &setup, &elements)?;
-        let node_count = topology.node_count();
-        let unknowns = DofMap::<3>::new(node_count, |node, c| {
-            setup.guidance.allows(c) && constraints.is_unknown(node, c)
-        });
-        let prescribed = DofMap::<3>::new(node_count, |node, _| constraints.is_design[node.index()]);
-        restraint::check(reference, &elements, &unknowns)?;
+    fn topology(&self) -> &Arc<Topology> {
+        &self.body.topology
+    }
 
-        // Positions in `elements` of those at a design node: no other couples to the design.
+    fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
+        let body = Arc::new(Body::new(reference.topology(), &setup.subregions)?);
+        let Body { topology, elements, .. } = &*body;
+        let constraints = Constraints::new(reference, &setup, elements)?;
+        let node_count = topology.node_count();
+        let unknowns = Arc::new(DofMap::<3>::new(node_count, |node, c| {
+            setup.guidance.allows(c) && constraints.is_unknown(node, c)
+        }));
+        let prescribed = DofMap::<3>::new(node_count, |node, _| constraints.is_design[node.index()]);
+        restraint::check(reference, elements, &unknowns)?;
+
+        // Positions in the body of those at a design node: no other couples to the design.
         let at_design = |e: ElementId| topology.tet(e).iter().any(|n| constraints.is_design[n.index()]);
         let coupled: Vec<u32> =
-            (0..).zip(&elements).filter(|&(_, &e)| at_design(e)).map(|(position, _)| position).collect();
-        let bound = |columns, connectivity: Vec<[NodeId; 4]>| {
-            let couplings = vec![Coupling::full(3); connectivity.len()];
-            let group = ElementGroup::new(node_count, connectivity, couplings);
-            let pattern = BlockPattern::rectangular(&unknowns, columns, &group);
-            let group = pattern.bind(&group);
-            (pattern, group)
-        };
-        let stiffness = bound(&unknowns, elements.iter().map(|&e| topology.tet(e)).collect());
+            (0..).zip(elements).filter(|&(_, &e)| at_design(e)).map(|(position, _)| position).collect();
         let at_coupled = coupled.iter().map(|&position| topology.tet(elements[position as usize]));
-        let coupling = bound(&prescribed, at_coupled.collect());
-        let analysis = SolverAnalysis::new(setup.solver, &unknowns, stiffness.0.structure())?;
-        let force = nodal_force(&topology, &setup.subregions, &unknowns);
+        let coupling = bound(&unknowns, &prescribed, at_coupled.collect());
+        let moving = moving_elements(&body, &unknowns, &constraints.design_nodes);
+        let (stiffness, analysis) = match &setup.share {
+            Some(share) => {
+                let shared = DistributedElastic::new(share, (&body, &unknowns), &moving);
+                (None, SolverAnalysis::Distributed(Arc::new(shared)))
+            }
+            None => {
+                let tets = elements.iter().map(|&e| topology.tet(e)).collect();
+                let stiffness = bound(&unknowns, &unknowns, tets);
+                let analysis = SolverAnalysis::new(setup.solver, &unknowns, stiffness.0.structure())?;
+                (Some(stiffness), analysis)
+            }
+        };
+        let force = nodal_force(topology, &setup.subregions, &unknowns);
         let design_nodes = constraints.design_nodes;
         Ok(Self {
             setup,
-            topology,
-            elements,
-            subregion_of,
+            body,
             design_nodes,
             unknowns,
             prescribed,
             stiffness,
             coupling,
             coupled,
+            moving,
             analysis,
             force,
         })
     }
 }
 
-/// The elements of all subregions, ascending, and the subregion of each.
-fn region_elements(
-    topology: &Topology,
-    subregions: &[Subregion],
-) -> Result<(Vec<ElementId>, Vec<u32>), RemeshError> {
-    let element_count = topology.tets().len();
-    let mut owner: Vec<Option<u32>> = vec![None; element_count];
-    for (s, subregion) in (0u32..).zip(subregions) {
-        subregion.validate()?;
-        for &element in &subregion.elements {
-            let name = |s: u32| subregions[s as usize].name.clone();
-            match owner.get_mut(element.index()) {
-                None => {
-                    let subregion = name(s);
-                    return Err(RemeshError::DanglingElement { subregion, element, elements: element_count });
-                }
-                Some(Some(first)) if *first != s => {
-                    return Err(RemeshError::Overlap { element, first: name(*first), second: name(s) });
-                }
-                Some(slot) => *slot = Some(s),
-            }
-        }
+/// The pattern of the rows against the columns over some elements, and these bound to it.
+pub(crate) fn bound(
+    rows: &DofMap<3>,
+    columns: &DofMap<3>,
+    connectivity: Vec<[NodeId; 4]>,
+) -> (BlockPattern<3>, BoundGroup<4>) {
+    let couplings = vec![Coupling::full(3); connectivity.len()];
+    let group = ElementGroup::new(rows.node_count(), connectivity, couplings);
+    let pattern = BlockPattern::rectangular(rows, columns, &group);
+    let group = pattern.bind(&group);
+    (pattern, group)
+}
+
+/// Elements of the body, and those around nodes that may move.
+fn moving_elements(body: &Body, unknowns: &DofMap<3>, design_nodes: &[NodeId]) -> Arc<[ElementId]> {
+    let topology = &body.topology;
+    let mut moves = vec![false; topology.tets().len()];
+    body.elements.iter().for_each(|e| moves[e.index()] = true);
+    let free = topology.nodes().filter(|&n| unknowns.unknown_bits(n) != 0);
+    for node in free.chain(design_nodes.iter().copied()) {
+        topology.elements_around(node).iter().for_each(|e| moves[e.index()] = true);
     }
-    let (elements, subregion_of): (Vec<_>, Vec<_>) =
-        topology.elements().filter_map(|e| Some((e, owner[e.index()]?))).unzip();
-    if elements.is_empty() { Err(RemeshError::EmptyRegion) } else { Ok((elements, subregion_of)) }
+    topology.elements().filter(|e| moves[e.index()]).collect()
 }

@@ -1,11 +1,15 @@
 //! What can be wrong with a remesh region or with a motion of it.
 
+use fluxmorph_geometry::ranks::RankError;
 use fluxmorph_geometry::{ElementId, MeshError, NodeId};
 
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RemeshError {
+    /// A rank could not do its share.
+    #[error(transparent)]
+    Rank(#[from] RankError),
     /// The remesh region has no element.
     #[error("the remesh region has no element: name at least one region of the mesh")]
     EmptyRegion,

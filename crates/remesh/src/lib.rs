@@ -8,8 +8,10 @@
 //! each frozen on its own reference mesh, [`travel`] takes a given motion in as many of them as needed, and [`rescue`] is
 //! what is tried when one cannot move on; [`smoothing`] is its last remedy.
 
+mod body;
 pub mod boundary;
 pub mod deform;
+mod distributed;
 pub mod elasticity;
 pub mod error;
 pub mod force;

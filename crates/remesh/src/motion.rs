@@ -64,10 +64,15 @@ impl Motion {
     /// As [`ElasticMap::new`].
     pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let map = Arc::new(ElasticMap::new(&original, setup)?);
-        let moving = moving_elements(&original, &map);
+        Ok(Self::begun(original, map))
+    }
+
+    /// The first round with its map.
+    fn begun(original: Mesh, map: Arc<ElasticMap>) -> Self {
+        let moving = Arc::clone(map.moving());
         let anchor = vec![[0.0; 3]; map.design_nodes().len()];
         let displacement = vec![[0.0; 3]; original.points().len()];
-        Ok(Self {
+        Self {
             reference: original.clone(),
             original,
             displacement,
@@ -76,7 +81,7 @@ impl Motion {
             moving,
             force: Force::Due,
             round: 0,
-        })
+        }
     }
 
     /// The next round, on a mesh that this one reached: `displacement` is that of every node from the original mesh,
@@ -112,7 +117,8 @@ impl Motion {
     /// # Errors
     /// As [`Motion::new`].
     pub fn restarted(&self) -> Result<Self, RemeshError> {
-        Self::new(self.original.clone(), self.map.setup().clone())
+        let map = Arc::new(self.map.restarted(&self.original)?);
+        Ok(Self::begun(self.original.clone(), map))
     }
 
     /// The same place with another stiffness: a round of its own.
@@ -209,7 +215,7 @@ impl Motion {
 
     /// Quality of the elements that may move, on a mesh of this topology.
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
-        QualityReport::of_elements(mesh, &self.moving).expect("an elastic body has elements")
+        self.map.quality(mesh)
     }
 
     /// Elements of the elastic body, and those beside it that share a node that may move: faces at which the body ends
@@ -258,16 +264,4 @@ impl Motion {
     pub fn policy(&self) -> StiffnessPolicy {
         self.map.policy()
     }
-}
-
-/// Elements of the body, and those around nodes that may move.
-fn moving_elements(mesh: &Mesh, map: &ElasticMap) -> Arc<[ElementId]> {
-    let topology = mesh.topology();
-    let mut moves = vec![false; topology.tets().len()];
-    map.elements().iter().for_each(|e| moves[e.index()] = true);
-    let free = topology.nodes().filter(|&n| (0..3).any(|component| map.is_unknown(n, component)));
-    for node in free.chain(map.design_nodes().iter().copied()) {
-        topology.elements_around(node).iter().for_each(|e| moves[e.index()] = true);
-    }
-    topology.elements().filter(|e| moves[e.index()]).collect()
 }

@@ -223,6 +223,8 @@ impl Motion {
         let setup = RemeshSetup {
             guidance: Guidance::Axis(axis),
             policy: self.policy(),
+            // A third of the unknowns, in one process.
+            share: None,
             ..self.map().setup().clone()
         };
         let path = |t: f64| design.iter().map(|u| u.map(|u| t * u)).collect();

@@ -16,7 +16,11 @@ use fluxmorph_geometry::fem::{
     IterationStatus, conjugate_gradients, csr::CsrStructure,
 };
 
+use fluxmorph_geometry::Mesh;
+
+use crate::distributed::DistributedElastic;
 use crate::error::RemeshError;
+use crate::policy::StiffnessPolicy;
 
 /// Unknowns up to which one factor is taken without being asked for. Measured (`benches/elastic.rs`): at 90 thousand it
 /// takes 9 s and 0.8 GiB, against 1.4 s and 0.15 GiB for the blocks, and every solution is 0.8 s faster, which an optimiser
@@ -26,10 +30,10 @@ const LARGEST_DIRECT: usize = 100_000;
 /// True relative residual of the component-block solver. Displacement and gradient are used as if they were exact: a
 /// gradient certificate compares differences of objectives to 10⁻⁶ over steps of 10⁻⁴ of the bounds, which leaves 10⁻¹⁰
 /// for all errors; this is two digits below, and close to what a direct factor leaves.
-const TOLERANCE: f64 = 1e-12;
+pub(crate) const TOLERANCE: f64 = 1e-12;
 
 /// Iterations at most: some twenty on regular meshes, a hundred on thin cells with `ν` = 0.45, so that more is a fault.
-const MAX_ITERATIONS: usize = 2000;
+pub(crate) const MAX_ITERATIONS: usize = 2000;
 
 /// How the elastic system is solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,6 +54,8 @@ pub(crate) enum SolverAnalysis {
     Nothing,
     Direct(Arc<CholeskyAnalysis>),
     ComponentBlocks(Arc<ComponentAnalysis>),
+    /// Rows and factors are shared out among ranks.
+    Distributed(Arc<DistributedElastic>),
 }
 
 /// A system ready to be solved with.
@@ -58,6 +64,23 @@ pub(crate) enum ElasticSolver {
     Nothing,
     Direct(Cholesky),
     ComponentBlocks { matrix: CsrMatrix<f64>, preconditioner: ComponentPreconditioner },
+    Distributed(DistributedSlot),
+}
+
+/// The matrix of one reference on all ranks, for as long as it is needed.
+#[derive(Debug)]
+pub(crate) struct DistributedSlot {
+    shared: Arc<DistributedElastic>,
+    /// `None` without unknowns, and at ranks that only follow.
+    slot: Option<u64>,
+}
+
+impl Drop for DistributedSlot {
+    fn drop(&mut self) {
+        if let Some(slot) = self.slot {
+            self.shared.release(slot);
+        }
+    }
 }
 
 impl SolverAnalysis {
@@ -89,6 +112,7 @@ impl SolverAnalysis {
         match self {
             Self::Nothing => 0,
             Self::Direct(analysis) => analysis.factor_entries() * size_of::<f64>(),
+            Self::Distributed(_) => 0,
             Self::ComponentBlocks(analysis) => {
                 structure.columns.len() * size_of::<f64>() + analysis.factor_bytes()
             }
@@ -97,9 +121,11 @@ impl SolverAnalysis {
 }
 
 impl ElasticSolver {
+    /// Factors; `matrix` assembles where that is done in this process.
     pub(crate) fn new(
         analysis: &SolverAnalysis,
         matrix: impl FnOnce() -> CsrMatrix<f64>,
+        (reference, policy): (&Mesh, StiffnessPolicy),
     ) -> Result<Self, RemeshError> {
         Ok(match analysis {
             SolverAnalysis::Nothing => Self::Nothing,
@@ -108,6 +134,10 @@ impl ElasticSolver {
                 let matrix = matrix();
                 let preconditioner = ComponentPreconditioner::new(analysis, &matrix)?;
                 Self::ComponentBlocks { matrix, preconditioner }
+            }
+            SolverAnalysis::Distributed(shared) => {
+                let slot = shared.factor(reference, policy)?;
+                Self::Distributed(DistributedSlot { shared: Arc::clone(shared), slot })
             }
         })
     }
@@ -129,6 +159,10 @@ impl ElasticSolver {
         match self {
             Self::Nothing => {}
             Self::Direct(factor) => factor.solve_in_place(right_side),
+            Self::Distributed(DistributedSlot { shared, slot: Some(slot) }) => {
+                *right_side = shared.solve(*slot, right_side)?;
+            }
+            Self::Distributed(DistributedSlot { slot: None, .. }) => right_side.fill(0.0),
             Self::ComponentBlocks { matrix, preconditioner } => {
                 let (solution, report) = conjugate_gradients(
                     matrix,

@@ -152,7 +152,7 @@ fn loops(criterion: &mut Criterion<CpuTime>, order: Order, refinement: f64) {
     group.bench_function("losses", |b| b.iter(|| state.losses(&model, &mesh)));
     let energy = Functional::energy(&model, None).expect("the mesh is not empty");
     group.bench_function("energy functional", |b| b.iter(|| energy.evaluate(&model, &mesh, &state)));
-    let matrix = system.matrix();
+    let matrix = system.matrix().expect("one process has the matrix");
     let mut image = vec![c64::default(); matrix.structure.row_count()];
     group.throughput(Throughput::Elements(matrix.values.len() as u64));
     group.bench_function("matrix product", |b| b.iter(|| matrix.mul(state.values(), &mut image)));

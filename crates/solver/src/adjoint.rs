@@ -33,34 +33,59 @@ pub fn solve(system: &mut PreparedSystem, derivative: &[c64]) -> Result<FieldSol
 /// `dF/dx` at every node [unit of F per m], shape `(n_nodes, 3)`; of tetrahedra, only the `moving` ones contribute.
 ///
 /// `moving` lists the elements of which a node may move, ascending; the derivative at nodes that other elements share
-/// is incomplete, and those nodes must be held.
+/// is incomplete, and those nodes must be held. The mesh is the one that the state was solved on.
+///
+/// # Errors
+/// [`SolverError::Rank`] where the problem is shared out.
 pub fn node_gradient(
     model: &FieldModel,
     mesh: &Mesh,
     state: &FieldSolution,
     adjoint: &FieldSolution,
     moving: &[ElementId],
+) -> Result<Vec<Point>, SolverError> {
+    match model.distributed() {
+        Some(distributed) => distributed.node_gradient(state, adjoint, moving),
+        None => Ok(gradient_of(model, mesh, state, adjoint, &Extent { moving, triangles: None })),
+    }
+}
+
+/// What contributes to a gradient.
+pub(crate) struct Extent<'a> {
+    /// Elements, ascending.
+    pub(crate) moving: &'a [ElementId],
+    /// Triangles with a surface term by number, ascending; `None` for all.
+    pub(crate) triangles: Option<&'a [usize]>,
+}
+
+/// The contribution of some elements and triangles to [`node_gradient`], shape `(n_nodes, 3)`.
+pub(crate) fn gradient_of(
+    model: &FieldModel,
+    mesh: &Mesh,
+    state: &FieldSolution,
+    adjoint: &FieldSolution,
+    extent: &Extent<'_>,
 ) -> Vec<Point> {
     match model.space().order() {
         Order::Linear => {
             let shapes = (Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle());
-            gradient_of_order(shapes, |triangle| triangle, (model, mesh), (state, adjoint), moving)
+            gradient_of_order(shapes, |triangle| triangle, (model, mesh), (state, adjoint), extent)
         }
         Order::Quadratic => {
             let shapes = (Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle());
             let nodes_of = |triangle| model.space().quadratic_triangle(triangle);
-            gradient_of_order(shapes, nodes_of, (model, mesh), (state, adjoint), moving)
+            gradient_of_order(shapes, nodes_of, (model, mesh), (state, adjoint), extent)
         }
     }
 }
 
-/// [`node_gradient`] on elements with `N` and faces with `F` nodes.
+/// [`gradient_of`] on elements with `N` and faces with `F` nodes.
 fn gradient_of_order<const N: usize, const F: usize>(
     (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
     nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F] + Sync,
     (model, mesh): (&FieldModel, &Mesh),
     (state, adjoint): (&FieldSolution, &FieldSolution),
-    moving: &[ElementId],
+    &Extent { moving, triangles }: &Extent<'_>,
 ) -> Vec<Point> {
     let topology = model.topology();
     let contributions: Vec<[Point; 4]> = moving
@@ -84,7 +109,13 @@ fn gradient_of_order<const N: usize, const F: usize>(
     for (e, terms) in magnets {
         add(&topology.tet(e), &scaled(2.0, &terms));
     }
-    let surface: Vec<([NodeId; 3], SurfaceTerm)> = model.surface().collect();
+    let all = model.surface();
+    let surface: Vec<([NodeId; 3], SurfaceTerm)> = match triangles {
+        None => all.collect(),
+        Some(own) => {
+            all.enumerate().filter(|(t, _)| own.binary_search(t).is_ok()).map(|(_, term)| term).collect()
+        }
+    };
     let contributions: Vec<[Point; 3]> = surface
         .par_iter()
         .map(|&(triangle, term)| {

@@ -1,17 +1,20 @@
 //! The matrix of the field problem in one finite-element space: equation numbers, pattern, assembly.
 //!
 //! All of it follows from topology, conditions and from where ψ is defined, and is made once; the values come from a
-//! [`WeakForm`] of any frequency above zero, or of statics.
+//! [`WeakForm`] of any frequency above zero, or of statics. Of a mesh that is shared out, a rank has all equation numbers,
+//! but only the rows of its own nodes and the elements that touch them ([`Holding`]).
 
 use fluxmorph_geometry::fem::{
-    BlockPattern, BoundGroup, Coupling, CsrMatrix, ElementGroup, LocalMatrix, c64,
+    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix, c64,
 };
+use fluxmorph_geometry::ranks::Share;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
 use crate::element::lagrange::Lagrange;
 use crate::error::SolverError;
 use crate::framed::Framed;
+use crate::holding::Holding;
 use crate::linear::aggregation;
 use crate::prolongation::{ScalarSpace, prolongation};
 use crate::space::{Order, Space};
@@ -23,8 +26,11 @@ use crate::weak_form::WeakForm;
 pub(crate) struct Discretisation {
     pub(crate) space: Space,
     pub(crate) unknowns: Unknowns,
+    /// Rows of this rank against all columns; the whole where there is one rank.
     pub(crate) pattern: BlockPattern<4>,
     groups: Groups,
+    /// Elements and triangles of the groups, where these are not all.
+    pub(crate) holding: Option<Holding>,
     /// Elements and surface triangles with a node whose `A` is prescribed.
     lifted: (Vec<ElementId>, Vec<usize>),
 }
@@ -46,22 +52,31 @@ impl Discretisation {
         order: Order,
         weak_form: &WeakForm,
         boundaries: &[(String, Boundary)],
+        share: Option<&Share>,
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
         let space = Space::new(topology, order);
         let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), boundaries)?;
         let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
-        let couplings = topology
-            .elements()
-            .map(|e| {
-                let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
-                let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
-                if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
-            })
-            .collect();
-        let (pattern, groups) = pattern(&space, &unknowns, couplings, weak_form.triangles());
+        let holding = share.map(|share| Holding::new(topology, weak_form.triangles(), share));
+        let coupling_of = |e: ElementId| {
+            let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
+            let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
+            if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
+        };
+        let rows = match share {
+            None => unknowns.dofs.clone(),
+            Some(share) => {
+                let owned = |node: NodeId| share.owns(space.vertices_of(node)[0]);
+                DofMap::new(space.node_count(), |node, c| {
+                    owned(node) && unknowns.dofs.equation(node, c).is_some()
+                })
+            }
+        };
+        let (pattern, groups) =
+            pattern(&space, (&rows, &unknowns.dofs), holding.as_ref(), coupling_of, weak_form.triangles());
         let lifted = lifted(mesh, &space, &unknowns, weak_form.triangles());
-        Ok(Self { space, unknowns, pattern, groups, lifted })
+        Ok(Self { space, unknowns, pattern, groups, holding, lifted })
     }
 
     /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones conductors in full and
@@ -90,21 +105,24 @@ impl Discretisation {
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
     }
 
-    /// Assembles the matrix on a mesh with this topology.
+    /// Assembles the matrix, or the rows of it that are held, on a mesh with this topology.
     pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
         let values = &mut matrix.values;
+        let holding = self.holding.as_ref();
+        let element = |e: ElementId| holding.map_or(e, |held| held.elements[e.index()]);
+        let triangle = |t: ElementId| holding.map_or(t.index(), |held| held.triangles[t.index()]);
         match &self.groups {
             Groups::Linear { tets, triangles } => {
-                self.add_group(tets, values, |e| weak_form.linear_tet(mesh, e));
+                self.add_group(tets, values, |e| weak_form.linear_tet(mesh, element(e)));
                 self.add_group(triangles, values, |t| {
-                    weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, t.index())
+                    weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, triangle(t))
                 });
             }
             Groups::Quadratic { tets, triangles } => {
-                self.add_group(tets, values, |e| weak_form.quadratic_tet(mesh, e));
+                self.add_group(tets, values, |e| weak_form.quadratic_tet(mesh, element(e)));
                 self.add_group(triangles, values, |t| {
-                    weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, t.index())
+                    weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, triangle(t))
                 });
             }
         }
@@ -131,22 +149,22 @@ impl Discretisation {
     pub(crate) fn lift(&self, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
         let (elements, triangles) = &self.lifted;
         match &self.groups {
-            Groups::Linear { triangles: bound, .. } => {
+            Groups::Linear { .. } => {
                 for &e in elements {
                     self.subtract_lift(self.space.nodes_of(e), &weak_form.linear_tet(mesh, e), load);
                 }
                 for &t in triangles {
                     let matrix = weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, load);
+                    self.subtract_lift(&self.space.triangle(weak_form.triangles()[t]), &matrix, load);
                 }
             }
-            Groups::Quadratic { triangles: bound, .. } => {
+            Groups::Quadratic { .. } => {
                 for &e in elements {
                     self.subtract_lift(self.space.nodes_of(e), &weak_form.quadratic_tet(mesh, e), load);
                 }
                 for &t in triangles {
                     let matrix = weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&bound.nodes_of(ElementId::new(t)), &matrix, load);
+                    self.subtract_lift(&self.space.triangle(weak_form.triangles()[t]), &matrix, load);
                 }
             }
         }
@@ -175,28 +193,43 @@ fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
     weak_form.topology().elements().filter(|&e| weak_form.conducts(e)).collect()
 }
 
-/// The pattern of the system, and its elements and triangles bound to it.
+/// The pattern of the rows against the columns, and the elements and triangles that are held bound to it.
 fn pattern(
     space: &Space,
-    unknowns: &Unknowns,
-    couplings: Vec<Coupling>,
+    (rows, columns): (&DofMap<4>, &DofMap<4>),
+    holding: Option<&Holding>,
+    coupling_of: impl Fn(ElementId) -> Coupling,
     triangles: &[[NodeId; 3]],
 ) -> (BlockPattern<4>, Groups) {
-    let surface_couplings = vec![Coupling::full(3); triangles.len()];
     let count = space.node_count();
+    let couplings: Vec<Coupling> = match holding {
+        None => (0..space.element_count()).map(|e| coupling_of(ElementId::new(e))).collect(),
+        Some(held) => held.elements.iter().map(|&e| coupling_of(e)).collect(),
+    };
+    let triangles: Vec<[NodeId; 3]> = match holding {
+        None => triangles.to_vec(),
+        Some(held) => held.triangles.iter().map(|&t| triangles[t]).collect(),
+    };
+    let surface_couplings = vec![Coupling::full(3); triangles.len()];
+    fn held<const N: usize>(tets: &[[NodeId; N]], holding: Option<&Holding>) -> Vec<[NodeId; N]> {
+        match holding {
+            None => tets.to_vec(),
+            Some(held) => held.elements.iter().map(|e| tets[e.index()]).collect(),
+        }
+    }
     match (space.linear_tets(), space.quadratic_tets()) {
         (Some(tets), _) => {
-            let volumes = ElementGroup::new(count, tets.to_vec(), couplings);
-            let faces = ElementGroup::new(count, triangles.to_vec(), surface_couplings);
-            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let volumes = ElementGroup::new(count, held(tets, holding), couplings);
+            let faces = ElementGroup::new(count, triangles, surface_couplings);
+            let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
             let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
             (pattern, groups)
         }
         (None, tets) => {
-            let volumes = ElementGroup::new(count, tets.unwrap_or_default().to_vec(), couplings);
+            let volumes = ElementGroup::new(count, held(tets.unwrap_or_default(), holding), couplings);
             let triangles = triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
             let faces = ElementGroup::new(count, triangles, surface_couplings);
-            let pattern = BlockPattern::symmetric(&unknowns.dofs, &volumes, &faces);
+            let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
             let groups = Groups::Quadratic { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
             (pattern, groups)
         }

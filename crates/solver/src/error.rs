@@ -1,6 +1,7 @@
 //! What can go wrong in a field analysis.
 
 use fluxmorph_geometry::MeshError;
+use fluxmorph_geometry::ranks::RankError;
 
 use crate::coil::{PlaneFault, RegionFault};
 
@@ -11,6 +12,9 @@ pub enum SolverError {
     /// The mesh or the sparse kernel refused.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// A rank could not do its share.
+    #[error(transparent)]
+    Rank(#[from] RankError),
     /// A parameter of the model is out of range.
     #[error("{what} = {value}: {expected}")]
     Parameter {

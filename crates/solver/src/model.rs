@@ -8,16 +8,19 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::ranks::Share;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::boundary::Boundary;
 use crate::coil::{Coil, Condition, ConditionedSurface, planes};
 use crate::discretisation::Discretisation;
+use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::linear::{
-    FieldKind, LinearSolverSettings, PreparedSystem, SolverMemory, SystemAnalysis, SystemPattern,
+    DistributedSettings, FieldKind, LinearSolverSettings, LocalSystem, PreparedSystem, SolverMemory,
+    SystemAnalysis, SystemPattern,
 };
 use crate::load::Sources;
 use crate::material::Material;
@@ -48,6 +51,8 @@ pub struct FieldModelSetup {
     pub boundaries: Vec<(String, Boundary)>,
     /// Linear solver.
     pub linear_solver: LinearSolverSettings,
+    /// The ranks among which the problem is shared out, and how they solve; `None` for one process.
+    pub share: Option<(Share, DistributedSettings)>,
 }
 
 impl Default for FieldModelSetup {
@@ -63,17 +68,22 @@ impl Default for FieldModelSetup {
             coils: Vec::new(),
             boundaries: Vec::new(),
             linear_solver: LinearSolverSettings::default(),
+            share: None,
         }
     }
 }
 
 /// A field problem, ready to be solved on any mesh with its topology.
-#[derive(Debug)]
+///
+/// A clone shares what is large.
+#[derive(Clone, Debug)]
 pub struct FieldModel {
-    setup: FieldModelSetup,
+    setup: Arc<FieldModelSetup>,
     angular_frequency: f64,
-    weak_form: WeakForm,
+    weak_form: Arc<WeakForm>,
     shared: Arc<Shared>,
+    /// Where the problem is shared out among ranks.
+    distributed: Option<Arc<Distributed>>,
 }
 
 /// What all frequencies above zero have in common.
@@ -81,7 +91,23 @@ pub struct FieldModel {
 struct Shared {
     fine: Discretisation,
     sources: Sources,
-    analysis: Arc<SystemAnalysis>,
+    /// Of one process.
+    analysis: Option<Arc<SystemAnalysis>>,
+}
+
+/// A matrix as assembled, wherever it is.
+#[derive(Debug)]
+pub enum AssembledMatrix {
+    /// In this process.
+    Local(CsrMatrix<c64>),
+    /// To be assembled by the ranks, with nodes at these places [m].
+    OnRanks(Vec<Point>),
+}
+
+impl From<CsrMatrix<c64>> for AssembledMatrix {
+    fn from(matrix: CsrMatrix<c64>) -> Self {
+        Self::Local(matrix)
+    }
 }
 
 impl FieldModel {
@@ -91,15 +117,18 @@ impl FieldModel {
     /// [`SolverError`] names what is missing or out of range.
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
         let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
-        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries)?;
+        let share = setup.share.as_ref().map(|(share, _)| share);
+        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries, share)?;
         let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             reference: &|| fine.assemble(&weak_form, mesh),
             prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
         };
-        let analysis = SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?;
-        let analysis = Arc::new(analysis);
+        let analysis = match share {
+            None => Some(SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?),
+            Some(_) => None,
+        };
         let magnetisation: Vec<Point> = setup
             .remanence
             .iter()
@@ -108,8 +137,23 @@ impl FieldModel {
             .collect();
         let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
         check_sources(mesh, &setup)?;
-        let shared = Arc::new(Shared { fine, sources, analysis });
-        Ok(Self { setup, angular_frequency, weak_form, shared })
+        let shared = Arc::new(Shared { fine, sources, analysis: analysis.map(Arc::new) });
+        Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
+    }
+
+    /// The model, with its part shared out where it has ranks.
+    fn whole(
+        setup: FieldModelSetup,
+        (angular_frequency, weak_form): (f64, WeakForm),
+        shared: Arc<Shared>,
+    ) -> Self {
+        let setup = Arc::new(setup);
+        let weak_form = Arc::new(weak_form);
+        let mut model = Self { setup, angular_frequency, weak_form, shared, distributed: None };
+        if let Some((share, settings)) = &model.setup.share {
+            model.distributed = Some(Arc::new(Distributed::new(&model, share, settings)));
+        }
+        model
     }
 
     /// The same problem at another frequency [Hz]; between frequencies above zero, equation numbers, pattern, symbolic
@@ -118,12 +162,12 @@ impl FieldModel {
     /// # Errors
     /// As [`FieldModel::new`].
     pub fn at_frequency(&self, mesh: &Mesh, frequency: f64) -> Result<Self, SolverError> {
-        let setup = FieldModelSetup { frequency, ..self.setup.clone() };
+        let setup = FieldModelSetup { frequency, ..(*self.setup).clone() };
         if frequency == 0.0 || self.angular_frequency == 0.0 {
             return Self::new(mesh, setup);
         }
-        let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
-        Ok(Self { setup, angular_frequency, weak_form, shared: Arc::clone(&self.shared) })
+        let weak_form = Self::weak_form(mesh, &setup)?;
+        Ok(Self::whole(setup, weak_form, Arc::clone(&self.shared)))
     }
 
     /// Checks a set-up; `ω` [rad/s] and the weak form.
@@ -136,9 +180,17 @@ impl FieldModel {
         Ok((angular_frequency, form))
     }
 
-    /// Assembles the matrix on a mesh with this model's topology.
+    /// Assembles the matrix on a mesh with this model's topology: the rows of this rank, where there are several.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {
         self.shared.fine.assemble(&self.weak_form, mesh)
+    }
+
+    /// The matrix on a mesh with this model's topology, wherever it is to be.
+    pub fn assembled(&self, mesh: &Mesh) -> AssembledMatrix {
+        match &self.distributed {
+            None => AssembledMatrix::Local(self.assemble(mesh)),
+            Some(_) => AssembledMatrix::OnRanks(mesh.points().to_vec()),
+        }
     }
 
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown.
@@ -153,21 +205,34 @@ impl FieldModel {
     /// Makes what the linear solver needs for a mesh; shared by the state and its adjoint.
     ///
     /// # Errors
-    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular.
-    pub fn prepare(&self, matrix: CsrMatrix<c64>) -> Result<PreparedSystem, SolverError> {
+    /// As [`FieldModel::prepare_with`].
+    pub fn prepare(&self, matrix: impl Into<AssembledMatrix>) -> Result<PreparedSystem, SolverError> {
         self.prepare_with(matrix, &mut SolverMemory::default())
     }
 
     /// As [`FieldModel::prepare`], with what is remembered of an earlier mesh or of another frequency.
     ///
     /// # Errors
-    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular.
+    /// [`SolverError::Mesh`] when the factorisation fails: the system is singular; [`SolverError::Rank`] where a rank does.
+    ///
+    /// # Panics
+    /// For a matrix that is not where the model is.
     pub fn prepare_with(
         &self,
-        matrix: CsrMatrix<c64>,
+        matrix: impl Into<AssembledMatrix>,
         memory: &mut SolverMemory,
     ) -> Result<PreparedSystem, SolverError> {
-        PreparedSystem::new(&self.shared.analysis, matrix, memory)
+        match (matrix.into(), &self.distributed, &self.shared.analysis) {
+            (AssembledMatrix::Local(matrix), _, Some(analysis)) => {
+                let system = LocalSystem::new(analysis, matrix, memory)?;
+                Ok(PreparedSystem::Local(Box::new(system)))
+            }
+            (AssembledMatrix::OnRanks(points), Some(distributed), _) => {
+                let system = distributed.prepare(&points, &self.setup.linear_solver)?;
+                Ok(PreparedSystem::Distributed(system))
+            }
+            _ => panic!("a matrix belongs where its model is"),
+        }
     }
 
     /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
@@ -175,7 +240,7 @@ impl FieldModel {
     /// # Errors
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-        let mut system = self.prepare(self.assemble(mesh))?;
+        let mut system = self.prepare(self.assembled(mesh))?;
         let state = self.solve_prepared(&mut system, &self.load(mesh))?;
         Ok((state, system))
     }
@@ -254,9 +319,31 @@ impl FieldModel {
         self.shared.sources.is_empty() && self.unknowns().prescribed_nodes().next().is_none()
     }
 
-    /// How the linear systems are solved, and what that takes.
-    pub fn linear_solver(&self) -> &SystemAnalysis {
-        &self.shared.analysis
+    /// How the linear systems of one process are solved, and what that takes; `None` where they are on several ranks.
+    pub fn linear_solver(&self) -> Option<&SystemAnalysis> {
+        self.shared.analysis.as_deref()
+    }
+
+    /// What the linear systems are solved with, in a word or two.
+    pub fn method_name(&self) -> String {
+        match (&self.shared.analysis, &self.setup.share) {
+            (Some(analysis), _) => analysis.method().name().to_owned(),
+            (None, Some((_, settings))) => settings.method_for(self.unknown_count()).name().to_owned(),
+            (None, None) => String::new(),
+        }
+    }
+
+    /// The same without the ranks among which it is shared out: for what needs no matrix.
+    pub fn of_one_process(&self) -> Self {
+        Self { distributed: None, ..self.clone() }
+    }
+
+    pub(crate) fn distributed(&self) -> Option<&Distributed> {
+        self.distributed.as_deref()
+    }
+
+    pub(crate) fn discretisation(&self) -> &Discretisation {
+        &self.shared.fine
     }
 
     /// `ν`, `(p − 1)ν` and `jωσ` of an element.

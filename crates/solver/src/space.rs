@@ -104,6 +104,14 @@ impl Space {
         self.vertex_count + self.edges().len()
     }
 
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        match &self.nodes {
+            Nodes::Linear(tets) => tets.len(),
+            Nodes::Quadratic { tets, .. } => tets.len(),
+        }
+    }
+
     /// The vertices of every edge that carries a node.
     pub fn edges(&self) -> &[[NodeId; 2]] {
         match &self.nodes {

@@ -44,7 +44,7 @@ fn model(mesh: &Mesh, order: Order) -> FieldModel {
 fn solved(mesh: &Mesh, order: Order) -> (usize, usize) {
     let model = model(mesh, order);
     let (field, system) = model.solve(mesh).expect("it converges");
-    assert_eq!(system.method(), Method::TwoLevel, "{:?}", system.events());
+    assert_eq!(system.method(), Some(Method::TwoLevel), "{:?}", system.events());
     let report = field.report();
     println!(
         "{} unknowns: {} iterations, residual {:.1e}",

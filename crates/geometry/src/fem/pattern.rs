@@ -153,7 +153,17 @@ impl<const C: usize> BlockPattern<C> {
         volumes: &ElementGroup<N>,
         surfaces: &ElementGroup<M>,
     ) -> Self {
-        Self::new(dofs, dofs, &[volumes, surfaces])
+        Self::of_rows(dofs, dofs, volumes, surfaces)
+    }
+
+    /// The pattern of some rows of that system: `rows` has the unknowns of some nodes only, `columns` all.
+    pub fn of_rows<const N: usize, const M: usize>(
+        rows: &DofMap<C>,
+        columns: &DofMap<C>,
+        volumes: &ElementGroup<N>,
+        surfaces: &ElementGroup<M>,
+    ) -> Self {
+        Self::new(rows, columns, &[volumes, surfaces])
     }
 
     /// The pattern of a rectangular part: rows in the unknowns `rows`, columns in those of `columns`.

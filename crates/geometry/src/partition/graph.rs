@@ -14,6 +14,9 @@ const KEPT_EDGE: u32 = 10;
 /// A conductor is one vertex if it weighs at most this share of what a rank gets: what is left is enough to balance with.
 const LARGEST_VERTEX: f64 = 0.5;
 
+/// How strongly two joined nodes hold together [1]; at least 1, and the same both ways.
+pub(super) type Strength<'a> = dyn Fn(NodeId, NodeId) -> u32 + Sync + 'a;
+
 /// Vertices with their weights, and how they are joined.
 pub(super) struct Graph {
     /// Vertex of every node.
@@ -29,8 +32,15 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// The graph for so many ranks; `weights` [1] of every node, `kept` the elements of all conductors.
-    pub(super) fn new(topology: &Topology, ranks: usize, weights: &[u64], kept: &[ElementId]) -> Self {
+    /// The graph for so many ranks; `weights` [1] of every node, `kept` the elements of all conductors, `strength` [1] of every
+    /// edge.
+    pub(super) fn new(
+        topology: &Topology,
+        ranks: usize,
+        weights: &[u64],
+        kept: &[ElementId],
+        strength: &Strength<'_>,
+    ) -> Self {
         let sets = ConnectedSets::new(topology, kept);
         let share = weights.iter().sum::<u64>() as f64 / ranks as f64;
         let weight = |nodes: &[NodeId]| nodes.iter().map(|n| weights[n.index()]).sum::<u64>();
@@ -52,7 +62,7 @@ impl Graph {
         let mut is_kept = vec![false; topology.tets().len()];
         kept.iter().for_each(|e| is_kept[e.index()] = true);
         let rows: Vec<Vec<(u32, u32)>> =
-            nodes.par_iter().map(|own| row(topology, &vertex_of, &is_kept, own)).collect();
+            nodes.par_iter().map(|own| row(topology, &vertex_of, &is_kept, own, strength)).collect();
         let mut row_starts = vec![0u32];
         let (mut columns, mut edge_weights) = (Vec::new(), Vec::new());
         for row in &rows {
@@ -67,7 +77,13 @@ impl Graph {
 }
 
 /// The vertices joined with that of some nodes, ascending, and the weight of what joins them.
-fn row(topology: &Topology, vertex_of: &[u32], is_kept: &[bool], nodes: &[NodeId]) -> Vec<(u32, u32)> {
+fn row(
+    topology: &Topology,
+    vertex_of: &[u32],
+    is_kept: &[bool],
+    nodes: &[NodeId],
+    strength: &Strength<'_>,
+) -> Vec<(u32, u32)> {
     let own = vertex_of[nodes[0].index()];
     let mut row: Vec<(u32, u32)> = Vec::new();
     let mut around: Vec<(NodeId, u32)> = Vec::new();
@@ -83,7 +99,7 @@ fn row(topology: &Topology, vertex_of: &[u32], is_kept: &[bool], nodes: &[NodeId
             let (other, weight) = same[same.len() - 1];
             let vertex = vertex_of[other.index()];
             if vertex != own {
-                row.push((vertex, weight));
+                row.push((vertex, weight * strength(node, other)));
             }
         }
     }

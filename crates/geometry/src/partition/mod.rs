@@ -6,7 +6,7 @@
 //! and cannot be cut, and the edges of a large one weigh more than others. Where there is no METIS, or it refuses, a rank
 //! gets a range of the nodes in their order.
 //!
-//! Lives here: who owns what, from the topology alone. Does not live here: how ranks talk, or any coordinate.
+//! Lives here: who owns what. Does not live here: how ranks talk.
 
 mod graph;
 mod report;
@@ -14,13 +14,18 @@ mod sets;
 
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId};
+use crate::mesh::Mesh;
 use crate::metis;
+use crate::tet4::{EDGES, dot, sub};
 use crate::topology::Topology;
-use graph::Graph;
+use graph::{Graph, Strength};
 pub use report::{ConductorShare, PartitionReport, RankShare};
 
 /// Vertices a rank from which METIS is asked: on smaller graphs it leaves parts empty, and says so on the terminal.
 const FEWEST_VERTICES: usize = 16;
+
+/// Most that an edge weighs by its length [1]: the sum over all edges must stay within 32 bits for METIS.
+const STRONGEST: f64 = 100.0;
 
 /// Which rank owns each node and element; the same for the same mesh, weights and number of ranks.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,6 +55,53 @@ impl Partition {
         weights: &[u32],
         kept: &[ElementId],
     ) -> Result<Self, MeshError> {
+        Self::cut_by(topology, ranks, weights, kept, &|_, _| 1)
+    }
+
+    /// As [`Partition::new`] for a mesh: short edges of flat elements, which couple their nodes more strongly than others, are
+    /// cut last.
+    ///
+    /// An edge weighs as much as the square of its length goes into that of the longest one at its ends: so much stronger
+    /// is its entry in the matrix of a Laplacian. At most a hundred times as much as another.
+    ///
+    /// # Errors
+    /// As [`Partition::new`].
+    ///
+    /// # Panics
+    /// If a kept element does not exist.
+    pub fn of_mesh(
+        mesh: &Mesh,
+        ranks: usize,
+        weights: &[u32],
+        kept: &[ElementId],
+    ) -> Result<Self, MeshError> {
+        let square = |a: NodeId, b: NodeId| {
+            let d = sub(mesh.point(a), mesh.point(b));
+            dot(d, d)
+        };
+        let mut longest = vec![0.0_f64; mesh.points().len()];
+        for tet in mesh.topology().tets() {
+            for [i, j] in EDGES {
+                let length = square(tet[i], tet[j]);
+                for n in [tet[i], tet[j]] {
+                    longest[n.index()] = longest[n.index()].max(length);
+                }
+            }
+        }
+        let strength = |a: NodeId, b: NodeId| {
+            let ratio = longest[a.index()].max(longest[b.index()]) / square(a, b);
+            ratio.clamp(1.0, STRONGEST) as u32
+        };
+        Self::cut_by(mesh.topology(), ranks, weights, kept, &strength)
+    }
+
+    fn cut_by(
+        topology: &Topology,
+        ranks: usize,
+        weights: &[u32],
+        kept: &[ElementId],
+        strength: &Strength<'_>,
+    ) -> Result<Self, MeshError> {
         let nodes = topology.node_count();
         if ranks == 0 || ranks > nodes {
             return Err(MeshError::Ranks { ranks, nodes });
@@ -62,7 +114,7 @@ impl Partition {
             return Ok(Self::of_owners(topology, ranks, vec![0; nodes]));
         }
         let weights: Vec<u64> = weights.iter().map(|&w| counted(w)).collect();
-        let graph = Graph::new(topology, ranks, &weights, kept);
+        let graph = Graph::new(topology, ranks, &weights, kept, strength);
         let part = cut(&graph, ranks).unwrap_or_else(|| ranges(&graph.weights, ranks));
         let mut owners: Vec<u32> = graph.vertex_of.iter().map(|&v| part[v as usize]).collect();
         fill_empty(&graph, ranks, &mut owners);

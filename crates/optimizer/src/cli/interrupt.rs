@@ -7,11 +7,13 @@ use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 
 use super::ExitCode;
+use super::launcher;
+use super::ranks::is_idle;
 use crate::error::Error;
 use crate::observer::take_down;
 
@@ -28,11 +30,16 @@ pub(super) struct Signal {
 }
 
 impl Signal {
+    /// What a signal sets: its number; zero before.
+    pub(super) fn number(&self) -> &Arc<AtomicUsize> {
+        &self.number
+    }
+
     /// The exit code of the signal received, if any.
     pub(super) fn received(&self) -> Option<ExitCode> {
         match i32::try_from(self.number.load(Ordering::SeqCst)) {
             Ok(SIGINT) => Some(ExitCode::Interrupted),
-            Ok(SIGTERM) => Some(ExitCode::Terminated),
+            Ok(SIGTERM | SIGUSR1) => Some(ExitCode::Terminated),
             _ => None,
         }
     }
@@ -54,7 +61,10 @@ impl Signal {
 pub(super) fn watch(message: &'static str) -> Signal {
     let number = Arc::new(AtomicUsize::new(0));
     let again = Arc::new(AtomicBool::new(false));
-    for (signal, code) in [(SIGINT, ExitCode::Interrupted), (SIGTERM, ExitCode::Terminated)] {
+    // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
+    let of_launcher = launcher::is_launched().then_some((SIGUSR1, ExitCode::Terminated));
+    let signals = [(SIGINT, ExitCode::Interrupted), (SIGTERM, ExitCode::Terminated)];
+    for (signal, code) in signals.into_iter().chain(of_launcher) {
         // Order matters: the shutdown looks at what an earlier signal has set.
         let _ = flag::register_conditional_shutdown(signal, code as i32, Arc::clone(&again))
             .and_then(|_| flag::register_usize(signal, Arc::clone(&number), signal as usize))
@@ -62,8 +72,10 @@ pub(super) fn watch(message: &'static str) -> Signal {
     }
     // A handler must not write; a thread of its own does, while the others compute.
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
+        // Of several ranks one speaks.
+        let speaks = !is_idle();
         std::thread::spawn(move || {
-            if signals.forever().next().is_some() {
+            if signals.forever().next().is_some() && speaks {
                 // A second signal ends the process where it stands: from here on nothing is left to tidy up.
                 take_down();
                 let _ = writeln!(std::io::stderr(), "{message}");

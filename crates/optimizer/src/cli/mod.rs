@@ -8,8 +8,10 @@ mod generate;
 mod gradient;
 mod init;
 mod interrupt;
+pub(crate) mod launcher;
 mod morph;
 mod panic;
+mod ranks;
 mod report;
 mod run;
 mod solve;
@@ -39,7 +41,9 @@ pub fn main() -> std::process::ExitCode {
         Err(error) => {
             // Help and version are asked for, and go to standard output; a closed pipe is no reason to panic.
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Success };
-            let _ = error.print();
+            if !ranks::is_idle() {
+                let _ = error.print();
+            }
             return code.into();
         }
     };
@@ -48,6 +52,13 @@ pub fn main() -> std::process::ExitCode {
 
 /// The outcome of a command.
 fn done(cli: &Cli) -> ExitCode {
+    let shared_out = matches!(
+        cli.command,
+        Command::Run(_) | Command::Resume(_) | Command::Solve(_) | Command::Gradient(_)
+    );
+    if ranks::is_idle() && !shared_out {
+        return ExitCode::Success;
+    }
     let outcome = match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Resume(args) => run::resume(args),
@@ -61,6 +72,13 @@ fn done(cli: &Cli) -> ExitCode {
         Command::Generate(args) => generate::generate(args),
     };
     outcome.unwrap_or_else(|error| {
+        // Of several ranks that fail alike one says so; what befalls one alone is said by that one.
+        if ranks::is_idle() {
+            if matches!(error, Error::Ranks { .. } | Error::Threads { .. }) {
+                let _ = writeln!(std::io::stderr(), "rank {}: {}", launcher::rank(), message(&error));
+            }
+            return error.exit_code();
+        }
         let _ = writeln!(std::io::stderr(), "{}", message(&error));
         error.exit_code()
     })

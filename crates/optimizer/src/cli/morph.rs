@@ -20,7 +20,7 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let older_run = args.common.older_run();
-        let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
+        let options = Options { disk: &disk, older_run, threads, team: None, interrupted: &interrupted };
         let report = morph::morph(&config, &source, parameters, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {
             stdout::print_json(&report)?;

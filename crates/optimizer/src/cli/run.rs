@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::args::{ResumeArgs, RunArgs};
 use super::exit::ExitCode;
 use super::interrupt::{self, Signal};
+use super::ranks::Ranks;
 use super::{observer, stdout, with_threads};
 use crate::config::OutputNamedBy;
 use crate::error::Error;
@@ -15,6 +16,7 @@ use crate::observer::Observer;
 use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
 use crate::report::ReportedRun;
 use crate::session::{self, Limits, Options, SavedRun};
+use crate::setup::Purpose;
 
 /// Do what the command line says.
 ///
@@ -23,11 +25,16 @@ use crate::session::{self, Limits, Options, SavedRun};
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let (config, source) = args.load()?;
-    let outcome = with_threads(args.common.work.threads, |threads| {
-        let interrupted = || signal.received().is_some();
+    let ranks = Ranks::joined(&config, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
+        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let disk = system_disk();
         let older_run = args.common.older_run();
-        let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
+        let team = ranks.team();
+        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
         let result = session::run(&config, &source, options, &mut *observer);
         let report = config.output.report.then_some(&disk);
@@ -44,11 +51,15 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 /// As [`run`].
 pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
-    let outcome = with_threads(args.work.threads, |threads| {
-        let interrupted = || signal.received().is_some();
-        let disk = system_disk();
-        let saved = SavedRun::open(&disk, &args.directory)?;
+    let disk = system_disk();
+    let saved = SavedRun::open(&disk, &args.directory)?;
+    let ranks = Ranks::joined(saved.config().0, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.work.threads), |threads| {
         let (config, source) = saved.config();
+        if let Some(code) = ranks.followed(config, source, Purpose::Optimisation) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         if !args.work.allow_outside {
             source.confined(OutputNamedBy::User)?;
         }
@@ -56,7 +67,8 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
             memory_limit::check_mesh(config, source)?;
         }
         let older_run = args.work.older_run();
-        let options = Options { disk: &disk, older_run, threads, interrupted: &interrupted };
+        let team = ranks.team();
+        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let report = config.output.report.then_some(&disk);
         let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::Dimension;
 use super::linear_solver::LinearSolver;
+use super::petsc::Petsc;
 use super::range::Range;
 use super::section::Section;
 use crate::schema::form::{each_once, integer, not_empty, number, quantity};
@@ -38,6 +39,9 @@ pub struct Analysis {
     /// How the linear systems are solved.
     #[schemars(default)]
     pub linear_solver: LinearSolver,
+    /// How they are solved on several ranks.
+    #[schemars(default)]
+    pub petsc: Petsc,
 }
 
 /// The frequency as it is written.
@@ -101,6 +105,7 @@ impl Default for Analysis {
             penalty: 1.0,
             order: ElementOrder::Linear,
             linear_solver: LinearSolver::default(),
+            petsc: Petsc::default(),
         }
     }
 }
@@ -114,7 +119,8 @@ impl Analysis {
             _ => ElementOrder::Linear,
         };
         let linear_solver = section.table("linear_solver").map(LinearSolver::read).unwrap_or_default();
-        Self { frequencies, penalty, order, linear_solver }
+        let petsc = section.table("petsc").map(Petsc::read).unwrap_or_default();
+        Self { frequencies, penalty, order, linear_solver, petsc }
     }
 
     /// All frequencies [Hz], at least one.

@@ -59,8 +59,9 @@ const TABLES: &[Keys] = &[
             "refinement",
         ],
     ),
-    table("[analysis]", &["frequency", "frequencies", "penalty", "order", "linear_solver"]),
+    table("[analysis]", &["frequency", "frequencies", "penalty", "order", "linear_solver", "petsc"]),
     table("[analysis.linear_solver]", &["method", "factor_gib", "reuse", "tolerance"]),
+    table("[analysis.petsc]", &["solver", "krylov", "overlap", "sub_solver", "options"]),
     table("[materials.NAME]", &["relative_permeability", "conductivity", "density"]),
     table("[regions.NAME]", &["material", "model", "remanence"]),
     table(

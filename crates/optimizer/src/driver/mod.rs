@@ -63,6 +63,11 @@ pub trait Recorder {
         None
     }
 
+    /// Whether what it gives back has the bits of one process.
+    fn is_exact(&self) -> bool {
+        true
+    }
+
     /// An evaluation is complete.
     ///
     /// # Errors

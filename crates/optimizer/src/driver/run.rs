@@ -94,6 +94,8 @@ pub(super) struct Run<'a> {
     pub(super) rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
+    /// Whether ranks have a share in what is computed, or had one in what is recalled.
+    is_shared_out: bool,
 }
 
 impl<'a> Run<'a> {
@@ -105,6 +107,7 @@ impl<'a> Run<'a> {
         interrupted: &'a dyn Fn() -> bool,
     ) -> Self {
         let goal = problem.objective.as_ref().expect("an optimisation has an objective").goal;
+        let is_shared_out = problem.share.is_some() || !recorder.is_exact();
         let last = problem.shape.as_ref().expect("an optimisation has a shape").initial.clone();
         Self {
             problem,
@@ -126,6 +129,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             rounds: Vec::new(),
             begun: 0,
+            is_shared_out,
         }
     }
 

@@ -48,8 +48,11 @@ pub struct Manifest {
     pub surfaces: Vec<String>,
     /// The machine.
     pub host: Host,
-    /// Threads used.
+    /// Threads used, of every rank.
     pub threads: usize,
+    /// The most ranks that the work was shared out among; absent for one process.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ranks: Option<usize>,
     /// Start, UTC.
     pub started: String,
     /// End, UTC.
@@ -179,6 +182,7 @@ impl Manifest {
             surfaces: Vec::new(),
             host: Host::this(),
             threads,
+            ranks: None,
             started: utc_timestamp(SystemTime::now()),
             finished: None,
             seconds: None,

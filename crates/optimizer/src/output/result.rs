@@ -250,6 +250,9 @@ pub struct LinearSolverResult {
     pub methods: Vec<String>,
     /// Largest relative residual of any accepted solution.
     pub worst_residual: f64,
+    /// Iterations for the design of this result: states and adjoints.
+    #[serde(default)]
+    pub iterations: usize,
 }
 
 impl RunResult {
@@ -343,6 +346,7 @@ pub(crate) mod tests {
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],
                 worst_residual: 1e-11,
+                iterations: 4,
             },
             timings_s: [("total".to_owned(), 12.0)].into(),
             peak_memory_bytes: 1 << 20,

@@ -4,6 +4,7 @@
 //! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
 //! final name is whole, and `resume` goes on with it.
 
+mod pieces;
 mod recorder;
 mod resume;
 mod summary;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::ranks::{Member, Team};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::driver;
@@ -34,6 +36,7 @@ use crate::rounds::RoundEvent;
 use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
 use crate::stage::Stage;
+use pieces::SharedPieces;
 use recorder::{DirectoryRecorder, write_collection, write_field};
 pub(crate) use resume::configuration;
 pub use resume::{Limits, SavedRun, resume};
@@ -48,6 +51,8 @@ pub struct Options<'a> {
     pub older_run: OlderRun,
     /// Threads in use, for the manifest.
     pub threads: usize,
+    /// The ranks among which the work is shared out; `None` for one process.
+    pub team: Option<&'a Team>,
     /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
 }
@@ -65,7 +70,7 @@ pub fn run(
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
     let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Optimisation, told)?;
+    let mut setup = set_up_watched(config, source, Purpose::Optimisation, options.team, told)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     Error::unless(options.interrupted)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
@@ -76,10 +81,25 @@ pub fn run(
     session.conclude(observer, |session, observer| {
         let directory = session.directory.clone();
         let names = constraint_names(&session.setup.problem);
+        let pieces = session.pieces();
         let recorder =
-            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?;
+            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?
+                .written_by(pieces);
         session.optimise(&approach, recorder, options.interrupted, observer)
     })
+}
+
+/// What a rank does that is not the first, whatever the first one is told: it sets the same problem up, and follows orders
+/// until the first one ends. A set-up that fails here and not there is told the first one with its first order.
+///
+/// # Panics
+/// At the first rank.
+pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
+    assert_eq!(team.member(), Member::Follower, "the first rank leads");
+    let setup = set_up_watched(config, source, purpose, Some(team), &mut |_| ());
+    let directory = config.output.directory.clone();
+    let _pieces = setup.as_ref().ok().and_then(|setup| SharedPieces::of(&setup.problem, directory));
+    team.follow(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
 }
 
 /// Analyses one design and writes its field and result.
@@ -96,7 +116,7 @@ pub fn solve(
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
     let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Analysis, told)?;
+    let mut setup = set_up_watched(config, source, Purpose::Analysis, options.team, told)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     Error::unless(options.interrupted)?;
     let values = match (&setup.problem.shape, design) {
@@ -131,7 +151,7 @@ pub fn solve(
         }
         let bounds = problem.bounds(p, &analysis)?;
         if config.output.fields != FieldsKept::Nothing {
-            write_field(&session.directory, 0, problem, &analysis)?;
+            write_field(&session.directory, session.pieces().as_ref(), 0, problem, &analysis)?;
             write_collection(&session.directory, &[0])?;
         }
         exports::write(config, &session.directory, &analysis.mesh, observer)?;
@@ -188,6 +208,7 @@ impl<'a> Session<'a> {
         let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
         let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
+        manifest.ranks = options.team.map(Team::size);
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
         manifest.write(&directory)?;
@@ -213,6 +234,11 @@ impl<'a> Session<'a> {
         for warning in &setup.warnings {
             observer.warning(warning);
         }
+    }
+
+    /// What all ranks write fields with; `None` for one process.
+    fn pieces(&self) -> Option<SharedPieces> {
+        SharedPieces::of(&self.setup.problem, self.directory.path().to_owned())
     }
 
     /// What the journal of this run belongs to.
@@ -254,7 +280,7 @@ impl<'a> Session<'a> {
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
             rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
-            linear_solver: linear_solver(problem, optimised.worst_residual),
+            linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
             ..self.result(
                 optimised.stop_reason,
                 &best.analysis,
@@ -266,6 +292,8 @@ impl<'a> Session<'a> {
         };
         let shapes = Shapes::of(config, &self.setup, &best.values)?;
         drop(optimised);
+        // The ranks' part of the problem goes with it.
+        drop(recorder);
         self.verified(result, &shapes, interrupted, observer)
     }
 

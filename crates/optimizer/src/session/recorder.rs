@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 
 use fluxmorph_geometry::io::pvd_text;
 
+use super::pieces::SharedPieces;
 use crate::config::FieldsKept;
 use crate::driver::Recorder;
 use crate::error::Error;
@@ -26,6 +27,10 @@ pub(super) struct DirectoryRecorder<'a> {
     written: Vec<usize>,
     /// Evaluations of before that are still to be told.
     recalled: VecDeque<Record>,
+    /// Whether these have the bits of one process.
+    is_exact: bool,
+    /// Where all ranks write the fields.
+    pieces: Option<SharedPieces>,
 }
 
 impl<'a> DirectoryRecorder<'a> {
@@ -43,16 +48,21 @@ impl<'a> DirectoryRecorder<'a> {
             kept,
             written: Vec::new(),
             recalled: VecDeque::new(),
+            is_exact: true,
+            pieces: None,
         })
     }
 
     /// For a run that goes on behind what its journal holds: history, collection and field files are brought to that.
+    /// `ranks` are the most that have computed it; `None` where one process has.
     pub(super) fn reopen(
         directory: &'a RunDirectory,
         contents: Contents,
         constraints: &[&str],
         kept: FieldsKept,
+        ranks: Option<usize>,
     ) -> Result<Self, Error> {
+        let is_exact = ranks.is_none();
         // The journal first: it holds the directory against other processes.
         let journal = Journal::reopen(directory, &contents)?;
         let records = contents.records;
@@ -67,7 +77,22 @@ impl<'a> DirectoryRecorder<'a> {
             write_collection(directory, &written)?;
         }
         directory.remove_leftovers(&written)?;
-        Ok(Self { directory, journal, history, kept, written, recalled: records.into() })
+        Ok(Self {
+            directory,
+            journal,
+            history,
+            kept,
+            written,
+            recalled: records.into(),
+            is_exact,
+            pieces: None,
+        })
+    }
+
+    /// The same with fields that all ranks write.
+    pub(super) fn written_by(mut self, pieces: Option<SharedPieces>) -> Self {
+        self.pieces = pieces;
+        self
     }
 
     /// Writes the field of an evaluation, and the collection of all.
@@ -80,13 +105,17 @@ impl<'a> DirectoryRecorder<'a> {
         if self.written.last() == Some(&evaluation) {
             return Ok(());
         }
-        write_field(self.directory, evaluation, problem, analysis)?;
+        write_field(self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
         self.written.push(evaluation);
         write_collection(self.directory, &self.written)
     }
 }
 
 impl Recorder for DirectoryRecorder<'_> {
+    fn is_exact(&self) -> bool {
+        self.is_exact
+    }
+
     fn recall(&mut self) -> Option<Record> {
         self.recalled.pop_front()
     }
@@ -110,14 +139,18 @@ fn is_wanted(kept: FieldsKept, record: &Record) -> bool {
     }
 }
 
-/// Writes the field file of an evaluation.
+/// Writes the field file of an evaluation, or the pieces of all ranks.
 pub(super) fn write_field(
     directory: &RunDirectory,
+    pieces: Option<&SharedPieces>,
     evaluation: usize,
     problem: &Problem,
     analysis: &Analysis,
 ) -> Result<(), Error> {
-    let bytes = fields::vtu(problem, &FieldData::of(analysis))?;
+    if let Some(pieces) = pieces {
+        return pieces.write(directory, evaluation, problem, analysis);
+    }
+    let bytes = fields::vtu(&problem.states, &FieldData::of(analysis))?;
     Ok(directory.write_field(evaluation, &bytes)?)
 }
 

@@ -4,6 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use fluxmorph_geometry::ranks::Team;
+
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session, constraint_names, unreached};
 use crate::config::{Config, Source};
@@ -88,7 +90,7 @@ pub fn resume(
     }
     observer.phase("setting up mesh and matrices");
     let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, told)?;
+    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, options.team, told)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), &source, options.older_run)?;
     if (options.interrupted)() {
         return Err(Error::InterruptedRun);
@@ -109,6 +111,8 @@ pub fn resume(
         clock,
         setup_seconds,
     };
+    let ranks = session.manifest.ranks;
+    session.manifest.ranks = session.manifest.ranks.max(options.team.map(Team::size));
     let identity = session.identity();
     let contents = journal(&directory, &identity, observer)?;
     session.manifest.resumed(Resumption::now(
@@ -132,13 +136,15 @@ pub fn resume(
     let kept = config.output.fields;
     // Before the manifest is touched: the journal holds the directory against other processes.
     let recorder = match contents {
-        Some(contents) => DirectoryRecorder::reopen(&directory, contents, &names, kept)?,
+        Some(contents) => DirectoryRecorder::reopen(&directory, contents, &names, kept, ranks)?,
         None => {
             directory.remove_leftovers(&[])?;
             directory.remove(&directory.collection())?;
             DirectoryRecorder::create(&directory, identity, &names, kept)?
         }
     };
+    let pieces = session.pieces();
+    let recorder = recorder.written_by(pieces);
     session.manifest.write(&directory)?;
     session.conclude(observer, |session, observer| {
         session.optimise(&approach, recorder, options.interrupted, observer)

@@ -68,7 +68,7 @@ impl Session<'_> {
             probes,
             losses_w,
             states: if states.len() > 1 { states } else { Vec::new() },
-            linear_solver: linear_solver(problem, analysis.worst_residual),
+            linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: BTreeMap::from([
                 ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
                 ("setup".to_owned(), self.setup_seconds),
@@ -153,7 +153,7 @@ pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Boun
 }
 
 /// How the linear systems were solved.
-pub(super) fn linear_solver(problem: &Problem, worst_residual: f64) -> LinearSolverResult {
-    let methods = problem.states.iter().map(|model| model.linear_solver().method().name().to_owned());
-    LinearSolverResult { methods: methods.collect(), worst_residual }
+pub(super) fn linear_solver(problem: &Problem, worst_residual: f64, iterations: usize) -> LinearSolverResult {
+    let methods = problem.states.iter().map(|model| model.method_name());
+    LinearSolverResult { methods: methods.collect(), worst_residual, iterations }
 }

@@ -1,12 +1,18 @@
 //! The field problems of a configuration.
 
+use fluxmorph_geometry::ranks::{Krylov, Share, SubSolver};
 use fluxmorph_geometry::{Mesh, Topology};
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
-use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, Reuse};
+use fluxmorph_solver::linear::{
+    DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
+};
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, SolverError, UniformField};
 
 use super::blame::Gathered;
-use crate::config::{self, Config, FactorReuse, Fault, RegionModel, SolverMethod, Source};
+use crate::config::{
+    self, Config, FactorReuse, Fault, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel, SolverMethod,
+    Source,
+};
 use crate::error::Error;
 
 /// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
@@ -75,13 +81,17 @@ pub(super) fn field_models(
     mesh: &Mesh,
     impedance_surfaces: &[Conductor],
     coils: &[coil::Coil],
+    share: Option<&Share>,
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
     for &frequency in config.analysis.frequencies() {
         // A model above 0 Hz shares all but its numbers with another.
         models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
             Some(model) => model.at_frequency(mesh, frequency)?,
-            None => field_model(config, mesh, frequency, impedance_surfaces.to_vec(), coils.to_vec())?,
+            None => {
+                let sources = (impedance_surfaces.to_vec(), coils.to_vec());
+                field_model(config, mesh, frequency, sources, share)?
+            }
         });
     }
     Ok(models)
@@ -91,8 +101,8 @@ fn field_model(
     config: &Config,
     mesh: &Mesh,
     frequency: f64,
-    impedance_surfaces: Vec<Conductor>,
-    coils: Vec<coil::Coil>,
+    (impedance_surfaces, coils): (Vec<Conductor>, Vec<coil::Coil>),
+    share: Option<&Share>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
     let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
@@ -115,6 +125,7 @@ fn field_model(
         coils,
         boundaries,
         linear_solver,
+        share: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
     };
     Ok(FieldModel::new(mesh, setup)?)
 }
@@ -140,6 +151,26 @@ fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
         tolerance: options.tolerance,
         factor_bytes: (options.factor_gib * GIB) as usize,
         ..LinearSolverSettings::default()
+    }
+}
+
+/// How they are solved on several ranks.
+fn distributed(options: &config::Petsc) -> DistributedSettings {
+    DistributedSettings {
+        method: match options.solver {
+            PetscSolver::Automatic => None,
+            PetscSolver::Mumps => Some(DistributedMethod::Direct),
+            PetscSolver::Asm => Some(DistributedMethod::Schwarz),
+        },
+        krylov: match options.krylov {
+            PetscKrylov::Gmres => Krylov::Gmres,
+            PetscKrylov::Cocg => Krylov::Cocg,
+        },
+        overlap: options.overlap,
+        sub_solver: match options.sub_solver {
+            PetscSubSolver::Incomplete => SubSolver::Incomplete,
+            PetscSubSolver::Complete => SubSolver::Complete,
+        },
     }
 }
 

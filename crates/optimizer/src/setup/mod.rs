@@ -12,6 +12,7 @@ pub(crate) mod mesh;
 mod motion;
 mod outline;
 mod shape;
+mod share;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub use motion::{MotionSetup, set_up_motion};
@@ -19,6 +20,7 @@ pub use outline::{Outline, OutlinedDesign, outline};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::ranks::Team;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
@@ -86,10 +88,11 @@ pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
 /// # Errors
 /// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
 pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setup, Error> {
-    set_up_watched(config, source, purpose, &mut |_| ())
+    set_up_watched(config, source, purpose, None, &mut |_| ())
 }
 
-/// As [`set_up`]; `told` hears of every stage as it begins.
+/// As [`set_up`], shared out among the ranks of a team if there is one: every rank sets the same up, and none but the first
+/// gives orders. `told` hears of every stage as it begins.
 ///
 /// # Errors
 /// As [`set_up`].
@@ -97,15 +100,22 @@ pub fn set_up_watched(
     config: &Config,
     source: &Source,
     purpose: Purpose,
+    team: Option<&Team>,
     told: Told<'_>,
 ) -> Result<Setup, Error> {
     if purpose == Purpose::Optimisation {
         config.optimisation(source)?;
     }
-    made(config, source, purpose, told).map_err(|error| blame::placed(error, config, source))
+    made(config, source, purpose, team, told).map_err(|error| blame::placed(error, config, source))
 }
 
-fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> Result<Setup, Error> {
+fn made(
+    config: &Config,
+    source: &Source,
+    purpose: Purpose,
+    team: Option<&Team>,
+    told: Told<'_>,
+) -> Result<Setup, Error> {
     told(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     let mut faults = name_faults(config, source, full_mesh.topology());
@@ -136,11 +146,17 @@ fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> R
         gathered.take::<()>(Err(source.error(vec![fault]).into()))?;
     }
     told(Stage::Unknowns);
+    let share = team.map(|team| share::of_mesh(config, &mesh, team)).transpose()?;
     let coils = gathered.take(field::coils(config, source, &mesh))?;
     let design = match (&config.design, &config.remesh) {
-        (Some(design), Some(remesh)) => {
-            Some(shape::Inputs { source, design, remesh, full_mesh: &full_mesh, mesh: &mesh })
-        }
+        (Some(design), Some(remesh)) => Some(shape::Inputs {
+            source,
+            design,
+            remesh,
+            full_mesh: &full_mesh,
+            mesh: &mesh,
+            share: share.as_ref(),
+        }),
         _ => None,
     };
     let body = match &design {
@@ -149,7 +165,9 @@ fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> R
     };
     // Neither needs the other: what is wrong with them is told together.
     let states = match coils {
-        Some(coils) => gathered.take(field::field_models(config, &mesh, &conductors, &coils))?,
+        Some(coils) => {
+            gathered.take(field::field_models(config, &mesh, &conductors, &coils, share.as_ref()))?
+        }
         None => None,
     };
     gathered.check()?;
@@ -174,7 +192,7 @@ fn made(config: &Config, source: &Source, purpose: Purpose, told: Told<'_>) -> R
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
-    let problem = Problem { original: mesh, states, objective, constraints, shape };
+    let problem = Problem { original: mesh, states, objective, constraints, shape, share };
     Ok(Setup { problem, audits, warnings, full_mesh })
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use fluxmorph_geometry::ranks::{Member, Share};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
@@ -31,6 +32,8 @@ pub(super) struct Inputs<'a> {
     pub(super) full_mesh: &'a Mesh,
     /// Without the regions that impedance surfaces replace.
     pub(super) mesh: &'a Mesh,
+    /// The ranks among which it is shared out.
+    pub(super) share: Option<&'a Share>,
 }
 
 /// The design surface and the elastic map, before they are held against the field problem.
@@ -72,6 +75,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
+    let setup = RemeshSetup { share: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
 }
@@ -123,7 +127,7 @@ pub(super) fn shape(
         upper: vec![design.upper; n],
         initial,
     };
-    check_bounds(source, &shape)?;
+    check_bounds(source, &shape, inputs.share)?;
     Ok(shape)
 }
 
@@ -225,6 +229,7 @@ pub(super) fn remesh_setup(
         boundaries,
         fixed_nodes: Vec::new(),
         solver: SolverChoice::Automatic,
+        share: None,
     })
 }
 
@@ -379,8 +384,10 @@ fn held_node_fault(
 
 /// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
 /// solved.
-fn check_bounds(source: &Source, shape: &Shape) -> Result<(), Error> {
-    if shape.limits.rounds > 0 {
+fn check_bounds(source: &Source, shape: &Shape, share: Option<&Share>) -> Result<(), Error> {
+    // A rank that follows gives no orders: the first one checks.
+    let follows = share.is_some_and(|share| share.team.member() == Member::Follower);
+    if shape.limits.rounds > 0 || follows {
         return Ok(());
     }
     let mut faults = Vec::new();

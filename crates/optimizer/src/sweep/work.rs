@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use super::{Layout, Planned, Sweep, Task};
 use crate::cli::ExitCode;
+use crate::cli::launcher;
 use crate::error::Error;
 use crate::output::OutputError;
 
@@ -131,6 +132,10 @@ impl Workers {
         let mut command = Command::new(&self.program);
         command.args(sweep.arguments(planned, task)).args(["--progress", "plain", "--threads"]);
         command.arg(self.threads.to_string()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
+        // A sweep that a launcher has started is no rank, and neither are its runs.
+        launcher::variables().for_each(|name| {
+            command.env_remove(name);
+        });
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         command.spawn().map_err(OutputError::io("start", &self.program))

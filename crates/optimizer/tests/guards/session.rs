@@ -32,7 +32,8 @@ fn run(directory: &Path, observer: &mut dyn Observer) -> Result<(), fluxmorph_op
     let (mut config, source) = Config::from_file(&quick_path(), &overrides).unwrap();
     config.output.directory = directory.to_owned();
     let disk = system_disk();
-    let options = Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, interrupted: &|| false };
+    let options =
+        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
     session::run(&config, &source, options, observer).map(drop)
 }
 
@@ -51,7 +52,8 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     }
     // Its evaluations are not lost.
     let disk = system_disk();
-    let options = Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, interrupted: &|| false };
+    let options =
+        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
     let limits = Limits { max_evaluations: None, max_time: None };
     let resumed =
         session::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();

@@ -4,17 +4,20 @@
 //! the ladder); what is fixed is the true residual of the solution. State and adjoint share the matrix, hence everything
 //! [`PreparedSystem`] holds; what follows from the pattern alone is made once a run in [`SystemAnalysis`]; what one
 //! design leaves for the next (a factor, solutions to start from) is [`SolverMemory`], and whether an old factor still pays is
-//! decided by counted work (`cost`), never by a clock, so that a run has the same bits on any machine. A further
-//! backend is a [`Method`] and an action in `preconditioner`.
+//! decided by counted work (`cost`), never by a clock, so that a run has the same bits on any machine. All of that is a
+//! [`system::LocalSystem`]; where a mesh is shared out over ranks, a [`distributed`] system has an engine of theirs solve.
 
 pub(crate) mod aggregation;
 mod analysis;
 pub mod cocg;
 mod cost;
+pub mod distributed;
 mod factor;
 mod memory;
 mod method;
 mod preconditioner;
+mod prepared;
+mod range;
 mod system;
 pub(crate) mod transfer;
 mod two_level;
@@ -26,10 +29,12 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::SolverError;
 pub use analysis::{SystemAnalysis, TWO_LEVELS_FROM};
+pub use distributed::{DistributedMethod, DistributedSettings, DistributedSystem};
 pub use memory::SolverMemory;
 pub(crate) use method::FieldKind;
 pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};
-pub use system::{PreparedSystem, SolverEvent};
+pub use prepared::PreparedSystem;
+pub use system::{LocalSystem, SolverEvent};
 
 /// What a system is analysed by.
 pub(crate) struct SystemPattern<'a> {

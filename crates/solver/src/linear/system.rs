@@ -1,4 +1,4 @@
-//! One matrix with its preconditioner: solutions, and what is done when one does not come.
+//! One matrix of this process with its preconditioner: solutions, and what is done when one does not come.
 //!
 //! What fails, and what follows:
 //!
@@ -21,15 +21,12 @@ use super::cost::Ledger;
 use super::memory::{Held, SolverMemory};
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
+use super::range::checked_norm;
 use super::{LinearSolverReport, cocg};
 use crate::error::SolverError;
 
 /// Iterations after which the speed of an iteration can be judged.
 const TRIAL: usize = 3;
-
-/// Norms of a right side that the iteration can work with: products of a residual, from there to far below the tolerance, with
-/// what the preconditioner makes of it are normal numbers, also where the matrix is some tens of digits from one.
-const RANGE: std::ops::RangeInclusive<f64> = 1e-130..=1e130;
 
 /// Solutions of a design of which nothing is known: state and adjoint.
 const USUAL_SOLUTIONS: usize = 2;
@@ -66,7 +63,7 @@ enum Origin {
 
 /// A matrix ready to be solved with, for any number of right sides.
 #[derive(Debug)]
-pub struct PreparedSystem {
+pub struct LocalSystem {
     analysis: Arc<SystemAnalysis>,
     matrix: CsrMatrix<c64>,
     /// None while another is made (two at a time would take twice the memory), and where none could be.
@@ -89,7 +86,7 @@ enum Attempt {
     TooSlow,
 }
 
-impl PreparedSystem {
+impl LocalSystem {
     /// Prepares the method for a matrix with the analysed pattern, and takes from `memory` what pays.
     ///
     /// # Errors
@@ -168,10 +165,7 @@ impl PreparedSystem {
     /// memory for, [`SolverError::Mesh`] when none of them has a factor, [`SolverError::NotFinite`] and
     /// [`SolverError::OutOfRange`] for a right side that cannot be solved for.
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        let scale = norm(right_side);
-        if !RANGE.contains(&scale) {
-            check_range(right_side)?;
-        }
+        let scale = checked_norm(right_side)?;
         if scale == 0.0 {
             let x = vec![c64::default(); right_side.len()];
             self.solutions.push(x.clone());
@@ -319,15 +313,6 @@ impl PreparedSystem {
         }
         norm(&r)
     }
-}
-
-/// Refuses a right side that is not finite, or not zero and beyond [`RANGE`].
-fn check_range(right_side: &[c64]) -> Result<(), SolverError> {
-    if let Some(value) = right_side.iter().flat_map(|b| [b.re, b.im]).find(|b| !b.is_finite()) {
-        return Err(SolverError::NotFinite { what: "right side of the field problem", value });
-    }
-    let largest = right_side.iter().fold(0.0_f64, |largest, b| largest.max(b.re.abs()).max(b.im.abs()));
-    if largest == 0.0 { Ok(()) } else { Err(SolverError::OutOfRange { largest }) }
 }
 
 /// The preconditioner of a method, or of the first more robust one that can be made.

@@ -4,6 +4,7 @@
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
@@ -44,7 +45,7 @@ pub(super) struct Summary<'a> {
     pub(super) skin: Vec<SkinSummary>,
     pub(super) motions: Vec<MotionSummary>,
     /// The method of each state's linear solver.
-    pub(super) linear_solvers: Vec<&'static str>,
+    pub(super) linear_solvers: Vec<String>,
     pub(super) coils: &'a [Coil],
     pub(super) boundaries: &'a Boundaries,
     pub(super) objective: Option<&'a Objective>,
@@ -135,7 +136,7 @@ pub(super) fn summary<'a>(
     older: OlderRun,
     told: Told<'_>,
 ) -> Result<Summary<'a>, Error> {
-    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, told)?;
+    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, None, told)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, older)?;
     let motions = morph::inspected(config, source)?;
     let mesh = &setup.full_mesh;
@@ -178,7 +179,7 @@ pub(super) fn summary<'a>(
         quality: quality(&setup),
         skin,
         motions,
-        linear_solvers: problem.states.iter().map(|model| model.linear_solver().method().name()).collect(),
+        linear_solvers: problem.states.iter().map(FieldModel::method_name).collect(),
         coils: &config.coils,
         boundaries: &config.boundaries,
         objective: config.objective.as_ref(),

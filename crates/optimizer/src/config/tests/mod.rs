@@ -177,7 +177,8 @@ fn values_are_in_si_and_defaults_filled_in() {
             frequencies: Frequencies::One(60.0),
             penalty: 1.0,
             order: ElementOrder::Linear,
-            linear_solver: LinearSolver::default()
+            linear_solver: LinearSolver::default(),
+            petsc: crate::config::Petsc::default(),
         }
     );
     let CoilShape::Racetrack(coil) = &config.coils[0].shape else { panic!("a racetrack") };

@@ -1,0 +1,56 @@
+//! Which rank has which part of the mesh of a problem.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::partition::Partition;
+use fluxmorph_geometry::ranks::{Share, Team};
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use super::material;
+use crate::config::{Config, resolved_toml};
+use crate::error::Error;
+
+/// Shares a mesh out by the unknowns of its nodes: three of `A`, and ψ in conductors, which stay together.
+///
+/// # Errors
+/// [`Error::Mesh`] for more ranks than nodes.
+pub(super) fn of_mesh(config: &Config, mesh: &Mesh, team: &Team) -> Result<Share, Error> {
+    let topology = mesh.topology();
+    let harmonic = config.analysis.frequencies().iter().any(|&f| f > 0.0);
+    let conducts: Vec<bool> = topology
+        .region_names()
+        .iter()
+        .map(|name| harmonic && material(config, name).conductivity > 0.0)
+        .collect();
+    let in_conductor = |e: &ElementId| conducts[topology.region_of()[e.index()].index()];
+    let kept: Vec<ElementId> = topology.elements().filter(in_conductor).collect();
+    let mut weights = vec![3u32; topology.node_count()];
+    for node in kept.iter().flat_map(|&e| topology.tet(e)) {
+        weights[node.index()] = 4;
+    }
+    let partition = Partition::of_mesh(mesh, team.size(), &weights, &kept)?;
+    team.identify(identity(config, mesh, &partition));
+    Ok(Share { team: team.clone(), partition: Arc::new(partition) })
+}
+
+/// A number that tells problems apart: configuration, mesh and owners.
+fn identity(config: &Config, mesh: &Mesh, partition: &Partition) -> u64 {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
+    hasher.update(resolved_toml(config).as_bytes());
+    let topology = mesh.topology();
+    for (node, point) in topology.nodes().zip(mesh.points()) {
+        hasher.update(&(partition.owner_of(node) as u64).to_le_bytes());
+        point.iter().for_each(|x| {
+            hasher.update(&x.to_bits().to_le_bytes());
+        });
+    }
+    for tet in topology.tets() {
+        tet.iter().for_each(|n| {
+            hasher.update(&n.0.to_le_bytes());
+        });
+    }
+    let hash = hasher.finalize();
+    let (first, _) = hash.as_bytes().split_first_chunk::<8>().expect("a hash has 32 bytes");
+    u64::from_le_bytes(*first)
+}

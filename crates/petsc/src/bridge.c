@@ -1,0 +1,405 @@
+/* The calls into MPI and PETSc that the program makes, as plain functions of plain numbers.
+ *
+ * What is a macro, an inline function or a type of unknown width in the headers of the two libraries is dealt with here, by
+ * the C compiler that read them. Complex numbers are pairs of doubles, real part first. Functions return 0, or a code that is
+ * not 0, with a text in `fm_message`. All functions but those of one rank are collective.
+ */
+#include <limits.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <mpi.h>
+#include <petscksp.h>
+
+#if !defined(PETSC_USE_COMPLEX)
+#error "this PETSc has real numbers: fluxmorph needs one that was configured with --with-scalar-type=complex"
+#endif
+
+/* The first text of the last error. */
+static char message[1024];
+
+const char *fm_message(void) { return message; }
+
+static void say(const char *text) {
+    if (message[0] == 0) {
+        snprintf(message, sizeof message, "%s", text);
+    }
+}
+
+/* PETSc tells of an error once in every function on the way back: the first text is the cause. */
+static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
+                               PetscErrorType type, const char *text, void *context) {
+    (void)comm, (void)line, (void)file, (void)type, (void)context;
+    if (text != NULL && text[0] != 0 && message[0] == 0) {
+        snprintf(message, sizeof message, "%s (PETSc, %s)", text, function);
+    }
+    return code;
+}
+
+/* ---- ranks ---- */
+
+int fm_start(void) {
+    int given = 0;
+    if (MPI_Init_thread(NULL, NULL, MPI_THREAD_SERIALIZED, &given) != MPI_SUCCESS || given < MPI_THREAD_SERIALIZED) {
+        say("MPI does not start with MPI_THREAD_SERIALIZED");
+        return 1;
+    }
+    /* Signals are the program's own, and a file in the working directory has no say. */
+    static char name[] = "fluxmorph", quiet[] = "-no_signal_handler", alone[] = "-skip_petscrc";
+    static char *words[] = {name, quiet, alone, NULL};
+    char **arguments = words;
+    int count = 3;
+    PetscErrorCode code = PetscInitialize(&count, &arguments, NULL, NULL);
+    if (code != 0) {
+        say("PETSc does not start");
+        return 1;
+    }
+    /* Standard output is the program's, for data. */
+    PETSC_STDOUT = stderr;
+    return (int)PetscPushErrorHandler(on_error, NULL);
+}
+
+int fm_finish(void) {
+    int code = (int)PetscFinalize();
+    MPI_Finalize();
+    return code;
+}
+
+int fm_rank(void) {
+    int rank = 0;
+    MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+    return rank;
+}
+
+int fm_size(void) {
+    int size = 1;
+    MPI_Comm_size(MPI_COMM_WORLD, &size);
+    return size;
+}
+
+/* How many ranks this machine has. */
+int fm_size_here(void) {
+    MPI_Comm here;
+    int size = 1;
+    if (MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &here) == MPI_SUCCESS) {
+        MPI_Comm_size(here, &size);
+        MPI_Comm_free(&here);
+    }
+    return size;
+}
+
+void fm_abort(int code) { MPI_Abort(MPI_COMM_WORLD, code); }
+
+/* Numbers that one MPI call takes at most. */
+#define PORTION ((int64_t)1 << 28)
+
+static int portion(int64_t left) { return (int)(left < PORTION ? left : PORTION); }
+
+void fm_broadcast(double *numbers, int64_t count) {
+    for (int64_t done = 0; done < count; done += PORTION) {
+        MPI_Bcast(numbers + done, portion(count - done), MPI_DOUBLE, 0, MPI_COMM_WORLD);
+    }
+}
+
+/* Sums over all ranks, at rank 0. */
+void fm_sum(double *numbers, int64_t count) {
+    int root = fm_rank() == 0;
+    for (int64_t done = 0; done < count; done += PORTION) {
+        double *at = numbers + done;
+        MPI_Reduce(root ? MPI_IN_PLACE : at, at, portion(count - done), MPI_DOUBLE, MPI_SUM, 0, MPI_COMM_WORLD);
+    }
+}
+
+/* The counts of all ranks, at rank 0: `all` has room for them there. */
+void fm_gather_counts(int64_t own, int64_t *all) {
+    MPI_Gather(&own, 1, MPI_INT64_T, all, 1, MPI_INT64_T, 0, MPI_COMM_WORLD);
+}
+
+/* The numbers of all ranks one after the other, at rank 0: `all` has room for them there. */
+void fm_gather(const double *own, int64_t count, double *all, const int64_t *counts) {
+    const int tag = 1;
+    if (fm_rank() != 0) {
+        for (int64_t done = 0; done < count; done += PORTION) {
+            MPI_Send(own + done, portion(count - done), MPI_DOUBLE, 0, tag, MPI_COMM_WORLD);
+        }
+        return;
+    }
+    if (count > 0) {
+        memcpy(all, own, (size_t)count * sizeof *own);
+    }
+    double *at = all + count;
+    for (int rank = 1; rank < fm_size(); rank++) {
+        for (int64_t done = 0; done < counts[rank]; done += PORTION) {
+            MPI_Recv(at + done, portion(counts[rank] - done), MPI_DOUBLE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        }
+        at += counts[rank];
+    }
+}
+
+/* ---- options ---- */
+
+/* Puts options, as PETSc's command line has them, into the database of all solvers. */
+int fm_options(const char *text) {
+    message[0] = 0;
+    return (int)PetscOptionsInsertString(NULL, text);
+}
+
+/* Sets an option unless it is set already. */
+int fm_option_default(const char *name, const char *value) {
+    message[0] = 0;
+    PetscBool is_set = PETSC_FALSE;
+    PetscErrorCode code = PetscOptionsHasName(NULL, NULL, name, &is_set);
+    if (code == 0 && !is_set) {
+        code = PetscOptionsSetValue(NULL, name, value);
+    }
+    return (int)code;
+}
+
+/* Whether a solver of any rank has asked for an option; the database has names without their hyphen. */
+int fm_option_used(const char *name) {
+    PetscBool is_used = PETSC_FALSE;
+    PetscOptionsUsed(NULL, name[0] == '-' ? name + 1 : name, &is_used);
+    int own = is_used ? 1 : 0, any = 0;
+    MPI_Allreduce(&own, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    return any;
+}
+
+/* ---- solvers ---- */
+
+typedef struct {
+    Mat matrix;
+    KSP ksp;
+    Vec right_side, solution, residual;
+    /* Of the iteration for complex symmetric matrices; NULL where PETSc iterates. */
+    Vec preconditioned, direction, image;
+    PetscInt own, first;
+    PetscReal tolerance;
+    int most;
+} fm_solver;
+
+void fm_solver_destroy(fm_solver *solver) {
+    if (solver == NULL) {
+        return;
+    }
+    KSPDestroy(&solver->ksp);
+    MatDestroy(&solver->matrix);
+    VecDestroy(&solver->right_side);
+    VecDestroy(&solver->solution);
+    VecDestroy(&solver->residual);
+    VecDestroy(&solver->preconditioned);
+    VecDestroy(&solver->direction);
+    VecDestroy(&solver->image);
+    free(solver);
+}
+
+/* Whether all ranks got through a part of the work that was each one's own: none may wait for one that did not. */
+static int agreed(PetscErrorCode code) {
+    int own = code != 0, any = 0;
+    MPI_Allreduce(&own, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    if (any) {
+        say(own ? "PETSc gave an error without a text" : "another rank failed");
+    }
+    return any;
+}
+
+#define TRY(call)                                                                                                              \
+    do {                                                                                                                       \
+        PetscErrorCode code = (call);                                                                                          \
+        if (code != 0) {                                                                                                       \
+            say("PETSc gave an error without a text");                                                                         \
+            return (int)code;                                                                                                  \
+        }                                                                                                                      \
+    } while (0)
+
+static int made(fm_solver *solver, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
+                double tolerance, int max_iterations, int symmetric) {
+    PetscInt own = solver->own;
+    if (count > (int64_t)PETSC_MAX_INT) {
+        say("more equations than this PETSc can number: it needs one configured with --with-64-bit-indices");
+        return 1;
+    }
+    TRY(MatCreate(PETSC_COMM_WORLD, &solver->matrix));
+    TRY(MatSetSizes(solver->matrix, own, own, (PetscInt)count, (PetscInt)count));
+    TRY(MatSetOptionsPrefix(solver->matrix, prefix));
+    TRY(MatSetType(solver->matrix, MATAIJ));
+    PetscInt *entries[2] = {NULL, NULL};
+    const int32_t *given[2] = {inside, outside};
+    for (int part = 0; part < 2; part++) {
+        TRY(PetscMalloc1(own + 1, &entries[part]));
+        for (PetscInt row = 0; row < own; row++) {
+            entries[part][row] = given[part][row];
+        }
+    }
+    TRY(MatSeqAIJSetPreallocation(solver->matrix, 0, entries[0]));
+    TRY(MatMPIAIJSetPreallocation(solver->matrix, 0, entries[0], 0, entries[1]));
+    TRY(PetscFree(entries[0]));
+    TRY(PetscFree(entries[1]));
+    TRY(MatSetOption(solver->matrix, MAT_SYMMETRIC, PETSC_TRUE));
+    TRY(MatSetOption(solver->matrix, MAT_SYMMETRY_ETERNAL, PETSC_TRUE));
+    TRY(MatGetOwnershipRange(solver->matrix, &solver->first, NULL));
+    TRY(MatCreateVecs(solver->matrix, &solver->solution, &solver->right_side));
+    TRY(VecDuplicate(solver->right_side, &solver->residual));
+    solver->tolerance = tolerance;
+    solver->most = max_iterations;
+    if (symmetric) {
+        TRY(VecDuplicate(solver->right_side, &solver->preconditioned));
+        TRY(VecDuplicate(solver->right_side, &solver->direction));
+        TRY(VecDuplicate(solver->right_side, &solver->image));
+    }
+    TRY(KSPCreate(PETSC_COMM_WORLD, &solver->ksp));
+    TRY(KSPSetOptionsPrefix(solver->ksp, prefix));
+    TRY(KSPSetTolerances(solver->ksp, tolerance, 0.0, PETSC_DEFAULT, max_iterations));
+    TRY(KSPSetFromOptions(solver->ksp));
+    return 0;
+}
+
+/* A solver for `count` equations, of which this rank owns `own`; `inside` and `outside` are the entries of each own row in
+ * the columns of this rank and in those of others; `symmetric` for the iteration of `cocg`. */
+int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
+                     double tolerance, int max_iterations, int symmetric, fm_solver **created) {
+    message[0] = 0;
+    fm_solver *solver = calloc(1, sizeof *solver);
+    *created = solver;
+    if (solver == NULL) {
+        say("no memory");
+        return 1;
+    }
+    solver->own = (PetscInt)own;
+    return made(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric);
+}
+
+/* The name of what KSPSolve ended with. */
+const char *fm_reason(int reason) { return KSPConvergedReasons[reason]; }
+
+/* Inserts values into the own rows; no rank waits for another. */
+static PetscErrorCode inserted(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
+    PetscInt longest = 0;
+    for (PetscInt row = 0; row < solver->own; row++) {
+        PetscInt length = (PetscInt)(starts[row + 1] - starts[row]);
+        longest = length > longest ? length : longest;
+    }
+    PetscInt *at = NULL;
+    TRY(PetscMalloc1(longest + 1, &at));
+    for (PetscInt row = 0; row < solver->own; row++) {
+        PetscInt length = (PetscInt)(starts[row + 1] - starts[row]), number = solver->first + row;
+        for (PetscInt k = 0; k < length; k++) {
+            at[k] = (PetscInt)columns[starts[row] + (uint32_t)k];
+        }
+        const PetscScalar *entries = (const PetscScalar *)(values + 2 * (size_t)starts[row]);
+        TRY(MatSetValues(solver->matrix, 1, &number, length, at, entries, INSERT_VALUES));
+    }
+    TRY(PetscFree(at));
+    return 0;
+}
+
+/* Takes values: entries of own row i are at starts[i] .. starts[i + 1], `columns` are numbers in the distributed matrix. */
+int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
+    message[0] = 0;
+    if (agreed(inserted(solver, starts, columns, values))) {
+        return 1;
+    }
+    TRY(MatAssemblyBegin(solver->matrix, MAT_FINAL_ASSEMBLY));
+    TRY(MatAssemblyEnd(solver->matrix, MAT_FINAL_ASSEMBLY));
+    TRY(KSPSetOperators(solver->ksp, solver->matrix, solver->matrix));
+    TRY(KSPSetUp(solver->ksp));
+    TRY(KSPSetUpOnBlocks(solver->ksp));
+    PC pc = NULL;
+    PCFailedReason reason = PC_NOERROR;
+    TRY(KSPGetPC(solver->ksp, &pc));
+    TRY(PCGetFailedReasonRank(pc, &reason));
+    int failed = reason != PC_NOERROR, any = 0;
+    MPI_Allreduce(&failed, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
+    if (any) {
+        say(failed ? PCFailedReasons[reason] : "the preconditioner of another rank failed");
+        return 1;
+    }
+    return 0;
+}
+
+/* Conjugate orthogonal conjugate gradients (van der Vorst and Melissen, IEEE Trans. Magn. 26, 1990) from the present solution:
+ * PETSc's own conjugate gradients for complex symmetric matrices end where the real part of p'Kp changes its sign. */
+static int cocg(fm_solver *solver, PetscReal target, PetscInt *done, KSPConvergedReason *reason) {
+    PC pc = NULL;
+    TRY(KSPGetPC(solver->ksp, &pc));
+    TRY(MatMult(solver->matrix, solver->solution, solver->residual));
+    TRY(VecAYPX(solver->residual, -1.0, solver->right_side));
+    PetscScalar rho = 1.0, before = 1.0, curvature = 1.0;
+    *reason = KSP_DIVERGED_ITS;
+    for (*done = 0; *done < solver->most; (*done)++) {
+        PetscReal size = 0.0;
+        TRY(VecNorm(solver->residual, NORM_2, &size));
+        if (size <= target) {
+            *reason = KSP_CONVERGED_RTOL;
+            return 0;
+        }
+        TRY(PCApply(pc, solver->residual, solver->preconditioned));
+        TRY(VecTDot(solver->residual, solver->preconditioned, &rho));
+        if (*done == 0) {
+            TRY(VecCopy(solver->preconditioned, solver->direction));
+        } else {
+            TRY(VecAYPX(solver->direction, rho / before, solver->preconditioned));
+        }
+        TRY(MatMult(solver->matrix, solver->direction, solver->image));
+        TRY(VecTDot(solver->direction, solver->image, &curvature));
+        if (rho == 0.0 || curvature == 0.0 || PetscIsInfOrNanScalar(rho / curvature)) {
+            *reason = KSP_DIVERGED_BREAKDOWN;
+            return 0;
+        }
+        TRY(VecAXPY(solver->solution, rho / curvature, solver->direction));
+        TRY(VecAXPY(solver->residual, -rho / curvature, solver->image));
+        before = rho;
+    }
+    return 0;
+}
+
+/* Solves from zero for the own rows of the right side, again from what was reached where the true relative residual has
+ * stayed above `tolerance`; overwrites the own rows of the solution. */
+int fm_solver_solve(fm_solver *solver, const double *right_side, double *solution, double tolerance, int *iterations,
+                    double *residual, int *reason) {
+    message[0] = 0;
+    /* The recurrence of an iteration and the true residual part by a few digits: a second attempt mends that, a third is rare. */
+    const int attempts = 3;
+    PetscScalar *at = NULL;
+    size_t bytes = 2 * sizeof(double) * (size_t)solver->own;
+    TRY(VecGetArray(solver->right_side, &at));
+    memcpy(at, right_side, bytes);
+    TRY(VecRestoreArray(solver->right_side, &at));
+    TRY(VecSet(solver->solution, 0.0));
+    PetscReal scale = 0.0, left = 0.0, before = PETSC_MAX_REAL;
+    TRY(VecNorm(solver->right_side, NORM_2, &scale));
+    *iterations = 0;
+    *residual = 0.0;
+    *reason = 0;
+    for (int attempt = 0; scale > 0.0 && attempt < attempts; attempt++) {
+        if (*iterations >= solver->most) {
+            break;
+        }
+        PetscInt done = 0;
+        KSPConvergedReason ended = KSP_CONVERGED_ITERATING;
+        if (solver->direction != NULL) {
+            TRY(cocg(solver, solver->tolerance * scale, &done, &ended));
+        } else {
+            TRY(KSPSetInitialGuessNonzero(solver->ksp, attempt > 0 ? PETSC_TRUE : PETSC_FALSE));
+            TRY(KSPSolve(solver->ksp, solver->right_side, solver->solution));
+            TRY(KSPGetIterationNumber(solver->ksp, &done));
+            TRY(KSPGetConvergedReason(solver->ksp, &ended));
+        }
+        *iterations += (int)done;
+        *reason = (int)ended;
+        TRY(MatMult(solver->matrix, solver->solution, solver->residual));
+        TRY(VecAYPX(solver->residual, -1.0, solver->right_side));
+        TRY(VecNorm(solver->residual, NORM_2, &left));
+        *residual = (double)(left / scale);
+        if (*residual <= tolerance || ended < 0 || !(left < 0.5 * before)) {
+            break;
+        }
+        before = left;
+    }
+    const PetscScalar *found = NULL;
+    TRY(VecGetArrayRead(solver->solution, &found));
+    memcpy(solution, found, bytes);
+    TRY(VecRestoreArrayRead(solver->solution, &found));
+    return 0;
+}

@@ -1,0 +1,224 @@
+//! The elastic system shared out among ranks: rows, factors and quality of each rank's own part.
+//!
+//! Several references may be in use at once, as when a remedy is tried; each has a *slot* with its matrix on every rank.
+//! Prescribed displacements, couplings and the mesh check stay with rank 0.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, CsrMatrix, DofMap, c64};
+use fluxmorph_geometry::quality::QualityReport;
+use fluxmorph_geometry::ranks::{
+    Communicator, DistributedMatrix, Krylov, Member, Order, Part, Preconditioning, RowLayout, Rows, Share,
+    Shared, SolverOptions, SubSolver, solution_of,
+};
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+
+use crate::body::Body;
+use crate::deform::bound;
+use crate::error::RemeshError;
+use crate::policy::StiffnessPolicy;
+use crate::solver::{MAX_ITERATIONS, TOLERANCE};
+
+/// The order to assemble and factor: slot, policy, places of the nodes.
+const FACTOR: u32 = 1;
+/// The order to solve: slot, right side.
+const SOLVE: u32 = 2;
+/// The order to forget a slot.
+const RELEASE: u32 = 3;
+/// The order to judge the elements that may move: places of the nodes.
+const QUALITY: u32 = 4;
+
+/// Unknowns up to which a distributed factor is taken.
+const LARGEST_DIRECT: usize = 400_000;
+
+/// The shared-out elastic system, as rank 0 holds it.
+#[derive(Debug)]
+pub(crate) struct DistributedElastic {
+    shared: Shared,
+    next: AtomicU64,
+    unknowns: usize,
+}
+
+impl DistributedElastic {
+    /// Shares a body out; every rank does.
+    pub(crate) fn new(
+        share: &Share,
+        (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
+        moving: &Arc<[ElementId]>,
+    ) -> Self {
+        let part = ElasticPart::new(share, (body, unknowns), moving);
+        let shared = share.team.share(Box::new(part));
+        Self { shared, next: AtomicU64::new(0), unknowns: unknowns.count() }
+    }
+
+    /// Has all ranks assemble and factor on a reference; the slot. Ranks that follow have none of their own.
+    ///
+    /// # Errors
+    /// [`RemeshError::Rank`].
+    pub(crate) fn factor(
+        &self,
+        reference: &Mesh,
+        policy: StiffnessPolicy,
+    ) -> Result<Option<u64>, RemeshError> {
+        if self.unknowns == 0 || self.shared.team().member() == Member::Follower {
+            return Ok(None);
+        }
+        let slot = self.next.fetch_add(1, Ordering::SeqCst);
+        let policy = StiffnessPolicy::ALL.iter().position(|&p| p == policy).expect("all are listed");
+        let mut numbers = vec![slot as f64, policy as f64];
+        numbers.extend_from_slice(reference.points().as_flattened());
+        if let Err(error) = self.shared.order(FACTOR, numbers) {
+            // Where it did not fail, it is kept.
+            self.release(slot);
+            return Err(error.into());
+        }
+        Ok(Some(slot))
+    }
+
+    /// Solves with the matrix of a slot.
+    ///
+    /// # Errors
+    /// [`RemeshError::Rank`], [`RemeshError::NotConverged`].
+    pub(crate) fn solve(&self, slot: u64, right_side: &[f64]) -> Result<Vec<f64>, RemeshError> {
+        if right_side.iter().all(|&b| b == 0.0) {
+            return Ok(right_side.to_vec());
+        }
+        let mut numbers = vec![slot as f64];
+        numbers.extend_from_slice(right_side);
+        let answer = self.shared.order(SOLVE, numbers)?;
+        let (solution, solved) = solution_of(&answer);
+        // The recurrence of the iteration and the true residual part in the last digits.
+        if solved.residual.is_nan() || solved.residual > 10.0 * TOLERANCE {
+            return Err(RemeshError::NotConverged {
+                unknowns: self.unknowns,
+                iterations: solved.iterations,
+                residual: solved.residual,
+                tolerance: TOLERANCE,
+            });
+        }
+        Ok(solution.iter().map(|x| x.re).collect())
+    }
+
+    /// Forgets the matrix of a slot.
+    pub(crate) fn release(&self, slot: u64) {
+        if !std::thread::panicking() {
+            // A rank that failed is told of by the next order that has an answer.
+            let _ = self.shared.order(RELEASE, vec![slot as f64]);
+        }
+    }
+
+    /// Quality of the elements that may move, every rank of its own; `None` at a rank that only follows.
+    ///
+    /// # Errors
+    /// [`RemeshError::Rank`].
+    pub(crate) fn quality(&self, mesh: &Mesh) -> Result<Option<QualityReport>, RemeshError> {
+        if self.shared.team().member() == Member::Follower {
+            return Ok(None);
+        }
+        let of_ranks = self.shared.order(QUALITY, mesh.points().as_flattened().to_vec())?;
+        let reports = of_ranks.chunks_exact(QualityReport::NUMBERS).map(QualityReport::of_numbers);
+        Ok(reports.reduce(QualityReport::with).map(|report| report.placed(mesh)))
+    }
+}
+
+/// What a rank holds of the elastic system.
+struct ElasticPart {
+    body: Arc<Body>,
+    layout: Arc<RowLayout>,
+    pattern: BlockPattern<3>,
+    group: BoundGroup<4>,
+    /// Positions in the body of the elements of `group`.
+    held: Vec<u32>,
+    /// Those of the elements that may move which the rank owns.
+    moving: Vec<ElementId>,
+    slots: BTreeMap<u64, DistributedMatrix>,
+}
+
+impl ElasticPart {
+    fn new(share: &Share, (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>), moving: &[ElementId]) -> Self {
+        let topology = &body.topology;
+        let owner = |node: NodeId| share.partition.owner_of(node);
+        let layout = Arc::new(RowLayout::new(unknowns, share.team.size(), share.team.rank(), owner));
+        let rows = DofMap::new(topology.node_count(), |node, c| {
+            share.owns(node) && unknowns.equation(node, c).is_some()
+        });
+        let touches = |e: ElementId| topology.tet(e).iter().any(|&n| share.owns(n));
+        let held: Vec<u32> =
+            (0..).zip(&body.elements).filter(|&(_, &e)| touches(e)).map(|(position, _)| position).collect();
+        let connectivity = held.iter().map(|&position| topology.tet(body.elements[position as usize]));
+        let (pattern, group) = bound(&rows, unknowns, connectivity.collect());
+        let moving = share.own_among(moving);
+        let (body, slots) = (Arc::clone(body), BTreeMap::new());
+        Self { body, layout, pattern, group, held, moving, slots }
+    }
+
+    fn factor(
+        &mut self,
+        slot: u64,
+        policy: StiffnessPolicy,
+        reference: &Mesh,
+        ranks: &dyn Communicator,
+    ) -> Result<(), String> {
+        let weighting = policy.weighting(reference, &self.body.elements);
+        let mut matrix = CsrMatrix::<f64>::zeros(self.pattern.structure());
+        self.pattern.assemble(&self.group, &mut matrix.values, |e| {
+            self.body.stiffness(reference, &weighting, self.held[e.index()] as usize)
+        });
+        let values: Vec<c64> = matrix.values.iter().map(|&v| c64::from(v)).collect();
+        let structure = Arc::clone(self.pattern.structure());
+        let rows = Rows { structure, layout: Arc::clone(&self.layout) };
+        let mut matrix = DistributedMatrix::new(rows, options(self.layout.count()));
+        matrix.set(&values, ranks)?;
+        self.slots.insert(slot, matrix);
+        Ok(())
+    }
+
+    fn mesh(&self, points: &[f64]) -> Result<Mesh, String> {
+        let points = points.as_chunks::<3>().0.to_vec();
+        Mesh::new(Arc::clone(&self.body.topology), points).map_err(|error| error.to_string())
+    }
+}
+
+/// How the elastic system is solved.
+fn options(unknowns: usize) -> SolverOptions {
+    let schwarz = Preconditioning::Schwarz { overlap: 2, sub_solver: SubSolver::Incomplete };
+    SolverOptions {
+        prefix: "elastic_",
+        krylov: Krylov::Cg,
+        preconditioning: if unknowns <= LARGEST_DIRECT { Preconditioning::Direct } else { schwarz },
+        tolerance: TOLERANCE,
+        max_iterations: MAX_ITERATIONS,
+    }
+}
+
+impl Part for ElasticPart {
+    fn work(&mut self, order: &Order, ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
+        match (order.kind, order.numbers.as_slice()) {
+            (FACTOR, [slot, policy, points @ ..]) => {
+                let policy = StiffnessPolicy::ALL[*policy as usize];
+                let reference = self.mesh(points)?;
+                self.factor(*slot as u64, policy, &reference, ranks)?;
+                Ok(Vec::new())
+            }
+            (SOLVE, [slot, right_side @ ..]) => {
+                let matrix = self.slots.get_mut(&(*slot as u64)).ok_or("there is no such slot")?;
+                let pairs: Vec<f64> = right_side.iter().flat_map(|&b| [b, 0.0]).collect();
+                matrix.solve(&pairs, ranks)
+            }
+            (RELEASE, [slot]) => {
+                self.slots.remove(&(*slot as u64));
+                Ok(Vec::new())
+            }
+            (QUALITY, points) => {
+                let points: Vec<Point> = points.as_chunks::<3>().0.to_vec();
+                let own = QualityReport::of_points(&self.body.topology, &points, &self.moving);
+                let numbers = own.map_or(Vec::new(), |report| report.numbers().to_vec());
+                Ok(ranks.gather(&numbers).concat())
+            }
+            (other, _) => Err(format!("an elastic body knows no order {other}")),
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! The program on several ranks as a user starts it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use fluxmorph_optimizer::journal::{Journal, Record};
+use fluxmorph_optimizer::output::{RunDirectory, system_disk};
+
+use crate::support;
+
+/// A meshed plate, coarse; a few evaluations with all fields, and no fresh mesh.
+pub(crate) const COARSE: [&str; 6] = [
+    "mesh.shield.refinement=0.3",
+    "mesh.shield.growth=2.5",
+    "mesh.shield.skin=[4e-4,1.2e-3,2.5e-3,5e-3]",
+    "optimizer.max_evaluations=6",
+    "output.verify_refinement=0",
+    "output.report=false",
+];
+
+/// `mpirun -n RANKS PROGRAM`, ready for the arguments; none for 0 ranks.
+pub(crate) fn ranks(count: usize, program: &Path) -> Command {
+    let mut command = match count {
+        0 => Command::new(program),
+        _ => {
+            let mut command = Command::new("mpirun");
+            command.args(["-n", &count.to_string()]).arg(program);
+            command
+        }
+    };
+    // More ranks than cores, and the first user of a container, are not what Open MPI expects.
+    command
+        .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
+        .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
+        .env("OMP_NUM_THREADS", "1")
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// The program itself on so many ranks.
+pub(crate) fn fluxmorph(count: usize) -> Command {
+    ranks(count, Path::new(env!("CARGO_BIN_EXE_fluxmorph")))
+}
+
+/// `fluxmorph COMMAND configs/NAME --out DIR` with overrides.
+pub(crate) fn on(count: usize, command: &str, name: &str, out: &Path, overrides: &[&str]) -> Command {
+    let mut program = fluxmorph(count);
+    program.arg(command).arg(support::repository("configs").join(name)).arg("--out").arg(out);
+    for setting in overrides {
+        program.args(["--set", setting]);
+    }
+    program
+}
+
+/// Exit code and standard error of an ended command.
+pub(crate) fn said(output: &Output) -> (Option<i32>, String) {
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Lets a command come to the end of its work: converged, done, or at a limit.
+#[track_caller]
+pub(crate) fn completed(command: &mut Command) {
+    let (code, said) = said(&command.output().expect("it starts"));
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {said}");
+}
+
+/// The evaluations of a run.
+pub(crate) fn records(directory: &Path) -> Vec<Record> {
+    let directory = RunDirectory::open(&system_disk(), directory).expect("a run directory");
+    Journal::read(&directory).expect("it is read").expect("there is one").records
+}
+
+/// `result.json` of a run.
+pub(crate) fn result(directory: &Path) -> serde_json::Value {
+    let text = std::fs::read_to_string(directory.join("result.json")).expect("written");
+    serde_json::from_str(&text).expect("it is JSON")
+}
+
+/// Objective and gradient of every evaluation agree to 1e-8, and there are as many.
+#[track_caller]
+pub(crate) fn assert_same(own: &Path, other: &Path) {
+    let (own, other) = (records(own), records(other));
+    assert_eq!(own.len(), other.len());
+    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+    for (a, b) in own.iter().zip(&other) {
+        let objective = (a.row.objective / b.row.objective - 1.0).abs();
+        let difference = norm(&mut a.gradient.iter().zip(&b.gradient).map(|(x, y)| x - y));
+        let gradient = difference / norm(&mut b.gradient.iter().copied());
+        let evaluation = a.row.evaluation;
+        assert!(objective < 1e-8 && gradient < 1e-8, "{evaluation}: {objective:e} and {gradient:e}");
+    }
+}
+
+/// A file of a run directory.
+pub(crate) fn field(directory: &Path, name: &str) -> PathBuf {
+    directory.join("fields").join(name)
+}

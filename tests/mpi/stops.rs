@@ -1,0 +1,68 @@
+//! Ranks that are killed, and signals to one of them: what was computed is kept, and the run goes on.
+
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Child, Command, Output};
+use std::time::{Duration, Instant};
+
+use crate::launch::{COARSE, assert_same, completed, fluxmorph, on, result, said};
+
+/// Far longer than any of these runs takes.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Starts a run, waits for its second evaluation, and sends a signal to one of its ranks, or without one to mpirun; how mpirun
+/// ended.
+fn stopped(out: &Path, rank: Option<usize>, signal: &str) -> Output {
+    let child = on(2, "run", "shield.toml", out, &COARSE).spawn().expect("it starts");
+    let begun = Instant::now();
+    let rows = || std::fs::read_to_string(out.join("history.csv")).map_or(0, |text| text.lines().count());
+    // A head and two rows.
+    while rows() < 3 {
+        assert!(begun.elapsed() < PATIENCE, "no second evaluation came");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let process = rank.map_or_else(|| child.id().to_string(), |rank| process_of(&child, rank));
+    let sent = Command::new("kill").args(["-s", signal, &process]).status().expect("kill is there");
+    assert!(sent.success());
+    child.wait_with_output().expect("it ends")
+}
+
+/// The process of a rank: the child of mpirun that was told so.
+fn process_of(mpirun: &Child, rank: usize) -> String {
+    let id = mpirun.id().to_string();
+    let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux has it");
+    let told = format!("OMPI_COMM_WORLD_RANK={rank}");
+    let is_it = |process: &&str| {
+        let environment = std::fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
+        environment.split(|&byte| byte == 0).any(|variable| variable == told.as_bytes())
+    };
+    children.split_whitespace().find(is_it).expect("mpirun has started it").to_owned()
+}
+
+#[test]
+fn a_run_one_of_whose_ranks_is_killed_goes_on_as_if_it_had_not_been() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let whole = folder.path().join("whole");
+    completed(&mut on(2, "run", "shield.toml", &whole, &COARSE));
+    for (killed, goes_on) in [(1, 2), (0, 3)] {
+        let out = folder.path().join(format!("killed{killed}"));
+        let ended = stopped(&out, Some(killed), "KILL");
+        assert!(!ended.status.success() && ended.status.signal().is_none(), "mpirun ends the others");
+        assert!(!out.join("result.json").exists());
+        completed(fluxmorph(goes_on).arg("resume").arg(&out));
+        assert_same(&out, &whole);
+        assert_eq!(result(&out)["evaluations"], result(&whole)["evaluations"]);
+    }
+}
+
+#[test]
+fn a_signal_to_one_rank_ends_all_with_the_state_saved() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (rank, signal) in [(Some(0), "TERM"), (Some(1), "TERM"), (None, "USR1")] {
+        let out = folder.path().join(format!("{rank:?}"));
+        let (code, said) = said(&stopped(&out, rank, signal));
+        assert_eq!(code, Some(143), "{said}");
+        assert_eq!(result(&out)["status"], "interrupted");
+        assert!(said.contains("fluxmorph resume"), "{said}");
+    }
+}

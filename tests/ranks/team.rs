@@ -1,0 +1,31 @@
+//! A team of threads, and a leader that does something with its problem.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::ranks::{Member, Team, threads};
+use fluxmorph_optimizer::session;
+use fluxmorph_optimizer::setup::{Purpose, Setup, set_up_watched};
+
+use crate::support;
+
+/// Has so many ranks set a shipped configuration up; what the first one makes of it.
+pub(crate) fn led<T: Send>(
+    size: usize,
+    name: &str,
+    overrides: &[&str],
+    lead: impl Fn(Setup) -> T + Sync,
+) -> T {
+    let led = threads::run(size, |ranks| {
+        let team = Team::new(ranks, Arc::default());
+        let (config, source) = support::config(name, overrides);
+        if team.member() == Member::Follower {
+            session::follow(&team, &config, &source, Purpose::Optimisation);
+            return None;
+        }
+        let setup = set_up_watched(&config, &source, Purpose::Optimisation, Some(&team), &mut |_| ());
+        let result = lead(setup.unwrap_or_else(|error| panic!("{error}")));
+        team.end();
+        Some(result)
+    });
+    led.into_iter().flatten().next().expect("the first rank leads")
+}
