@@ -9,10 +9,10 @@ use cpu_time::ProcessTime;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_optimizer::config::Config;
-use fluxmorph_optimizer::fields;
+use fluxmorph::config::Config;
+use fluxmorph::fields;
 use fluxmorph_optimizer::problem::{Analysis, Want};
-use fluxmorph_optimizer::setup::{Purpose, build_mesh, set_up};
+use fluxmorph::setup::{Purpose, build_mesh, set_up};
 use fluxmorph_optimizer::thickness::Thickness;
 
 /// Refinements of `shield_quick.toml`: 10k, 55k and 595k tetrahedra.

@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release --example gradient_check`
 
-use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Config;
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::Error;
+use fluxmorph::config::Config;
+use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify};
 
 pub(crate) fn main() -> Result<(), Error> {

@@ -2,11 +2,11 @@
 //!
 //! `cargo run --release --example optimisation`
 
-use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::{Config, Optimizer};
+use fluxmorph::Error;
+use fluxmorph::config::{Config, Optimizer};
 use fluxmorph_optimizer::driver::{Unrecorded, optimise};
-use fluxmorph_optimizer::observer::Console;
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::observer::Console;
+use fluxmorph::setup::{Purpose, set_up};
 
 pub(crate) fn main() -> Result<(), Error> {
     let (config, source) =
@@ -16,7 +16,7 @@ pub(crate) fn main() -> Result<(), Error> {
     // Seven evaluations are enough to see the frame; `session::run` would also write a run directory.
     let settings = Optimizer { max_evaluations: 7, ..config.optimizer };
     let mut console = Console::new(std::io::stdout());
-    let optimised = optimise(&mut problem, &settings, &mut console, &mut Unrecorded, &|| false)?;
+    let optimised = optimise(&mut problem, &settings.settings(), &mut console, &mut Unrecorded, &|| false)?;
 
     let ratio = optimised.best.objective / optimised.initial;
     println!("F/F0 = {ratio:.4} at evaluation {}", optimised.best.evaluation);

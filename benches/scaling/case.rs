@@ -4,14 +4,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use fluxmorph_optimizer::config::Config;
+use fluxmorph::config::Config;
 use fluxmorph_optimizer::driver::{self, Unrecorded};
-use fluxmorph_optimizer::fields;
+use fluxmorph::fields;
 use fluxmorph_optimizer::memory::Memory;
-use fluxmorph_optimizer::observer::Silent;
-use fluxmorph_optimizer::output::peak_memory_bytes;
+use fluxmorph::observer::Silent;
+use fluxmorph::output::peak_memory_bytes;
 use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_solver::adjoint;
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +124,7 @@ impl Case {
             Kind::Optimisation => {
                 let optimizer = &config.optimizer;
                 let (run, optimised) = timed(|| {
-                    driver::optimise(&mut problem, optimizer, &mut Silent, &mut Unrecorded, &|| false)
+                    driver::optimise(&mut problem, &optimizer.settings(), &mut Silent, &mut Unrecorded, &|| false)
                         .unwrap_or_else(|e| panic!("{e}"))
                 });
                 record.run = run;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use fluxmorph_fuzz::in_time;
 use fluxmorph_fuzz::mutation;
-use fluxmorph_optimizer::config::{Config, resolved_toml};
+use fluxmorph::config::{Config, resolved_toml};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target};
 
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));

@@ -7,7 +7,7 @@
 
 use fluxmorph_fuzz::in_time;
 use fluxmorph_fuzz::journal::sign;
-use fluxmorph_optimizer::journal::{Record, parse};
+use fluxmorph::journal::{Record, parse};
 use libfuzzer_sys::fuzz_target;
 
 /// Whether records are the same to the bit; numbers that are not finite have no equality of their own.

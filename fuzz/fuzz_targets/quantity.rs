@@ -3,7 +3,7 @@
 #![no_main]
 
 use fluxmorph_fuzz::in_time;
-use fluxmorph_optimizer::config::{Dimension, parse_quantity};
+use fluxmorph::config::{Dimension, parse_quantity};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));

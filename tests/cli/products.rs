@@ -39,7 +39,7 @@ fn every_template_passes_check_and_does_its_work() {
 
 #[test]
 fn the_mesh_of_the_template_belongs_to_its_geometry() {
-    let templates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/optimizer/templates");
+    let templates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/app/templates");
     let geometry = std::fs::read_to_string(templates.join("gmsh.geo")).expect("the geometry");
     let mesh = std::fs::read_to_string(templates.join("gmsh.msh")).expect("an ASCII mesh");
     assert!(mesh.starts_with("$MeshFormat\n4.1 0 8\n"));

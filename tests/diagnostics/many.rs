@@ -3,8 +3,8 @@
 use std::fs;
 use std::process::Command;
 
-use fluxmorph_optimizer::config::{Config, ConfigError, FaultReport};
-use fluxmorph_optimizer::diagnostics::{Style, render};
+use fluxmorph::config::{Config, ConfigError, FaultReport};
+use fluxmorph::diagnostics::{Style, render};
 
 use crate::case::repository;
 

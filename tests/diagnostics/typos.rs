@@ -5,8 +5,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_optimizer::config::{Config, ConfigError};
-use fluxmorph_optimizer::setup::build_mesh;
+use fluxmorph::config::{Config, ConfigError};
+use fluxmorph::setup::build_mesh;
 
 use crate::case::repository;
 

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::{Config, Source};
-use fluxmorph_optimizer::observer::Silent;
-use fluxmorph_optimizer::output::{Disk, OlderRun, RunResult};
-use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
+use fluxmorph::config::{Config, Source};
+use fluxmorph::observer::Silent;
+use fluxmorph::output::{Disk, OlderRun, RunResult};
+use fluxmorph::session::{self, Limits, Options, SavedRun};
 
 /// An iron block over a gap in a uniform field; its lower face moves.
 const BLOCK: &str = include_str!("block.toml");

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph_optimizer::journal;
+use fluxmorph::journal;
 use fluxmorph_optimizer::problem::Timings;
 use serde_json::Value;
 

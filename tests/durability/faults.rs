@@ -4,10 +4,10 @@
 use std::path::Path;
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::cli::ExitCode;
-use fluxmorph_optimizer::config::{Config, Source};
-use fluxmorph_optimizer::output::{OutputError, RunResult};
-use fluxmorph_optimizer::session::Limits;
+use fluxmorph::cli::ExitCode;
+use fluxmorph::config::{Config, Source};
+use fluxmorph::output::{OutputError, RunResult};
+use fluxmorph::session::Limits;
 use rayon::prelude::*;
 
 use crate::device::{FOLDER, block, constrained, resume, run, with_rounds};

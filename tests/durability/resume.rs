@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use fluxmorph_optimizer::config::{Config, Source};
-use fluxmorph_optimizer::journal;
-use fluxmorph_optimizer::output::Disk;
-use fluxmorph_optimizer::session::Limits;
+use fluxmorph::config::{Config, Source};
+use fluxmorph::journal;
+use fluxmorph::output::Disk;
+use fluxmorph::session::Limits;
 
 use crate::device::{FOLDER, block, constrained, resume, run, shipped, with_rounds};
 use crate::disk::SimulatedDisk;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use fluxmorph_geometry::io::read_vtu;
-use fluxmorph_optimizer::journal;
+use fluxmorph::journal;
 
 /// What the ends of logs may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

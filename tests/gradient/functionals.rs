@@ -2,9 +2,9 @@
 
 use std::io::Write;
 
-use fluxmorph_optimizer::config::Config;
+use fluxmorph::config::Config;
 use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::setup::{Purpose, set_up};
 
 use super::{MESHED, Settings, certify_all, check, wavy};
 use crate::support::repository;

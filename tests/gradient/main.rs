@@ -5,9 +5,9 @@ mod support;
 
 use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Config;
+use fluxmorph::config::Config;
 use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
 use fluxmorph_remesh::Moved;
 use support::{repository, setup};

@@ -1,7 +1,7 @@
 //! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
 
-use fluxmorph_optimizer::config::Config;
-use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
+use fluxmorph::config::Config;
+use fluxmorph::setup::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify_all};
 
 use crate::{MESHED, check, setup, wavy};

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use fluxmorph_optimizer::journal::{Journal, Record};
-use fluxmorph_optimizer::output::{RunDirectory, system_disk};
+use fluxmorph::journal::{Journal, Record};
+use fluxmorph::output::{RunDirectory, system_disk};
 
 use crate::support;
 

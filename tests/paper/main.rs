@@ -8,14 +8,14 @@
 mod support;
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Optimizer;
+use fluxmorph::config::Optimizer;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::fresh_mesh::{Gain, Shapes};
-use fluxmorph_optimizer::journal::Record;
-use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
+use fluxmorph::fresh_mesh::{Gain, Shapes};
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph::observer::{Evaluation, Silent};
+use fluxmorph::output::{ObjectiveResult, StopReason};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
-use fluxmorph_optimizer::setup::Setup;
+use fluxmorph::setup::Setup;
 use fluxmorph_solver::recovery;
 use support::{ShieldReference, config, relative_l2, setup};
 

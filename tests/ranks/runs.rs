@@ -5,11 +5,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph_geometry::ranks::{Member, Team, threads};
-use fluxmorph_optimizer::observer::Silent;
-use fluxmorph_optimizer::output::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph_optimizer::report::ReportedRun;
-use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
-use fluxmorph_optimizer::setup::Purpose;
+use fluxmorph::observer::Silent;
+use fluxmorph::output::{OlderRun, RunResult, StopReason, system_disk};
+use fluxmorph::report::ReportedRun;
+use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph::setup::Purpose;
 
 use crate::support;
 

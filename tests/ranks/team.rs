@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::ranks::{Member, Team, threads};
-use fluxmorph_optimizer::session;
-use fluxmorph_optimizer::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph::session;
+use fluxmorph::setup::{Purpose, Setup, set_up_watched};
 
 use crate::support;
 

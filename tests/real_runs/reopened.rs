@@ -66,7 +66,7 @@ impl Begun {
 fn a_damaged_journal_goes_on_with_what_is_whole_or_is_refused() {
     let run = begun("out");
     let whole = std::fs::read(run.journal()).expect("a journal");
-    let header = (0..whole.len()).find(|&n| fluxmorph_optimizer::journal::parse(&whole[..n]).is_ok());
+    let header = (0..whole.len()).find(|&n| fluxmorph::journal::parse(&whole[..n]).is_ok());
     let header = header.expect("a header");
     let restored = |bytes: &[u8]| std::fs::write(run.journal(), bytes).expect("written");
     restored(&[]);

@@ -139,7 +139,7 @@ fn written_at<'a>(config: &'a toml::Table, path: &str) -> Option<&'a toml::Value
 
 #[test]
 fn program_and_schema_agree() {
-    let document = fluxmorph_optimizer::schema::document();
+    let document = fluxmorph::schema::document();
     let validator = validator();
     let bases = bases::all();
     let mut random = Rng::with_seed(7);

@@ -1,6 +1,6 @@
 //! Valid configurations that the tests change: the shipped ones, and some that together write every table and key.
 
-use fluxmorph_optimizer::config::Config;
+use fluxmorph::config::Config;
 
 use crate::support::repository;
 

@@ -1,7 +1,7 @@
 //! The shipped schema and the page of keys are fresh, every example is right, and every shipped file names the schema.
 
-use fluxmorph_optimizer::config::Config;
-use fluxmorph_optimizer::schema;
+use fluxmorph::config::Config;
+use fluxmorph::schema;
 use serde_json::Value;
 
 use crate::bases;

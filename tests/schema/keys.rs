@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_optimizer::config::{Config, ConfigError, resolved_toml};
+use fluxmorph::config::{Config, ConfigError, resolved_toml};
 use serde_json::Value;
 
 use crate::places::{Step, all, schema_at, tables, value_at};
@@ -42,7 +42,7 @@ fn known(table: &toml::Table, path: &[Step]) -> Vec<String> {
 
 #[test]
 fn the_readers_ask_for_the_keys_of_the_schema_and_no_others() {
-    let document = fluxmorph_optimizer::schema::document();
+    let document = fluxmorph::schema::document();
     let mut asked: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (_, table) in bases::all() {
         for (path, name) in tables_of(&document, &table) {
@@ -77,7 +77,7 @@ fn with_key(table: &toml::Table, path: &[Step], key: &str, value: Option<toml::V
 
 #[test]
 fn a_key_with_its_default_is_a_key_left_out() {
-    let document = fluxmorph_optimizer::schema::document();
+    let document = fluxmorph::schema::document();
     let (mut compared, mut all_keys) = (BTreeSet::new(), BTreeSet::new());
     for (name, keys) in tables(&document) {
         let with_default = keys.iter().filter(|(_, property)| property.get("default").is_some());

@@ -1,6 +1,6 @@
 //! What the program and the schema say of one configuration.
 
-use fluxmorph_optimizer::config::{Config, ConfigError};
+use fluxmorph::config::{Config, ConfigError};
 use jsonschema::Validator;
 use serde_json::Value;
 
@@ -14,7 +14,7 @@ pub(crate) struct Verdict {
 
 /// The schema, ready to judge.
 pub(crate) fn validator() -> Validator {
-    jsonschema::draft202012::new(&fluxmorph_optimizer::schema::document()).expect("a valid schema")
+    jsonschema::draft202012::new(&fluxmorph::schema::document()).expect("a valid schema")
 }
 
 /// Judges one configuration by both.

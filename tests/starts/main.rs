@@ -9,13 +9,13 @@
 mod support;
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Optimizer;
+use fluxmorph::config::Optimizer;
 use fluxmorph_optimizer::driver::{Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
-use fluxmorph_optimizer::observer::Silent;
-use fluxmorph_optimizer::output::StopReason;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph::observer::Silent;
+use fluxmorph::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::setup::{Purpose, set_up};
 use support::setup;
 
 const MESHED: &str = "shield.toml";

@@ -5,8 +5,8 @@
 use std::path::PathBuf;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_optimizer::config::{Config, Source};
-use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
+use fluxmorph::config::{Config, Source};
+use fluxmorph::setup::{Purpose, Setup, set_up};
 
 /// A file of the repository.
 pub(crate) fn repository(path: &str) -> PathBuf {

@@ -6,7 +6,7 @@
 use fluxmorph_geometry::Mesh;
 use fluxmorph_remesh::RemeshError;
 
-use crate::algorithm::CONSTRAINT_TOLERANCE;
+use crate::nlopt::CONSTRAINT_TOLERANCE;
 use crate::error::Error;
 use crate::geometric;
 use crate::objective::Term;

@@ -1,27 +1,16 @@
-//! What can go wrong in a command, and its exit code.
-
-use std::path::PathBuf;
+//! What can go wrong in an optimisation.
 
 use fluxmorph_geometry::MeshError;
-use fluxmorph_geometry::ranks::RankError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
-use crate::cli::{ExitCode, InitError};
-use crate::config::ConfigError;
 use crate::design::Apart;
 use crate::geometric::GeometricError;
-use crate::journal::Mismatch;
-use crate::output::{DesignFileError, OutputError};
-use crate::sweep::SweepError;
 
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The configuration is wrong.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
     /// The mesh is wrong.
     #[error(transparent)]
     Mesh(#[from] MeshError),
@@ -55,18 +44,6 @@ pub enum Error {
     /// A shape cannot be taken over by another mesh.
     #[error(transparent)]
     Apart(#[from] Apart),
-    /// A file with a design is wrong.
-    #[error(transparent)]
-    Design(#[from] DesignFileError),
-    /// A file cannot be written or read.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-    /// A starting configuration cannot be written.
-    #[error(transparent)]
-    Init(#[from] InitError),
-    /// A sweep cannot be begun.
-    #[error(transparent)]
-    Sweep(#[from] SweepError),
     /// The optimisation method refuses or fails.
     #[error("the optimisation failed: {cause}")]
     Optimisation {
@@ -101,20 +78,6 @@ pub enum Error {
         /// What is needed, and what to do.
         expected: &'static str,
     },
-    /// The gradient does not match the objective.
-    #[error("the gradient certificate does not hold: {cause}")]
-    Certificate {
-        /// Which of its tests fails.
-        cause: String,
-    },
-    /// A journal belongs to another run.
-    #[error("the journal `{}` is not that of this run: {cause}", path.display())]
-    OtherRun {
-        /// The journal.
-        path: PathBuf,
-        /// The first difference.
-        cause: Mismatch,
-    },
     /// The run takes another way than its journal says.
     #[error(
         "evaluation {evaluation} of the journal does not answer what the optimisation asks for: {cause}; go on with the \
@@ -126,48 +89,15 @@ pub enum Error {
         /// What differs.
         cause: String,
     },
-    /// A run directory that there is nothing to go on with in.
-    #[error("`{}` cannot be resumed: {cause}", path.display())]
-    NotResumable {
-        /// The directory.
-        path: PathBuf,
-        /// Why, and what to do.
-        cause: String,
-    },
-    /// A run directory that there is nothing to report of.
-    #[error("there is no report of `{}`: {cause}", path.display())]
-    NoReport {
-        /// The directory.
-        path: PathBuf,
-        /// Why, and what to do.
-        cause: String,
-    },
     /// A signal came before there was anything to keep.
     #[error("interrupted before there was anything to keep")]
     Interrupted,
     /// A signal ended a run before an evaluation that its journal does not have.
     #[error("interrupted before anything new was computed")]
     InterruptedRun,
-    /// A rank could not write its piece of a field.
-    #[error("the fields cannot be written: {cause}")]
-    Pieces {
-        /// Which rank, and why.
-        cause: RankError,
-    },
-    /// The ranks of a parallel program cannot work together.
-    #[error("several ranks: {cause}")]
-    Ranks {
-        /// Why, and what to do.
-        cause: String,
-    },
-    /// A pool of threads cannot be made.
-    #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system said.
-        cause: String,
-    },
+    /// A recorder could not keep an evaluation, or give one back: the error of its own.
+    #[error(transparent)]
+    Recorder(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl Error {
@@ -175,68 +105,33 @@ impl Error {
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub(crate) fn unless(interrupted: &dyn Fn() -> bool) -> Result<(), Self> {
+    pub fn unless(interrupted: &dyn Fn() -> bool) -> Result<(), Self> {
         if interrupted() { Err(Self::Interrupted) } else { Ok(()) }
     }
 
-    /// Whether a run that ends with this error can be gone on with once its cause is mended.
-    pub fn leaves_a_run(&self) -> bool {
+    /// Whether a computation failed on sound input: a best design found before is still worth keeping.
+    pub fn is_numerical(&self) -> bool {
         match self {
-            Self::Output(error) => matches!(error, OutputError::Io { .. }),
-            Self::InterruptedRun | Self::Pieces { .. } => true,
-            other => other.exit_code() == ExitCode::Numerical,
-        }
-    }
-
-    /// The exit code of a command that fails with this error.
-    pub fn exit_code(&self) -> ExitCode {
-        match self {
-            Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
-                ExitCode::Files
-            }
-            Self::Output(_)
-            | Self::Pieces { .. }
-            | Self::Replay { .. }
-            | Self::Init(InitError::Exists { .. }) => ExitCode::Files,
-            // Of a motion; a file's or a generator's is a wrong mesh.
-            Self::Remesh(RemeshError::Mesh(MeshError::NotFinite { .. } | MeshError::Inverted { .. })) => {
-                ExitCode::Numerical
-            }
+            // A mesh that breaks under motion; a file's or a generator's is wrong input.
+            Self::Remesh(RemeshError::Mesh(MeshError::NotFinite { .. } | MeshError::Inverted { .. })) => true,
             Self::Mesh(mesh)
             | Self::Solver(SolverError::Mesh(mesh))
-            | Self::Remesh(RemeshError::Mesh(mesh)) => match mesh {
-                MeshError::Factorisation { .. } | MeshError::NotFiniteArray { .. } => ExitCode::Numerical,
-                MeshError::File { .. } => ExitCode::Files,
-                _ => ExitCode::Configuration,
-            },
-            Self::Solver(
+            | Self::Remesh(RemeshError::Mesh(mesh)) => {
+                matches!(mesh, MeshError::Factorisation { .. } | MeshError::NotFiniteArray { .. })
+            }
+            Self::Solver(error) => matches!(
+                error,
                 SolverError::NotConverged { .. }
-                | SolverError::NotFinite { .. }
-                | SolverError::OutOfRange { .. }
-                | SolverError::Rank(_),
-            )
-            | Self::Field { .. }
-            | Self::NotFinite { .. }
-            | Self::Remesh(
-                RemeshError::NotConverged { .. } | RemeshError::NotFinite { .. } | RemeshError::Rank(_),
-            )
-            | Self::Optimisation { .. }
-            | Self::Certificate { .. } => ExitCode::Numerical,
-            Self::Constraint { .. }
-            | Self::OtherRun { .. }
-            | Self::NotResumable { .. }
-            | Self::NoReport { .. }
-            | Self::DesignUnreached { .. }
-            | Self::FirstDesign { .. }
-            | Self::Apart(_)
-            | Self::Config(_)
-            | Self::Solver(_)
-            | Self::Remesh(_)
-            | Self::Geometric(_)
-            | Self::Design(_) => ExitCode::Configuration,
-            Self::Sweep(error) => error.exit_code(),
-            Self::Threads { .. } | Self::Ranks { .. } | Self::Init(_) => ExitCode::Usage,
-            Self::Interrupted | Self::InterruptedRun => ExitCode::Interrupted,
+                    | SolverError::NotFinite { .. }
+                    | SolverError::OutOfRange { .. }
+                    | SolverError::Rank(_)
+            ),
+            Self::Remesh(error) => matches!(
+                error,
+                RemeshError::NotConverged { .. } | RemeshError::NotFinite { .. } | RemeshError::Rank(_)
+            ),
+            Self::Field { .. } | Self::NotFinite { .. } | Self::Optimisation { .. } => true,
+            _ => false,
         }
     }
 }

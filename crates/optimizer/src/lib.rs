@@ -1,37 +1,24 @@
-//! Everything above field and mesh: the configuration, the files, the optimisation and the command line.
+//! The optimisation of a shape: design variables, objective and constraints as one function with its exact gradient, and
+//! NLopt's methods driven over it.
+//!
+//! It composes [`fluxmorph_solver`] and [`fluxmorph_remesh`]. What a person sees is not here: configuration keys, files,
+//! exit codes and the terminal belong to the application.
 
-pub mod algorithm;
 mod approach;
-pub mod bobyqa;
-pub mod cli;
-pub mod config;
 pub mod constraint;
 pub mod design;
-pub mod diagnostics;
 pub mod driver;
 mod error;
-mod exports;
-pub mod fields;
-mod finite;
-pub mod fresh_mesh;
+pub mod finite;
 pub mod geometric;
-pub mod journal;
-mod lap;
+pub mod lap;
 pub mod memory;
 pub mod memory_estimate;
-mod memory_limit;
-pub mod morph;
+pub mod nlopt;
 pub mod objective;
-pub mod observer;
-pub mod output;
 pub mod problem;
-pub mod report;
 pub mod rounds;
-pub mod schema;
-pub mod session;
-pub mod setup;
 pub mod stage;
-pub mod sweep;
 pub mod thickness;
 pub mod verify;
 

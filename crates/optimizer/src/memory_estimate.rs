@@ -10,7 +10,6 @@ use fluxmorph_solver::FieldModel;
 use fluxmorph_solver::Order;
 use fluxmorph_solver::linear::{Method, Reuse, TWO_LEVELS_FROM};
 
-use crate::config::Config;
 use crate::problem::Problem;
 
 /// The program itself, its libraries and the stacks of its threads.
@@ -110,20 +109,9 @@ pub fn of_evaluation(problem: &Problem) -> usize {
     PROCESS + Evaluation::of(problem).bytes()
 }
 
-/// Bytes that the process holds at the peak of a run, about: its evaluations, and the check of its result on a fresh mesh
-/// where `config` asks for one.
-pub fn of_run(config: &Config, problem: &Problem) -> usize {
-    of_evaluation(problem).max(of_fresh_mesh(config, problem).unwrap_or(0))
-}
-
-/// Bytes that the process holds at the peak of the check on a fresh mesh, about; `None` where there is none to be made.
-pub fn of_fresh_mesh(config: &Config, problem: &Problem) -> Option<usize> {
-    let factor = config.output.verify_refinement;
-    if factor == 0.0 || problem.shape.is_none() || problem.objective.is_none() {
-        return None;
-    }
-    let fresh = config.mesh.refined(factor)?.tet_count()?;
-    let growth = fresh as f64 / config.mesh.tet_count()?.max(1) as f64;
+/// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the
+/// problem's own mesh and patterns are still held, about.
+pub fn of_other_mesh(problem: &Problem, growth: f64) -> usize {
     let held = problem.original.topology().tets().len() * HELD_BY_SETUP;
-    Some(PROCESS + held + Evaluation::of(problem).grown(problem, growth))
+    PROCESS + held + Evaluation::of(problem).grown(problem, growth)
 }

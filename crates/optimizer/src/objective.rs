@@ -2,7 +2,14 @@
 
 use fluxmorph_solver::Functional;
 
-pub use crate::config::Goal;
+/// Which way is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// The smaller value.
+    Minimise,
+    /// The larger value.
+    Maximise,
+}
 
 /// One functional on one or several states.
 #[derive(Clone, Debug)]

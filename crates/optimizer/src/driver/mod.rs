@@ -19,22 +19,25 @@
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or while evaluations are
 //!   told again: then there is nothing new to keep.
 
+mod observer;
+mod record;
 mod run;
+mod settings;
+mod stop_reason;
 mod trust;
 
 use fluxmorph_remesh::Rung;
 
-use crate::algorithm::{self, Ending, Minimisation, Outcome};
-use crate::cli::ExitCode;
-use crate::config::Optimizer;
+use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::journal::Record;
-use crate::observer::Observer;
-use crate::output::StopReason;
 use crate::problem::{Analysis, Problem, Timings};
 use crate::rounds::{RoundEvent, RoundKind};
+pub use observer::{Observer, Silent};
+pub use record::{Evaluation, Record, column, hash_points, reference_hash};
 use run::Run;
+pub use settings::Settings;
+pub use stop_reason::StopReason;
 use trust::TrustRegion;
 
 /// How much of the box is left after a design in it was refused and nothing was gained.
@@ -150,7 +153,7 @@ enum Stop {
 /// If the problem has no shape or no objective.
 pub fn optimise(
     problem: &mut Problem,
-    settings: &Optimizer,
+    settings: &Settings,
     observer: &mut dyn Observer,
     recorder: &mut dyn Recorder,
     interrupted: &dyn Fn() -> bool,
@@ -178,7 +181,7 @@ pub fn optimise(
                 run.observer.warning(&error.to_string());
                 break StopReason::MeshLimit;
             }
-            Err(error) if run.best.is_some() && error.exit_code() == ExitCode::Numerical => {
+            Err(error) if run.best.is_some() && error.is_numerical() => {
                 run.observer.warning(&error.to_string());
                 break StopReason::NumericalFailure;
             }
@@ -203,7 +206,7 @@ struct Search {
 
 impl Search {
     /// Runs the method once in the box, and decides what follows; a reason where nothing does.
-    fn once(&mut self, run: &mut Run<'_>, settings: &Optimizer) -> Result<Option<StopReason>, Error> {
+    fn once(&mut self, run: &mut Run<'_>, settings: &Settings) -> Result<Option<StopReason>, Error> {
         let [lower, upper] = self.trust.bounds(run.shape());
         let minimisation = Minimisation {
             algorithm: settings.algorithm,
@@ -216,7 +219,7 @@ impl Search {
         let evaluations = run.evaluations;
         let before =
             run.best.as_ref().filter(|_| !run.best_is_stale).map(|best| (best.violation, best.objective));
-        let outcome = algorithm::minimise(&minimisation, &run.centre(), |p| run.evaluate(p));
+        let outcome = minimise(&minimisation, &run.centre(), |p| run.evaluate(p));
         let gain = LEAST_GAIN.max(settings.ftol_rel);
         let gained = run.best.as_ref().is_some_and(|best| match before {
             None => best.evaluation > evaluations,
@@ -259,7 +262,7 @@ impl Search {
             Outcome::Failed(cause) => Err(Error::Optimisation { cause }),
             Outcome::Interrupted(Stop::Limit(reason)) => Ok(Some(reason)),
             Outcome::Interrupted(Stop::Error(error))
-                if run.best.is_some() && error.exit_code() == ExitCode::Numerical =>
+                if run.best.is_some() && error.is_numerical() =>
             {
                 run.observer.warning(&error.to_string());
                 Ok(Some(StopReason::NumericalFailure))
@@ -286,13 +289,13 @@ impl Search {
         self.renewals += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
         run.observer.warning(&format!(
-            "the method's first step changed the objective by less than optimizer.ftol_rel: it goes on with {:.0e}",
+            "the method's first step changed the objective by less than its relative tolerance: continuing with {:.0e}",
             self.ftol_rel
         ));
     }
 
     /// The best mesh becomes the reference, and the box is laid around the best design.
-    fn next_round(&mut self, run: &mut Run<'_>, settings: &Optimizer, cause: &str) -> Result<(), Error> {
+    fn next_round(&mut self, run: &mut Run<'_>, settings: &Settings, cause: &str) -> Result<(), Error> {
         run.begin_round()?;
         // What a box shrank to is doubled with every gain.
         let scale = (self.trust.scale / SHRINK).min(1.0);
@@ -308,7 +311,7 @@ impl Search {
     fn climb(
         &mut self,
         run: &mut Run<'_>,
-        settings: &Optimizer,
+        settings: &Settings,
         gained: bool,
         cause: &str,
         wanted: &[f64],
@@ -341,8 +344,8 @@ impl Search {
         };
         let Some((motion, rescued, rung)) = remedy else {
             let exhausted = match run.shape().limits.rounds {
-                0 => "and remesh.rounds = 0 allows no other reference".to_owned(),
-                rounds if !run.has_rounds_left() => format!("and all of remesh.rounds = {rounds} are used"),
+                0 => "and no other reference mesh is allowed (rounds = 0)".to_owned(),
+                rounds if !run.has_rounds_left() => format!("and all {rounds} rounds are used"),
                 _ => "and no remedy is left".to_owned(),
             };
             run.observer.warning(&format!("{cause}, {exhausted}: the mesh carries the design no further"));

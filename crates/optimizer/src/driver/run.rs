@@ -8,16 +8,12 @@ use std::time::Instant;
 use fluxmorph_geometry::ElementId;
 use fluxmorph_remesh::{Moved, RemeshError};
 
-use super::{Optimised, Recorder, Stop};
-use crate::algorithm::{CONSTRAINT_TOLERANCE, Sample};
-use crate::config::Optimizer;
+use super::{Evaluation, Observer, Optimised, Record, Recorder, Settings, Stop, StopReason, column, reference_hash};
+use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::journal::{Record, reference_hash};
 use crate::memory::Memory;
 use crate::objective::Goal;
-use crate::observer::{Evaluation, Observer, column};
-use crate::output::{RunStatus, StopReason};
 use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Want};
 use crate::rounds::RoundEvent;
 use crate::stage::Stage;
@@ -73,7 +69,7 @@ pub(super) struct BestSoFar {
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
     goal: Goal,
-    settings: &'a Optimizer,
+    settings: &'a Settings,
     /// What the linear solvers remember of the designs before: which methods work.
     memory: Memory,
     pub(super) observer: &'a mut dyn Observer,
@@ -101,7 +97,7 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     pub(super) fn new(
         problem: &'a mut Problem,
-        settings: &'a Optimizer,
+        settings: &'a Settings,
         observer: &'a mut dyn Observer,
         recorder: &'a mut dyn Recorder,
         interrupted: &'a dyn Fn() -> bool,
@@ -263,7 +259,7 @@ impl<'a> Run<'a> {
             moved.inversion.element.filter(|_| share > limits.inversion_share && limits.rounds > 0)
         {
             return Err(refused(format!(
-                "a design would go {:.0} % of the way to inverting element {element}, beyond remesh.inversion_share = {}",
+                "a design would go {:.0} % of the way to inverting element {element}, beyond the allowed share of {}",
                 100.0 * share,
                 limits.inversion_share
             )));
@@ -272,7 +268,7 @@ impl<'a> Run<'a> {
             let quality = self.problem.quality(&moved.mesh);
             if quality.worst < limits.least_quality {
                 return Err(refused(format!(
-                    "element {} would have the quality {:.4e}, below the least of {:.4e} (optimizer.minimum_quality)",
+                    "element {} would have the quality {:.4e}, below the minimum of {:.4e}",
                     quality.worst_element, quality.worst, limits.least_quality
                 )));
             }
@@ -437,9 +433,10 @@ impl<'a> Run<'a> {
                 best.violation
             ));
         }
-        let stop_reason = match stop_reason.status() {
-            RunStatus::Converged if best.violation > 0.0 => StopReason::Infeasible,
-            _ => stop_reason,
+        let stop_reason = if stop_reason.is_converged() && best.violation > 0.0 {
+            StopReason::Infeasible
+        } else {
+            stop_reason
         };
         Ok(Optimised {
             stop_reason,

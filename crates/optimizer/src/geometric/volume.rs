@@ -192,51 +192,7 @@ fn normal_axis(vertices: [Point; 3]) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{shield, taylor, wavy};
     use super::*;
-
-    const MESHED: [&str; 2] = ["regions.plate.model=\"volume\"", "remesh.region=[\"plate\", \"remesh\"]"];
-
-    fn volume(setup: &crate::setup::Setup) -> Volume {
-        let problem = &setup.problem;
-        let surface = problem.states[0].conductors().first().map(|plate| plate.surface.as_slice());
-        Volume::new(&problem.original, &setup.full_mesh, "plate", surface).expect("a plate has a volume")
-    }
-
-    #[test]
-    fn a_quarter_plate_has_its_volume_and_grows_with_its_face() {
-        for overrides in [&[][..], &MESHED] {
-            let setup = shield(overrides);
-            let (problem, plate) = (&setup.problem, volume(&setup));
-            let shape = problem.shape.as_ref().expect("a shape");
-            let uniform = vec![3e-3; shape.surface.variable_count()];
-            let mesh = problem.moved(&uniform).expect("inside the bounds").mesh;
-            let (value, gradient) = plate.evaluate(&mesh, shape).expect("a direct solve");
-            // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
-            assert!((value - 0.12 * 0.24 * 0.013).abs() < 1e-12 * value, "{value}");
-            let swept: f64 = gradient.iter().sum();
-            assert!((swept - 0.12 * 0.24).abs() < 1e-12, "{swept}");
-            let mass = plate.with_density(7850.0).value(&mesh);
-            assert!((mass - 7850.0 * value).abs() < 1e-12 * mass);
-        }
-    }
-
-    #[test]
-    fn the_gradient_holds_in_both_models_and_both_agree() {
-        let values = [&[][..], &MESHED].map(|overrides| {
-            let setup = shield(overrides);
-            let (problem, plate) = (&setup.problem, volume(&setup));
-            let shape = problem.shape.as_ref().expect("a shape");
-            let at = |p: &[f64]| {
-                let mesh = problem.moved(p).expect("inside the bounds").mesh;
-                plate.evaluate(&mesh, shape).expect("a direct solve")
-            };
-            taylor(at, &wavy(problem), 1e-3);
-            at(&wavy(problem)).0
-        });
-        // The same triangles bound both.
-        assert!((values[0] - values[1]).abs() < 1e-12 * values[0], "{values:?}");
-    }
 
     #[test]
     fn the_flux_through_a_triangle_has_its_derivative() {

@@ -5,10 +5,9 @@ use std::time::Instant;
 use fluxmorph_remesh::Motion;
 
 use super::{BestSoFar, Field, Run};
-use crate::algorithm::Sample;
-use crate::driver::{Best, Stop};
+use crate::nlopt::Sample;
+use crate::driver::{Best, Record, Stop, reference_hash};
 use crate::error::Error;
-use crate::journal::{Record, reference_hash};
 use crate::memory::Memory;
 use crate::problem::Want;
 

@@ -1,0 +1,101 @@
+//! What a look at the sizes tells before anything is solved: what is allowed, and yet seldom meant.
+//!
+//! Does not live here: what is wrong (`setup`), and the audit of skin depths (`fluxmorph_solver::audit`).
+
+use fluxmorph_geometry::tet4::{norm, sub};
+
+use crate::config::{Coil, CoilShape, Config, ElementOrder, MeshConfig};
+use crate::setup::Setup;
+
+/// Worst quality (Eq. 4) below which a mesh from a file is better made again. Generated meshes are layered on purpose, and
+/// move along their layers.
+const POOR: f64 = 0.05;
+
+/// Share of the mesh's size below which a coil looks like one in another unit.
+const TINY: f64 = 1e-2;
+
+/// Sentences for what looks unlike what is meant; none for most configurations.
+pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
+    let [low, high] = setup.full_mesh.bounding_box();
+    let size = norm(sub(high, low));
+    let mut all = Vec::new();
+    let is_file = matches!(config.mesh, MeshConfig::File { .. });
+    let has_field = !config.coils.is_empty() || config.objective.is_some();
+    if is_file && has_field && config.analysis.order == ElementOrder::Linear {
+        all.push(
+            "the elements are linear: B is constant in each of them, and on a mesh that was not made for that it may be far \
+             off; compare `fluxmorph solve` with analysis.order = 2"
+                .to_owned(),
+        );
+    }
+    let worst = setup.problem.quality(&setup.problem.original).worst;
+    if is_file && worst < POOR {
+        all.push(format!(
+            "the worst element has a quality of {worst:.4}; below {POOR} a mesh from a file is better made again"
+        ));
+    }
+    all.extend(config.coils.iter().filter_map(|coil| {
+        let extent = widest(coil)?;
+        (extent < TINY * size).then(|| {
+            format!(
+                "the coil `{}` is {extent} m wide in a mesh of {size:.4} m: check its sizes and the mesh's unit",
+                coil.name
+            )
+        })
+    }));
+    if let Some(design) = &config.design {
+        let lengths = [
+            ("lower", Some(-design.lower)),
+            ("upper", Some(design.upper)),
+            ("filter_radius", design.filter_radius),
+        ];
+        for (key, length) in lengths {
+            if let Some(length) = length.filter(|length| *length > size) {
+                all.push(format!(
+                    "design.{key} is {length} m, more than the whole mesh ({size:.4} m): a number without unit is in metres"
+                ));
+            }
+        }
+    }
+    all
+}
+
+/// Largest width of an analytic coil [m].
+fn widest(coil: &Coil) -> Option<f64> {
+    match &coil.shape {
+        CoilShape::Racetrack(c) => Some(2.0 * (c.half_window[0].max(c.half_window[1]) + c.width)),
+        CoilShape::Rectangular(c) => Some(2.0 * (c.half_window[0].max(c.half_window[1]) + c.width)),
+        CoilShape::Circular(c) => Some(2.0 * (c.radius + c.width)),
+        CoilShape::Region(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::setup::{Purpose, set_up};
+
+    fn of(configuration: &str, overrides: &[&str]) -> Vec<String> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(configuration);
+        let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+        let (config, source) = Config::from_file(&path, &overrides).expect("shipped");
+        let setup = set_up(&config, &source, Purpose::Inspection).expect("sound");
+        advice(&config, &setup)
+    }
+
+    #[test]
+    fn shipped_devices_are_as_meant_and_sizes_without_units_are_told() {
+        assert_eq!(of("shield_quick.toml", &[]), Vec::<String>::new());
+        let told = of("shield_quick.toml", &["design.upper=10", "remesh.rounds=50"]);
+        assert!(told.len() == 1 && told[0].contains("design.upper is 10 m"), "{told:?}");
+    }
+
+    #[test]
+    fn linear_elements_and_poor_ones_of_a_file_are_told() {
+        let told = of("inductor.toml", &["analysis.order=1"]);
+        assert!(told.iter().any(|line| line.contains("analysis.order = 2")), "{told:?}");
+        assert!(!of("inductor.toml", &[]).iter().any(|line| line.contains("analysis.order = 2")));
+    }
+}

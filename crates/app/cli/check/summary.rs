@@ -1,0 +1,265 @@
+//! What `check` finds: the configuration as it is understood, and what the mesh and the problem are.
+//!
+//! Serialised as it stands by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
+
+use fluxmorph_geometry::tet4::{area_vector, norm, volume};
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_solver::FieldModel;
+use serde::Serialize;
+
+use super::advice::advice;
+use crate::config::{
+    Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
+    Remesh, Source,
+};
+use crate::error::Error;
+use crate::fresh_mesh;
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use crate::memory_limit;
+use crate::morph::{self, MotionSummary};
+use crate::output::OlderRun;
+use crate::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph_optimizer::stage::Told;
+
+/// What `check` found.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary<'a> {
+    pub(super) title: &'a str,
+    /// The generator of the mesh, or `file`.
+    pub(super) mesh_origin: &'static str,
+    /// The file of the mesh and the unit of its coordinates; `None` for a generated mesh.
+    pub(super) mesh_file: Option<MeshFileSummary>,
+    /// What the file asks for.
+    pub(super) field_problem: FieldProblem,
+    pub(super) frequencies_hz: &'a [f64],
+    /// Polynomial degree of the elements.
+    pub(super) order: u8,
+    pub(super) nodes: usize,
+    pub(super) tets: usize,
+    pub(super) unknowns: usize,
+    pub(super) elastic_equations: usize,
+    pub(super) design_variables: usize,
+    pub(super) bounding_box_m: [[f64; 3]; 2],
+    pub(super) regions: Vec<RegionSummary>,
+    pub(super) surfaces: Vec<SurfaceSummary>,
+    pub(super) quality: QualitySummary,
+    pub(super) skin: Vec<SkinSummary>,
+    pub(super) motions: Vec<MotionSummary>,
+    /// The method of each state's linear solver.
+    pub(super) linear_solvers: Vec<String>,
+    pub(super) coils: &'a [Coil],
+    pub(super) boundaries: &'a Boundaries,
+    pub(super) objective: Option<&'a Objective>,
+    /// Unit of the objective in SI; `None` where its terms have several.
+    pub(super) objective_unit: Option<&'static str>,
+    pub(super) constraints: &'a [Constraint],
+    pub(super) design: Option<&'a Design>,
+    pub(super) remesh: Option<&'a Remesh>,
+    pub(super) optimizer: &'a Optimizer,
+    pub(super) probes: &'a [Probe],
+    pub(super) output_directory: String,
+    pub(super) memory_estimate_bytes: usize,
+    pub(super) warnings: Vec<String>,
+}
+
+/// Whether there is a field to be computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum FieldProblem {
+    /// Yes.
+    Given,
+    /// No: only the mesh moves.
+    None,
+}
+
+/// The file that the mesh was read from.
+#[derive(Debug, Serialize)]
+pub(super) struct MeshFileSummary {
+    pub(super) path: String,
+    pub(super) unit: &'static str,
+}
+
+/// One region of the mesh.
+#[derive(Debug, Serialize)]
+pub(super) struct RegionSummary {
+    pub(super) name: String,
+    pub(super) tets: usize,
+    pub(super) volume_m3: f64,
+    pub(super) material: String,
+    pub(super) model: &'static str,
+}
+
+/// One named surface.
+#[derive(Debug, Serialize)]
+pub(super) struct SurfaceSummary {
+    pub(super) name: String,
+    pub(super) triangles: usize,
+    pub(super) area_m2: f64,
+}
+
+/// Quality of the elements that may move, or of all.
+#[derive(Debug, Serialize)]
+pub(super) struct QualitySummary {
+    pub(super) of: &'static str,
+    pub(super) worst: f64,
+    pub(super) worst_element: u32,
+    pub(super) worst_at_m: [f64; 3],
+    pub(super) up_to_0_3: f64,
+    pub(super) from_0_3_to_0_6: f64,
+    pub(super) from_0_6: f64,
+}
+
+/// One conductor.
+#[derive(Debug, Serialize)]
+pub(super) struct SkinSummary {
+    pub(super) region: String,
+    pub(super) model: &'static str,
+    pub(super) skin_depth_m: f64,
+    pub(super) median_elements_per_skin_depth: f64,
+    pub(super) least_elements_per_skin_depth: f64,
+    pub(super) thickness_in_skin_depths: f64,
+}
+
+fn model_name(model: RegionModel) -> &'static str {
+    match model {
+        RegionModel::Volume => "volume",
+        RegionModel::Impedance => "impedance",
+    }
+}
+
+/// Looks at a configuration; `told` hears of every stage as it begins.
+///
+/// # Errors
+/// When the configuration or the mesh is wrong.
+pub(super) fn summary<'a>(
+    config: &'a Config,
+    source: &Source,
+    older: OlderRun,
+    told: Told<'_>,
+) -> Result<Summary<'a>, Error> {
+    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, None, told)?;
+    memory_limit::check_problem(of_evaluation(&setup.problem), source, older)?;
+    let motions = morph::inspected(config, source)?;
+    let mesh = &setup.full_mesh;
+    let problem = &setup.problem;
+    let skin = setup
+        .audits
+        .iter()
+        .map(|audited| SkinSummary {
+            region: audited.audit.region.clone(),
+            model: model_name(audited.model),
+            skin_depth_m: audited.audit.skin_depth,
+            median_elements_per_skin_depth: audited.audit.median_elements_per_skin_depth,
+            least_elements_per_skin_depth: audited.audit.least_elements_per_skin_depth,
+            thickness_in_skin_depths: audited.audit.thickness_in_skin_depths,
+        })
+        .collect();
+    let reference = problem.original.topology();
+    let mut warnings = advice(config, &setup);
+    warnings.splice(0..0, setup.warnings.iter().cloned());
+    Ok(Summary {
+        title: &config.title,
+        mesh_origin: origin(&config.mesh),
+        mesh_file: match &config.mesh {
+            MeshConfig::File { path, unit } => {
+                Some(MeshFileSummary { path: path.display().to_string(), unit: unit.name() })
+            }
+            _ => None,
+        },
+        field_problem: field_problem(config),
+        frequencies_hz: config.analysis.frequencies(),
+        order: config.analysis.order.into(),
+        nodes: reference.node_count(),
+        tets: reference.tets().len(),
+        unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
+        elastic_equations: problem.shape.as_ref().map_or(0, |shape| shape.motion.map().equation_count()),
+        design_variables: problem.shape.as_ref().map_or(0, |shape| shape.surface.variable_count()),
+        bounding_box_m: mesh.bounding_box(),
+        regions: regions(config, mesh),
+        surfaces: surfaces(mesh)?,
+        quality: quality(&setup),
+        skin,
+        motions,
+        linear_solvers: problem.states.iter().map(FieldModel::method_name).collect(),
+        coils: &config.coils,
+        boundaries: &config.boundaries,
+        objective: config.objective.as_ref(),
+        objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
+        constraints: &config.constraints,
+        design: config.design.as_ref(),
+        remesh: config.remesh.as_ref(),
+        optimizer: &config.optimizer,
+        probes: &config.probes,
+        output_directory: config.output.directory.display().to_string(),
+        memory_estimate_bytes: of_evaluation(problem).max(fresh_mesh::memory_estimate(config, problem).unwrap_or(0)),
+        warnings,
+    })
+}
+
+fn origin(mesh: &MeshConfig) -> &'static str {
+    match mesh {
+        MeshConfig::Shield(_) => "shield",
+        MeshConfig::Block(_) => "block",
+        MeshConfig::Boxes(_) => "boxes",
+        MeshConfig::Sphere(_) => "sphere",
+        MeshConfig::File { .. } => "file",
+    }
+}
+
+/// With [morph] a field problem need not be there.
+fn field_problem(config: &Config) -> FieldProblem {
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
+    let conditions = !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some();
+    let is_given = conditions || !config.coils.is_empty() || config.objective.is_some();
+    if config.morph.is_some() && !is_given { FieldProblem::None } else { FieldProblem::Given }
+}
+
+fn regions(config: &Config, mesh: &Mesh) -> Vec<RegionSummary> {
+    let topology = mesh.topology();
+    let empty = |name: &String| {
+        let entry = config.regions.get(name);
+        RegionSummary {
+            name: name.clone(),
+            tets: 0,
+            volume_m3: 0.0,
+            material: entry.map_or_else(|| "air".to_owned(), |region| region.material.clone()),
+            model: entry.map_or("volume", |region| model_name(region.model)),
+        }
+    };
+    let mut regions: Vec<RegionSummary> = topology.region_names().iter().map(empty).collect();
+    for e in topology.elements() {
+        let region = &mut regions[topology.region_of()[e.index()].index()];
+        region.tets += 1;
+        region.volume_m3 += volume(mesh.vertices(e));
+    }
+    regions
+}
+
+fn surfaces(mesh: &Mesh) -> Result<Vec<SurfaceSummary>, Error> {
+    let topology = mesh.topology();
+    let of = |name: &str| {
+        let triangles = topology.surface(name)?;
+        let area = |t: &[NodeId; 3]| norm(area_vector(t.map(|n| mesh.point(n))));
+        Ok(SurfaceSummary {
+            name: name.to_owned(),
+            triangles: triangles.len(),
+            area_m2: triangles.iter().map(area).sum(),
+        })
+    };
+    topology.surface_names().map(of).collect()
+}
+
+fn quality(setup: &Setup) -> QualitySummary {
+    let problem = &setup.problem;
+    let quality = problem.quality(&problem.original);
+    let [poor, fair, good] = quality.shares();
+    QualitySummary {
+        of: if problem.moving_elements().is_empty() { "mesh" } else { "remesh region" },
+        worst: quality.worst,
+        worst_element: quality.worst_element.0,
+        worst_at_m: quality.worst_centroid,
+        up_to_0_3: poor,
+        from_0_3_to_0_6: fair,
+        from_0_6: good,
+    }
+}

@@ -1,0 +1,125 @@
+//! `fluxmorph gradient`.
+
+use super::args::GradientArgs;
+use super::exit::ExitCode;
+use super::ranks::Ranks;
+use super::{interrupt, observer, stdout, with_threads};
+use crate::config::FactorReuse;
+use crate::error::Error;
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use crate::memory_limit;
+use crate::output::read_design;
+use crate::setup::{Purpose, set_up_watched};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify_until};
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration or the numbers fail, and when the certificate does not hold.
+pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_WORK);
+    let (mut config, source) = args.common.load()?;
+    // The differences are between designs so near to each other that one factor serves them all.
+    config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
+    let ranks = Ranks::joined(&config, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.common.work.threads), |_| {
+        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+        let mut observer = observer(&args.common.work);
+        observer.phase("setting up mesh and matrices");
+        let told = &mut |stage| observer.stage(stage);
+        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.team(), told)?;
+        memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.older_run())?;
+        for warning in &setup.warnings {
+            observer.warning(warning);
+        }
+        let shape = setup.problem.shape.as_ref().expect("an optimisation has a shape");
+        let p = match &args.design {
+            Some(path) => read_design(path, shape.surface.variable_count())?,
+            None => shape.initial.clone(),
+        };
+        setup.problem.approach(&p, &interrupted)?;
+        let settings = Settings::default();
+        let certificates =
+            certify_until(&setup.problem, &p, &settings, &interrupted, |constraint, index, direction| {
+                observer.phase(&format!(
+                    "{}direction {} of {}: slope {:.4}, difference {:.1e}",
+                    constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),
+                    index + 1,
+                    settings.directions,
+                    direction.slope,
+                    direction.error
+                ));
+            })?;
+        let constraints =
+            certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
+        let all: Vec<(&Certificate, &str)> =
+            std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
+        // No bar may stand where the table goes.
+        drop(observer);
+        if args.common.work.json {
+            stdout::print_json(&certificates)?;
+        } else {
+            let tables: Vec<String> =
+                all.iter().map(|(certificate, name)| table(certificate, name, &settings)).collect();
+            stdout::print(&tables.join("\n"))?;
+        }
+        let Some((certificate, name)) = all.into_iter().find(|(certificate, _)| !certificate.holds) else {
+            return Ok(ExitCode::Success);
+        };
+        Err(Error::Certificate {
+            cause: format!(
+                "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} \
+                 allowed)",
+                certificate.least_slope,
+                settings.least_slope,
+                certificate.largest_error,
+                settings.largest_error
+            ),
+        })
+    });
+    signal.ended(outcome)
+}
+
+/// The certificate as a table.
+fn table(certificate: &Certificate, name: &str, settings: &Settings) -> String {
+    let mut text = format!(
+        "{name} = {:.10e}\n\nTaylor remainders |F(p + h d) - F(p) - h g.d| / F(p)\n",
+        certificate.objective
+    );
+    text += &format!("{:>10}", "h / span");
+    for index in 1..=certificate.directions.len() {
+        text += &format!(" {:>12}", format!("direction {index}"));
+    }
+    text.push('\n');
+    let steps = certificate.directions.first().map_or(&[][..], |d| &d.steps);
+    for (k, step) in steps.iter().enumerate() {
+        text += &format!("{step:>10.3e}");
+        for direction in &certificate.directions {
+            text += &format!(" {:>12.4e}", direction.remainders[k]);
+        }
+        text.push('\n');
+    }
+    let mut row = |name: &str, cell: &dyn Fn(&fluxmorph_optimizer::verify::Direction) -> String| {
+        text += &format!("{name:>10}");
+        for direction in &certificate.directions {
+            text += &format!(" {:>12}", cell(direction));
+        }
+        text.push('\n');
+    };
+    row("slope", &|d| format!("{:.4}", d.slope));
+    row("adjoint", &|d| format!("{:.5e}", d.adjoint));
+    row("central", &|d| format!("{:.5e}", d.difference));
+    row("error", &|d| format!("{:.2e}", d.error));
+    text += &format!(
+        "\nleast slope {:.4} (needed {}), largest error {:.2e} (allowed {:e}): the certificate {}\n",
+        certificate.least_slope,
+        settings.least_slope,
+        certificate.largest_error,
+        settings.largest_error,
+        if certificate.holds { "holds" } else { "DOES NOT HOLD" }
+    );
+    text
+}

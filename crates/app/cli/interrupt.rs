@@ -1,0 +1,94 @@
+//! Signals: the first asks the command to end after the work in hand, the second ends the process at once.
+//!
+//! The second needs no help of a thread that may be busy: the handler itself ends the process. The files of a run bear
+//! that at any moment.
+
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::flag;
+use signal_hook::iterator::Signals;
+
+use super::ExitCode;
+use super::launcher;
+use super::ranks::is_idle;
+use crate::error::Error;
+use fluxmorph_optimizer::Error as OptimizerError;
+use crate::observer::take_down;
+
+/// What is shown at the first signal of a run.
+pub(super) const FINISHES_EVALUATION: &str =
+    "finishing the evaluation in hand, then saving; once more to leave at once";
+
+/// What is shown at the first signal of other commands.
+pub(super) const FINISHES_WORK: &str = "finishing the work in hand; once more to leave at once";
+
+/// Whether and which signal has come.
+pub(super) struct Signal {
+    number: Arc<AtomicUsize>,
+}
+
+impl Signal {
+    /// What a signal sets: its number; zero before.
+    pub(super) fn number(&self) -> &Arc<AtomicUsize> {
+        &self.number
+    }
+
+    /// The exit code of the signal received, if any.
+    pub(super) fn received(&self) -> Option<ExitCode> {
+        match i32::try_from(self.number.load(Ordering::SeqCst)) {
+            Ok(SIGINT) => Some(ExitCode::Interrupted),
+            Ok(SIGTERM | SIGUSR1) => Some(ExitCode::Terminated),
+            _ => None,
+        }
+    }
+
+    /// How a command ended: one that a signal has ended, before it could have a result, says so and has that signal's code.
+    pub(super) fn ended(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
+        match (outcome, self.received()) {
+            (Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)), Some(code)) => {
+                let _ = writeln!(std::io::stderr(), "{error}");
+                Ok(code)
+            }
+            (outcome, _) => outcome,
+        }
+    }
+}
+
+/// Watches for Ctrl-C and SIGTERM; `message` is shown when the first comes. Where the system refuses a handler, its default
+/// (ending at once) stays.
+pub(super) fn watch(message: &'static str) -> Signal {
+    let number = Arc::new(AtomicUsize::new(0));
+    let again = Arc::new(AtomicBool::new(false));
+    // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
+    let of_launcher = launcher::is_launched().then_some((SIGUSR1, ExitCode::Terminated));
+    let signals = [(SIGINT, ExitCode::Interrupted), (SIGTERM, ExitCode::Terminated)];
+    for (signal, code) in signals.into_iter().chain(of_launcher) {
+        // Order matters: the shutdown looks at what an earlier signal has set.
+        let _ = flag::register_conditional_shutdown(signal, code as i32, Arc::clone(&again))
+            .and_then(|_| flag::register_usize(signal, Arc::clone(&number), signal as usize))
+            .and_then(|_| flag::register(signal, Arc::clone(&again)));
+    }
+    // A handler must not write; a thread of its own does, while the others compute.
+    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
+        // Of several ranks one speaks.
+        let speaks = !is_idle();
+        std::thread::spawn(move || {
+            if signals.forever().next().is_some() && speaks {
+                // A second signal ends the process where it stands: from here on nothing is left to tidy up.
+                take_down();
+                let _ = writeln!(std::io::stderr(), "{message}");
+            }
+        });
+    }
+    Signal { number }
+}
+
+/// Lets a write beyond the limit on the size of files fail like any other, with the file named; by default the system ends
+/// the process.
+pub(super) fn survive_file_size_limits() {
+    #[cfg(unix)]
+    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+}

@@ -1,0 +1,119 @@
+//! The command line: what was typed becomes a call, its outcome an exit code.
+
+pub mod args;
+mod check;
+mod examples;
+mod exit;
+mod generate;
+mod gradient;
+mod init;
+mod interrupt;
+pub(crate) mod launcher;
+mod morph;
+mod panic;
+mod ranks;
+mod report;
+mod run;
+mod solve;
+pub mod stdout;
+mod sweep;
+mod template;
+
+use std::io::Write;
+
+use clap::Parser;
+
+pub use exit::ExitCode;
+pub use init::InitError;
+
+use crate::config::ConfigError;
+use crate::diagnostics::{self, Style};
+use crate::error::Error;
+use crate::observer::{Bar, Console, RunObserver, Quiet};
+use crate::output::DesignFileError;
+use args::{Cli, Command, Progress, WorkArgs};
+
+/// Do what the arguments of this process say.
+pub fn main() -> std::process::ExitCode {
+    interrupt::survive_file_size_limits();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are asked for, and go to standard output; a closed pipe is no reason to panic.
+            let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Success };
+            if !ranks::is_idle() {
+                let _ = error.print();
+            }
+            return code.into();
+        }
+    };
+    panic::reported(|| done(&cli)).into()
+}
+
+/// The outcome of a command.
+fn done(cli: &Cli) -> ExitCode {
+    let shared_out = matches!(
+        cli.command,
+        Command::Run(_) | Command::Resume(_) | Command::Solve(_) | Command::Gradient(_)
+    );
+    if ranks::is_idle() && !shared_out {
+        return ExitCode::Success;
+    }
+    let outcome = match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Resume(args) => run::resume(args),
+        Command::Sweep(args) => sweep::sweep(args),
+        Command::Solve(args) => solve::solve(args),
+        Command::Morph(args) => morph::morph(args),
+        Command::Check(args) => check::check(args),
+        Command::Gradient(args) => gradient::gradient(args),
+        Command::Report(args) => report::report(args),
+        Command::Init(args) => init::init(args),
+        Command::Generate(args) => generate::generate(args),
+    };
+    outcome.unwrap_or_else(|error| {
+        // Of several ranks that fail alike one says so; what befalls one alone is said by that one.
+        if ranks::is_idle() {
+            if matches!(error, Error::Ranks { .. } | Error::Threads { .. }) {
+                let _ = writeln!(std::io::stderr(), "rank {}: {}", launcher::rank(), message(&error));
+            }
+            return error.exit_code();
+        }
+        let _ = writeln!(std::io::stderr(), "{}", message(&error));
+        error.exit_code()
+    })
+}
+
+/// What is shown for an error on standard error.
+fn message(error: &Error) -> String {
+    match error {
+        Error::Config(ConfigError::Faults(report)) | Error::Design(DesignFileError::Fault(report)) => {
+            diagnostics::render(report, Style::for_stderr())
+        }
+        other => format!("error: {other}"),
+    }
+}
+
+/// Who shows the progress.
+fn observer(args: &WorkArgs) -> Box<dyn RunObserver> {
+    match args.progress() {
+        Progress::None => Box::new(Quiet::stderr()),
+        Progress::Plain => Box::new(Console::stderr()),
+        Progress::Auto | Progress::Bar => match Bar::stderr() {
+            Some(bar) => Box::new(bar),
+            None => Box::new(Console::stderr()),
+        },
+    }
+}
+
+/// Works on as many threads as asked for, or as the machine has; `work` is told how many.
+fn with_threads<T: Send>(
+    threads: Option<usize>,
+    work: impl FnOnce(usize) -> Result<T, Error> + Send,
+) -> Result<T, Error> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build()
+        .map_err(|cause| Error::Threads { threads: threads.unwrap_or(0), cause: cause.to_string() })?;
+    pool.install(|| work(rayon::current_num_threads()))
+}

@@ -1,0 +1,35 @@
+//! `fluxmorph morph`.
+
+use super::args::MorphArgs;
+use super::exit::ExitCode;
+use super::{interrupt, observer, stdout, with_threads};
+use crate::error::Error;
+use crate::morph::{self, Parameters};
+use crate::output::system_disk;
+use fluxmorph_optimizer::driver::StopReason;
+use crate::session::Options;
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration, the files or the numbers fail; a mesh that a motion breaks is a result.
+pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_WORK);
+    let (config, source) = args.common.load()?;
+    let parameters = if args.tune { Parameters::Tuned } else { Parameters::Given };
+    with_threads(args.common.work.threads, |threads| {
+        let interrupted = || signal.received().is_some();
+        let disk = system_disk();
+        let older_run = args.common.older_run();
+        let options = Options { disk: &disk, older_run, threads, team: None, interrupted: &interrupted };
+        let report = morph::morph(&config, &source, parameters, options, &mut *observer(&args.common.work))?;
+        if args.common.work.json {
+            stdout::print_json(&report)?;
+        } else {
+            stdout::print(&morph::text(&report))?;
+        }
+        // A signal that came too late to leave anything out does not change how the command ended.
+        let stopped_by = signal.received().filter(|_| report.stop_reason == StopReason::Interrupted);
+        Ok(stopped_by.unwrap_or_else(|| report.exit_code()))
+    })
+}

@@ -1,0 +1,125 @@
+//! `fluxmorph run` and `fluxmorph resume`.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::args::{ResumeArgs, RunArgs};
+use super::exit::ExitCode;
+use super::interrupt::{self, Signal};
+use super::ranks::Ranks;
+use super::{observer, stdout, with_threads};
+use crate::config::OutputNamedBy;
+use crate::error::Error;
+use crate::memory_limit;
+use crate::observer::RunObserver;
+use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
+use crate::report::ReportedRun;
+use crate::session::{self, Limits, Options, SavedRun};
+use crate::setup::Purpose;
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration, the files or the numbers fail; the error knows its exit code.
+pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
+    let (config, source) = args.load()?;
+    let ranks = Ranks::joined(&config, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
+        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+        let disk = system_disk();
+        let older_run = args.common.older_run();
+        let team = ranks.team();
+        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let mut observer = observer(&args.common.work);
+        let result = session::run(&config, &source, options, &mut *observer);
+        let report = config.output.report.then_some(&disk);
+        let json = args.common.work.json;
+        let ended = Ended { directory: &config.output.directory, report, json };
+        concluded(result, &ended, &signal, &mut *observer)
+    });
+    signal.ended(outcome)
+}
+
+/// Do what the command line says.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
+    let disk = system_disk();
+    let saved = SavedRun::open(&disk, &args.directory)?;
+    let ranks = Ranks::joined(saved.config().0, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.work.threads), |threads| {
+        let (config, source) = saved.config();
+        if let Some(code) = ranks.followed(config, source, Purpose::Optimisation) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+        if !args.work.allow_outside {
+            source.confined(OutputNamedBy::User)?;
+        }
+        if !args.work.force {
+            memory_limit::check_mesh(config, source)?;
+        }
+        let older_run = args.work.older_run();
+        let team = ranks.team();
+        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let report = config.output.report.then_some(&disk);
+        let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
+        let mut observer = observer(&args.work);
+        let result = session::resume(saved, limits, options, &mut *observer);
+        let ended = Ended { directory: &args.directory, report, json: args.work.json };
+        concluded(result, &ended, &signal, &mut *observer)
+    });
+    signal.ended(outcome)
+}
+
+/// What is done when a run has ended.
+struct Ended<'a> {
+    directory: &'a Path,
+    /// Where the report is written to; `None` where there is to be none.
+    report: Option<&'a Arc<dyn Disk>>,
+    json: bool,
+}
+
+/// Prints the result, writes the report, and tells how to go on.
+fn concluded(
+    result: Result<RunResult, Error>,
+    ended: &Ended<'_>,
+    signal: &Signal,
+    observer: &mut dyn RunObserver,
+) -> Result<ExitCode, Error> {
+    let result = result?;
+    let directory = ended.directory;
+    if ended.json {
+        stdout::print_json(&result)?;
+    }
+    if let Some(disk) = ended.report {
+        // The result is worth more than a page about it: not even a mistake of the program in it ends the run otherwise.
+        match catch_unwind(AssertUnwindSafe(|| ReportedRun::open(disk, directory)?.write(None))) {
+            Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
+            Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
+            Err(_) => observer.warning("the report is not written: a mistake of the program, told above"),
+        }
+    }
+    // The search may have ended by itself, and the check of its result not.
+    let interrupted = result.status == RunStatus::Interrupted;
+    match result.stop_reason {
+        reason if interrupted || reason == StopReason::MaxTime => {
+            observer
+                .warning(&format!("all evaluations are saved: go on with `{}`", resume_command(directory)));
+        }
+        StopReason::MaxEvaluations => {
+            observer.note(&format!("to go on from here: {}", extend_command(directory, result.evaluations)))
+        }
+        _ => {}
+    }
+    // A signal that came too late to stop anything does not change how the run ended.
+    let stopped_by = signal.received().filter(|_| interrupted);
+    Ok(stopped_by.unwrap_or_else(|| result.stop_reason.into()))
+}

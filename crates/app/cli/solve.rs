@@ -1,0 +1,41 @@
+//! `fluxmorph solve`.
+
+use super::args::SolveArgs;
+use super::exit::ExitCode;
+use super::ranks::Ranks;
+use super::{interrupt, observer, stdout, with_threads};
+use crate::error::Error;
+use crate::output::{read_design, system_disk};
+use crate::session::{self, Options};
+use crate::setup::{Purpose, variable_count};
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the configuration, the files or the numbers fail; the error knows its exit code.
+pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(interrupt::FINISHES_WORK);
+    let (config, source) = args.common.load()?;
+    let ranks = Ranks::joined(&config, signal.number())?;
+    let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
+        if let Some(code) = ranks.followed(&config, &source, Purpose::Analysis) {
+            return Ok(code);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+        let design = match &args.design {
+            Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
+            None => None,
+        };
+        let disk = system_disk();
+        let older_run = args.common.older_run();
+        let team = ranks.team();
+        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let result = session::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
+        if args.common.work.json {
+            stdout::print_json(&result)?;
+        }
+        // An analysis that has begun is finished and saved; then the signal decides the exit code.
+        Ok(signal.received().unwrap_or_else(|| result.stop_reason.into()))
+    });
+    signal.ended(outcome)
+}

@@ -1,0 +1,294 @@
+//! `fluxmorph sweep`: what is run, what is told about it, and how it ends.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use super::args::SweepArgs;
+use super::exit::ExitCode;
+use super::{interrupt, stdout};
+use crate::config::ConfigError;
+use crate::diagnostics::{self, Style};
+use crate::error::Error;
+use crate::observer::{Console, Observer};
+use crate::output::{OlderRun, OutputError, shell_word, system_disk};
+use crate::sweep::{
+    Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
+};
+
+/// What is shown at the first signal.
+const FINISHES_RUNS: &str =
+    "no further run begins; those at work finish the evaluation in hand and save; once more to leave at once";
+
+/// How many times as long as writing the comparison the work before must have taken: it is written for a reader, and at the
+/// end in any case.
+const SHARE: u32 = 10;
+
+/// Longest log in which an error is looked for [bytes].
+const LONGEST_LOG: u64 = 1 << 24;
+
+/// Do what the command line says.
+///
+/// # Errors
+/// When the values, a configuration or the directory are wrong, before anything is run; or when the files of the sweep fail.
+pub(super) fn sweep(args: &SweepArgs) -> Result<ExitCode, Error> {
+    let signal = interrupt::watch(FINISHES_RUNS);
+    let sweep = Sweep::plan(&args.request()).inspect_err(tell_faults)?;
+    let disk = system_disk();
+    if args.compare {
+        let layout = Layout::open(&disk, &sweep)?;
+        return compared(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
+    }
+    let count = sweep.combinations.len();
+    let chosen = match args.only {
+        Some(index) if index >= count => return Err(SweepError::NoSuch { index, count }.into()),
+        Some(index) => index..index + 1,
+        None => 0..count,
+    };
+    let mut states = States::new(&disk, &sweep);
+    let left = chosen.map(|index| Ok((index, left_to_do(&mut states, &sweep, index)?)));
+    let left = left.collect::<Result<Vec<_>, Error>>()?;
+    let layout = match args.only {
+        Some(_) => Layout::open(&disk, &sweep)?,
+        None => Layout::create(&disk, &sweep)?,
+    };
+    if let Some(path) = &args.script {
+        let script = ScriptFile { path, program: program()?, jobs: args.jobs, threads: args.threads };
+        script.write(&disk, &sweep)?;
+        if !args.quiet {
+            Console::stderr().note(&format!("script of {count} combinations: sbatch {}", shell_word(path)));
+        }
+        return compared(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
+    }
+    Session::new(args, &sweep, &layout)?.run(&left, &|| signal.received())
+}
+
+/// What is left to do of a combination: a task, or how it stands.
+enum Left {
+    Task(Task),
+    Finished(ExitCode),
+    InUse,
+}
+
+/// # Errors
+/// [`SweepError::OtherRun`] without `--force`, or files that cannot be read.
+fn left_to_do(states: &mut States<'_>, sweep: &Sweep, index: usize) -> Result<Left, Error> {
+    let planned = &sweep.combinations[index];
+    Ok(match states.of(planned)? {
+        State::Missing => Left::Task(Task::Begin(OlderRun::Keep)),
+        State::Unborn => Left::Task(Task::Begin(OlderRun::Replace)),
+        State::Broken => Left::Task(Task::Resume),
+        State::Finished(reason) => Left::Finished(reason.into()),
+        State::InUse => Left::InUse,
+        State::Other(_) if sweep.older == OlderRun::Replace => Left::Task(Task::Begin(OlderRun::Replace)),
+        State::Other(cause) => {
+            return Err(SweepError::OtherRun { path: sweep.run_directory(planned), cause }.into());
+        }
+    })
+}
+
+/// This program.
+fn program() -> Result<std::path::PathBuf, SweepError> {
+    std::env::current_exe().map_err(|source| SweepError::Program { source })
+}
+
+/// Shows the faults of configurations with their places; the error counts them.
+fn tell_faults(error: &Error) {
+    let Error::Sweep(SweepError::Faults { reports, .. }) = error else { return };
+    let mut stderr = std::io::stderr();
+    for (name, fault) in reports {
+        let _ = writeln!(stderr, "combination `{name}`:\n{}\n", rendered(fault));
+    }
+}
+
+fn rendered(fault: &ConfigError) -> String {
+    match fault {
+        ConfigError::Faults(report) => diagnostics::render(report, Style::for_stderr()),
+        other => other.to_string(),
+    }
+}
+
+/// Writes the comparison and prints it where that is asked for.
+fn compared(
+    args: &SweepArgs,
+    sweep: &Sweep,
+    layout: &Layout,
+    comparison: &Comparison,
+) -> Result<ExitCode, Error> {
+    comparison.write(sweep, layout)?;
+    if args.json {
+        stdout::print_json(comparison)?;
+    }
+    if !args.quiet {
+        Console::stderr().note(&format!("comparison: {}", layout.path().join("sweep.html").display()));
+    }
+    Ok(ExitCode::Success)
+}
+
+/// The runs of one command.
+struct Session<'a> {
+    args: &'a SweepArgs,
+    sweep: &'a Sweep,
+    layout: &'a Layout,
+    workers: Workers,
+    /// `None` with `--only`: other processes work on the same sweep, and the last would have the say.
+    comparison: Option<Comparison>,
+    /// When the comparison was written, and how long that took.
+    written: (Instant, Duration),
+    begun: Vec<Option<Instant>>,
+    codes: Vec<ExitCode>,
+}
+
+impl<'a> Session<'a> {
+    fn new(args: &'a SweepArgs, sweep: &'a Sweep, layout: &'a Layout) -> Result<Self, Error> {
+        let jobs = args.jobs.unwrap_or(1);
+        let threads = args.threads.unwrap_or_else(|| Workers::threads_each(jobs));
+        let comparison = match args.only {
+            Some(_) => None,
+            None => Some(Comparison::read(sweep, layout)?),
+        };
+        Ok(Self {
+            args,
+            sweep,
+            layout,
+            workers: Workers { program: program()?, jobs, threads },
+            comparison,
+            written: (Instant::now(), Duration::ZERO),
+            begun: vec![None; sweep.combinations.len()],
+            codes: Vec::new(),
+        })
+    }
+
+    /// Does what is left; the exit code is the worst of all runs.
+    fn run(
+        mut self,
+        left: &[(usize, Left)],
+        interrupted: &dyn Fn() -> Option<ExitCode>,
+    ) -> Result<ExitCode, Error> {
+        let mut tasks = Vec::new();
+        for (index, left) in left {
+            match left {
+                Left::Task(task) => tasks.push((*index, *task)),
+                Left::Finished(code) => {
+                    self.codes.push(*code);
+                    self.note(*index, &format!("skipped, {}", self.row(*index)?.told()));
+                }
+                Left::InUse => {
+                    self.codes.push(ExitCode::Files);
+                    self.warning(*index, "another process works on it");
+                }
+            }
+        }
+        let (workers, sweep, layout) = (self.workers.clone(), self.sweep, self.layout);
+        workers.work(sweep, layout, &tasks, interrupted, &mut |event| self.take(event))?;
+        let is_cut_short = self.codes.len() < left.len()
+            || self.codes.iter().any(|code| matches!(code, ExitCode::Interrupted | ExitCode::Terminated));
+        let code = self.codes.iter().copied().max_by_key(|code| severity(*code));
+        if let Some(comparison) = &self.comparison {
+            compared(self.args, sweep, layout, comparison)?;
+        } else if self.args.json {
+            let rows = left.iter().map(|(index, _)| self.row(*index)).collect::<Result<Vec<_>, _>>()?;
+            stdout::print_json(&rows)?;
+        }
+        // A signal that came too late to stop anything does not change how the sweep ended.
+        let signal = interrupted().filter(|_| is_cut_short);
+        if signal.is_some() {
+            Console::stderr().warning("the sweep is not finished: go on with the same command");
+        }
+        Ok(signal.or(code).unwrap_or(ExitCode::Success))
+    }
+
+    fn take(&mut self, event: Event) -> Result<(), Error> {
+        match event {
+            Event::Begun(index, task) => {
+                self.begun[index] = Some(Instant::now());
+                self.note(index, if task == Task::Resume { "resumed" } else { "begun" });
+            }
+            Event::Ended(index, ending) => {
+                self.codes.push(ending.code());
+                if let Some(comparison) = &mut self.comparison {
+                    comparison.update(self.sweep, self.layout, index)?;
+                }
+                self.tell_end(index, &ending)?;
+                let (at, cost) = self.written;
+                if let Some(comparison) = &self.comparison
+                    && at.elapsed() >= SHARE * cost
+                {
+                    let clock = Instant::now();
+                    comparison.write(self.sweep, self.layout)?;
+                    self.written = (Instant::now(), clock.elapsed());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn tell_end(&self, index: usize, ending: &Ending) -> Result<(), Error> {
+        let seconds = self.begun[index].map_or(0.0, |begun| begun.elapsed().as_secs_f64());
+        let log = self.layout.log(&self.sweep.combinations[index]);
+        let broken = |how: &str| {
+            let error = self.last_error(&log).map_or(String::new(), |error| format!(", {error}"));
+            self.warning(index, &format!("{how}{error}; see {}", log.display()));
+        };
+        match ending {
+            Ending::Broken(how) => broken(&format!("failed: {how}")),
+            Ending::Code(ExitCode::Interrupted | ExitCode::Terminated) => {
+                let told = match self.row(index)?.evaluations {
+                    Some(count) => format!("interrupted, {count} evaluations are saved, {seconds:.1} s"),
+                    None => "interrupted before there was anything to keep".to_owned(),
+                };
+                self.note(index, &told);
+            }
+            Ending::Code(ExitCode::Success | ExitCode::Stopped) => {
+                let row = self.row(index)?;
+                let ratio = row.ratio.map_or(String::new(), |ratio| format!(", F/F0 {ratio:.5}"));
+                let evaluations = row.evaluations.unwrap_or(0);
+                let told = row.told();
+                self.note(index, &format!("{told}{ratio}, {evaluations} evaluations, {seconds:.1} s"));
+            }
+            Ending::Code(code) => broken(&format!("failed with exit code {}", *code as u8)),
+        }
+        Ok(())
+    }
+
+    /// The last error that a run has told.
+    fn last_error(&self, log: &std::path::Path) -> Option<String> {
+        let bytes = self.layout.disk().read(log, LONGEST_LOG).ok()?;
+        let text = String::from_utf8_lossy(&bytes);
+        text.lines().rfind(|line| line.starts_with("error")).map(str::to_owned)
+    }
+
+    fn row(&self, index: usize) -> Result<Row, OutputError> {
+        match &self.comparison {
+            Some(comparison) => Ok(comparison.combinations[index].clone()),
+            None => Row::read(self.sweep, self.layout, &self.sweep.combinations[index]),
+        }
+    }
+
+    fn about(&self, index: usize, text: &str) -> String {
+        let combinations = &self.sweep.combinations;
+        format!("[{}/{}] {}: {text}", index + 1, combinations.len(), combinations[index].combination.name)
+    }
+
+    fn note(&self, index: usize, text: &str) {
+        if !self.args.quiet {
+            Console::stderr().note(&self.about(index, text));
+        }
+    }
+
+    fn warning(&self, index: usize, text: &str) {
+        Console::stderr().warning(&self.about(index, text));
+    }
+}
+
+/// Which of two exit codes says more about what is to be done.
+fn severity(code: ExitCode) -> u8 {
+    match code {
+        ExitCode::Success => 0,
+        ExitCode::Stopped => 1,
+        ExitCode::Interrupted => 2,
+        ExitCode::Terminated => 3,
+        ExitCode::Usage | ExitCode::Configuration => 4,
+        ExitCode::Files => 5,
+        ExitCode::Numerical => 6,
+    }
+}

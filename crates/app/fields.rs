@@ -1,0 +1,214 @@
+//! The arrays that a design leaves for ParaView (docs/output.md lists them with their units), of the whole mesh or of a
+//! part of it.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::io::{ArrayData, Field, VtuPiece, pvtu_text, vtu_bytes};
+use fluxmorph_geometry::quality::qualities_of;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
+use fluxmorph_solver::{FieldModel, FieldSolution};
+use rayon::prelude::*;
+
+use fluxmorph_optimizer::problem::Analysis;
+
+/// What the arrays of a design are made from; a rank has no more of it.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldData<'a> {
+    /// The moved mesh.
+    pub mesh: &'a Mesh,
+    /// Displacement of every node from the undeformed mesh [m], shape `(n_nodes, 3)`.
+    pub displacement: &'a [Point],
+    /// dF/dx at the nodes [unit of F per m], shape `(n_nodes, 3)`; `None` is written as zeros.
+    pub sensitivity: Option<&'a [Point]>,
+    /// One solution per state. For a piece only the potentials at its nodes matter.
+    pub solutions: &'a [FieldSolution],
+}
+
+impl<'a> FieldData<'a> {
+    /// Those of an analysed design.
+    pub fn of(analysis: &'a Analysis) -> Self {
+        Self {
+            mesh: &analysis.mesh,
+            displacement: &analysis.displacement,
+            sensitivity: analysis.sensitivity.as_deref(),
+            solutions: &analysis.solutions,
+        }
+    }
+}
+
+/// The VTU file of an analysed design: the moved mesh, potentials, displacement and sensitivity at its nodes; fields,
+/// loss, region and quality in its elements.
+///
+/// Fields of the first frequency have plain names, those of the others a suffix: `B_re_200Hz`.
+///
+/// # Errors
+/// [`MeshError::NotFiniteArray`] names an array that is not finite: nothing of it is written.
+pub fn vtu(states: &[FieldModel], data: &FieldData<'_>) -> Result<Vec<u8>, MeshError> {
+    let topology = data.mesh.topology();
+    let (nodes, elements): (Vec<_>, Vec<_>) = (topology.nodes().collect(), topology.elements().collect());
+    let arrays = Arrays::new(states, data, &nodes, &elements);
+    vtu_bytes(data.mesh, &arrays.at_nodes(), &arrays.in_cells())
+}
+
+/// The VTU file of some elements of a design and the nodes that they touch: what [`vtu`] has for them, and their numbers
+/// in the whole mesh.
+///
+/// # Errors
+/// As [`vtu`], for values of the piece.
+pub fn piece(
+    states: &[FieldModel],
+    data: &FieldData<'_>,
+    elements: &[ElementId],
+) -> Result<Vec<u8>, MeshError> {
+    let piece = VtuPiece::new(data.mesh.topology(), elements);
+    let arrays = Arrays::new(states, data, piece.nodes(), piece.elements());
+    piece.bytes(data.mesh.points(), &arrays.at_nodes(), &arrays.in_cells())
+}
+
+/// The text of the PVTU file of pieces that [`piece`] made; their paths are relative to it.
+pub fn header(states: &[FieldModel], data: &FieldData<'_>, pieces: &[String]) -> String {
+    let arrays = Arrays::new(states, data, &[], &[]);
+    pvtu_text(&arrays.at_nodes(), &arrays.in_cells(), pieces)
+}
+
+/// The arrays over some nodes and elements.
+struct Arrays {
+    states: Vec<StateArrays>,
+    displacement: Vec<Point>,
+    sensitivity: Vec<Point>,
+    region: Vec<i32>,
+    quality: Vec<f64>,
+}
+
+impl Arrays {
+    fn new(states: &[FieldModel], data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
+        let regions = data.mesh.topology().region_of();
+        let at = |values: &[Point]| nodes.iter().map(|n| values[n.index()]).collect();
+        let states = states.iter().zip(data.solutions).enumerate();
+        Self {
+            states: states
+                .map(|(index, (model, solution))| {
+                    StateArrays::new(model, solution, data.mesh, index, nodes, elements)
+                })
+                .collect(),
+            displacement: at(data.displacement),
+            sensitivity: data.sensitivity.map_or_else(|| vec![[0.0; 3]; nodes.len()], at),
+            region: elements.iter().map(|e| regions[e.index()].0 as i32).collect(),
+            quality: qualities_of(data.mesh, elements),
+        }
+    }
+
+    fn at_nodes(&self) -> Vec<Field<'_>> {
+        let (first, others) = self.states.split_first().expect("a problem has a state");
+        let mut fields: Vec<Field<'_>> = first.at_nodes().into();
+        fields.push(Field { name: "displacement", data: ArrayData::Vector(&self.displacement) });
+        fields.push(Field { name: "sensitivity", data: ArrayData::Vector(&self.sensitivity) });
+        fields.extend(others.iter().flat_map(StateArrays::at_nodes));
+        fields
+    }
+
+    fn in_cells(&self) -> Vec<Field<'_>> {
+        let (first, others) = self.states.split_first().expect("a problem has a state");
+        let mut fields: Vec<Field<'_>> = first.in_cells().into();
+        fields.push(Field { name: "region", data: ArrayData::Integer(&self.region) });
+        fields.push(Field { name: "quality", data: ArrayData::Scalar(&self.quality) });
+        fields.extend(others.iter().flat_map(StateArrays::in_cells));
+        fields
+    }
+}
+
+/// Names of the arrays of one state, in the order of [`StateArrays`].
+const NODE_ARRAYS: [&str; 4] = ["A_re", "A_im", "psi_re", "psi_im"];
+const CELL_ARRAYS: [&str; 6] = ["B_re", "B_im", "B_abs", "J_re", "J_im", "loss_density"];
+
+/// The arrays of one state.
+struct StateArrays {
+    node_names: [String; 4],
+    cell_names: [String; 6],
+    a: [Vec<Point>; 2],
+    psi: [Vec<f64>; 2],
+    b: [Vec<Point>; 2],
+    b_abs: Vec<f64>,
+    j: [Vec<Point>; 2],
+    loss: Vec<f64>,
+}
+
+impl StateArrays {
+    fn new(
+        model: &FieldModel,
+        solution: &FieldSolution,
+        mesh: &Mesh,
+        index: usize,
+        nodes: &[NodeId],
+        elements: &[ElementId],
+    ) -> Self {
+        let potentials: Vec<[c64; 4]> = nodes.par_iter().map(|&n| solution.potentials(model, n)).collect();
+        let a: Vec<[c64; 3]> = potentials.par_iter().map(|p| [p[0], p[1], p[2]]).collect();
+        let b = parts(&solution.flux_densities_of(model, mesh, elements));
+        let magnitude = |(re, im): (&Point, &Point)| re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt();
+        let b_abs = b[0].par_iter().zip(&b[1]).map(magnitude).collect();
+        let suffix = match index {
+            0 => String::new(),
+            _ => suffix(model.angular_frequency()),
+        };
+        Self {
+            node_names: NODE_ARRAYS.map(|name| format!("{name}{suffix}")),
+            cell_names: CELL_ARRAYS.map(|name| format!("{name}{suffix}")),
+            a: parts(&a),
+            psi: [potentials.iter().map(|p| p[3].re).collect(), potentials.iter().map(|p| p[3].im).collect()],
+            b,
+            b_abs,
+            j: parts(&solution.current_densities_of(model, mesh, elements)),
+            loss: solution.loss_densities_of(model, mesh, elements),
+        }
+    }
+
+    fn at_nodes(&self) -> [Field<'_>; 4] {
+        let data = [
+            ArrayData::Vector(&self.a[0]),
+            ArrayData::Vector(&self.a[1]),
+            ArrayData::Scalar(&self.psi[0]),
+            ArrayData::Scalar(&self.psi[1]),
+        ];
+        let mut names = self.node_names.iter();
+        data.map(|data| Field { name: names.next().map_or("", String::as_str), data })
+    }
+
+    fn in_cells(&self) -> [Field<'_>; 6] {
+        let data = [
+            ArrayData::Vector(&self.b[0]),
+            ArrayData::Vector(&self.b[1]),
+            ArrayData::Scalar(&self.b_abs),
+            ArrayData::Vector(&self.j[0]),
+            ArrayData::Vector(&self.j[1]),
+            ArrayData::Scalar(&self.loss),
+        ];
+        let mut names = self.cell_names.iter();
+        data.map(|data| Field { name: names.next().map_or("", String::as_str), data })
+    }
+}
+
+/// `_200Hz`; to a microhertz, and without a point, which ParaView's calculator takes for an operator.
+fn suffix(angular_frequency: f64) -> String {
+    let hertz = (angular_frequency / (2.0 * std::f64::consts::PI) * 1e6).round() / 1e6;
+    format!("_{hertz}Hz").replace('.', "_")
+}
+
+/// Real and imaginary parts.
+fn parts(values: &[[c64; 3]]) -> [Vec<Point>; 2] {
+    [|c: c64| c.re, |c: c64| c.im].map(|part| values.par_iter().map(|v| v.map(part)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::suffix;
+
+    #[test]
+    fn the_suffix_of_a_frequency_can_stand_in_a_name() {
+        let of = |hertz: f64| suffix(2.0 * std::f64::consts::PI * hertz);
+        assert_eq!(
+            (of(200.0), of(0.5), of(16.7)),
+            ("_200Hz".to_owned(), "_0_5Hz".to_owned(), "_16_7Hz".to_owned())
+        );
+    }
+}

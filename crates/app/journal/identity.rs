@@ -1,0 +1,145 @@
+//! What a journal belongs to: the version of the program, the configuration, the mesh.
+
+use fluxmorph_geometry::Mesh;
+
+use fluxmorph_optimizer::driver::hash_points;
+
+use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
+
+/// Version of the program that writes.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// What a journal belongs to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Version of the program.
+    pub version: String,
+    /// [`configuration_hash`].
+    pub configuration: [u8; 32],
+    /// [`mesh_hash`] of the undeformed mesh.
+    pub mesh: [u8; 32],
+    /// Number of design variables.
+    pub variables: usize,
+    /// Number of constraints.
+    pub constraints: usize,
+}
+
+/// In what two identities differ.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Mismatch {
+    /// The program.
+    #[error("it was written by version {journal} of fluxmorph, this is {program}: go on with that version")]
+    Version {
+        /// Version that wrote the journal.
+        journal: String,
+        /// This version.
+        program: String,
+    },
+    /// The configuration.
+    #[error(
+        "it belongs to another configuration (hash {journal}, of config.toml and its overrides {now}): restore the \
+         config.toml that the run was started with"
+    )]
+    Configuration {
+        /// Hash in the journal.
+        journal: String,
+        /// Hash now.
+        now: String,
+    },
+    /// The mesh.
+    #[error(
+        "it belongs to another mesh (hash {journal}, now {now}): restore the mesh file that the run was started with"
+    )]
+    Mesh {
+        /// Hash in the journal.
+        journal: String,
+        /// Hash now.
+        now: String,
+    },
+    /// The sizes, which follow from the configuration.
+    #[error("it has {journal} variables and constraints, the problem has {now}")]
+    Sizes {
+        /// In the journal.
+        journal: String,
+        /// Now.
+        now: String,
+    },
+}
+
+impl Identity {
+    /// That of a problem with so many variables and constraints.
+    pub fn new(config: &Config, mesh: &Mesh, variables: usize, constraints: usize) -> Self {
+        let (configuration, mesh) = (configuration_hash(config), mesh_hash(mesh));
+        Self { version: VERSION.to_owned(), configuration, mesh, variables, constraints }
+    }
+
+    /// Whether a journal of this identity belongs to the problem that is there now.
+    ///
+    /// # Errors
+    /// The first difference.
+    pub fn check(&self, now: &Self) -> Result<(), Mismatch> {
+        let hex = |hash: &[u8; 32]| hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<String>();
+        let sizes = |identity: &Self| format!("{} and {}", identity.variables, identity.constraints);
+        if self.version != now.version {
+            let (journal, program) = (self.version.clone(), now.version.clone());
+            return Err(Mismatch::Version { journal, program });
+        }
+        if self.configuration != now.configuration {
+            let (journal, now) = (hex(&self.configuration), hex(&now.configuration));
+            return Err(Mismatch::Configuration { journal, now });
+        }
+        if self.mesh != now.mesh {
+            return Err(Mismatch::Mesh { journal: hex(&self.mesh), now: hex(&now.mesh) });
+        }
+        if sizes(self) != sizes(now) {
+            return Err(Mismatch::Sizes { journal: sizes(self), now: sizes(now) });
+        }
+        Ok(())
+    }
+}
+
+/// BLAKE3 of everything in a configuration that an evaluation or the method depends on.
+///
+/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may go on. Nor is
+/// the path of a mesh file: its content is in [`mesh_hash`].
+pub fn configuration_hash(config: &Config) -> [u8; 32] {
+    let mut bare = config.clone();
+    let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
+    (bare.optimizer.max_evaluations, bare.optimizer.max_time) = (max_evaluations, max_time);
+    bare.title.clear();
+    bare.probes.clear();
+    bare.output = Output::default();
+    if let MeshConfig::File { path, .. } = &mut bare.mesh {
+        path.clear();
+    }
+    *blake3::hash(resolved_toml(&bare).as_bytes()).as_bytes()
+}
+
+/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles.
+pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
+    let topology = mesh.topology();
+    let mut hasher = blake3::Hasher::new();
+    hash_points(&mut hasher, mesh);
+    let mut number = |n: usize| {
+        hasher.update(&(n as u64).to_le_bytes());
+    };
+    topology.tets().iter().flatten().for_each(|node| number(node.index()));
+    topology.region_of().iter().for_each(|region| number(region.index()));
+    for name in topology.region_names() {
+        number(name.len());
+        name.bytes().for_each(|byte| number(usize::from(byte)));
+        for cell in topology.given_cells(name).unwrap_or_default() {
+            number(cell.len());
+            cell.iter().for_each(|element| number(element.index()));
+        }
+    }
+    for name in topology.surface_names() {
+        number(name.len());
+        name.bytes().for_each(|byte| number(usize::from(byte)));
+        let triangles = topology.surface(name).unwrap_or_default();
+        number(triangles.len());
+        triangles.iter().flatten().for_each(|node| number(node.index()));
+    }
+    *hasher.finalize().as_bytes()
+}

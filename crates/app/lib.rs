@@ -1,0 +1,24 @@
+//! The application: everything that a person sees of fluxmorph. Configuration, files, runs, report and command line.
+//!
+//! The numerical work is in the crates below; here it is set up from a configuration, watched, kept and shown. Exit codes
+//! are decided here alone ([`Error::exit_code`]).
+
+pub mod cli;
+pub mod config;
+pub mod diagnostics;
+mod error;
+mod exports;
+pub mod fields;
+pub mod fresh_mesh;
+pub mod journal;
+mod memory_limit;
+pub mod morph;
+pub mod observer;
+pub mod output;
+pub mod report;
+pub mod schema;
+pub mod session;
+pub mod setup;
+pub mod sweep;
+
+pub use error::Error;

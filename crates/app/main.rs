@@ -1,0 +1,5 @@
+//! The program `fluxmorph`.
+
+fn main() -> std::process::ExitCode {
+    fluxmorph::cli::main()
+}

@@ -1,0 +1,307 @@
+//! `result.json`: what a run or a single analysis found.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::manifest::RunStatus;
+use super::{OutputError, RunDirectory};
+use fluxmorph_optimizer::driver::StopReason;
+use fluxmorph_optimizer::rounds::RoundEvent;
+
+/// The content of `result.json`. Keys carry their unit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunResult {
+    /// Version of this file's form: 1.
+    pub schema_version: u32,
+    /// `run` or `solve`.
+    pub command: String,
+    /// How it ended: that of the stop reason, or interrupted where the search ended by itself and the check of its result
+    /// did not.
+    pub status: RunStatus,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+    /// Evaluations of the objective.
+    pub evaluations: usize,
+    /// Evaluations that improved on the best so far.
+    pub iterations: usize,
+    /// The objective; `None` when the configuration has none.
+    pub objective: Option<ObjectiveResult>,
+    /// The constraints at the best design, in the order of the configuration.
+    #[serde(default)]
+    pub constraints: Vec<ConstraintResult>,
+    /// The best design; `None` when the configuration has none.
+    pub design: Option<DesignResult>,
+    /// The mesh.
+    pub mesh: MeshResult,
+    /// Rounds of the mesh motion and remedies, as they came; empty where one reference mesh was enough.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<RoundEvent>,
+    /// The frequencies [Hz] in the order of the configuration.
+    #[serde(default)]
+    pub frequencies_hz: Vec<f64>,
+    /// The field at the probes, at the first frequency.
+    pub probes: Vec<ProbeResult>,
+    /// Eddy-current loss by region, of the meshed part, at the first frequency [W].
+    pub losses_w: BTreeMap<String, f64>,
+    /// Losses and probes at every frequency; only where there are several.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<StateResult>,
+    /// The linear systems.
+    pub linear_solver: LinearSolverResult,
+    /// Wall time by part, with `total` [s].
+    pub timings_s: BTreeMap<String, f64>,
+    /// Most memory held [bytes].
+    pub peak_memory_bytes: u64,
+}
+
+/// The objective of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ObjectiveResult {
+    /// At the initial design.
+    pub initial: f64,
+    /// At the best design.
+    pub best: f64,
+    /// `best / initial`.
+    pub ratio: f64,
+    /// The evaluation of the best design.
+    pub best_evaluation: usize,
+    /// `best / initial` of the same two shapes on a freshly generated mesh; `None` where that was not computed.
+    #[serde(default)]
+    pub verified_ratio: Option<f64>,
+    /// How the verified ratio came about; `None` without one, and where the initial design is the best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verification: Option<Verification>,
+    /// The terms at the best design.
+    #[serde(default)]
+    pub terms: Vec<TermResult>,
+}
+
+/// The gain of a run computed again on a mesh that the optimiser never saw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Verification {
+    /// Refinement of that mesh relative to the run's.
+    pub refinement: f64,
+    /// Its tetrahedra.
+    pub tets: usize,
+    /// The objective at the initial design there.
+    pub initial: f64,
+    /// The objective at the best design there.
+    pub best: f64,
+    /// `best / initial`.
+    pub ratio: f64,
+}
+
+/// One term of an objective.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TermResult {
+    /// What it measures, in the words of the configuration.
+    pub kind: String,
+    /// Its region; `null` for everything that is meshed.
+    pub region: Option<String>,
+    /// Its frequency [Hz]; `null` for the sum over all.
+    pub frequency: Option<f64>,
+    /// Its factor in the objective.
+    pub weight: f64,
+    /// Its value without the factor, in SI.
+    pub value: f64,
+}
+
+/// One constraint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ConstraintResult {
+    /// Its name.
+    pub name: String,
+    /// Its value, in SI.
+    pub value: f64,
+    /// Its bound, in SI.
+    pub bound: f64,
+    /// Whether the value keeps within the bound.
+    pub satisfied: bool,
+}
+
+/// What depends on the frequency.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StateResult {
+    /// The frequency [Hz].
+    pub frequency_hz: f64,
+    /// Eddy-current loss by region, of the meshed part [W].
+    pub losses_w: BTreeMap<String, f64>,
+    /// The field at the probes.
+    pub probes: Vec<ProbeResult>,
+}
+
+/// The best design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DesignResult {
+    /// The variables [m].
+    pub values_m: Vec<f64>,
+    /// Their lower bounds [m].
+    pub lower_m: Vec<f64>,
+    /// Their upper bounds [m].
+    pub upper_m: Vec<f64>,
+    /// Where they act on the undeformed mesh [m].
+    pub points_m: Vec<[f64; 3]>,
+}
+
+/// The mesh of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MeshResult {
+    /// Nodes.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tets: usize,
+    /// Unknowns of the field problem.
+    pub unknowns: usize,
+    /// Worst quality (Eq. 4) of the initial mesh.
+    pub worst_quality_initial: f64,
+    /// Worst quality of the mesh of the best design.
+    pub worst_quality_final: f64,
+}
+
+/// The field at the points of one probe, shapes `(n_points, 3)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProbeResult {
+    /// The probe's name.
+    pub name: String,
+    /// The points [m].
+    pub points_m: Vec<[f64; 3]>,
+    /// Real part of B [T]; `null` for a point that the moved mesh no longer holds.
+    pub b_re_t: Vec<Option<[f64; 3]>>,
+    /// Imaginary part of B [T]; `null` likewise.
+    pub b_im_t: Vec<Option<[f64; 3]>>,
+}
+
+/// The linear systems of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LinearSolverResult {
+    /// The method that each state's solutions begin with.
+    #[serde(default)]
+    pub methods: Vec<String>,
+    /// Largest relative residual of any accepted solution.
+    pub worst_residual: f64,
+    /// Iterations for the design of this result: states and adjoints.
+    #[serde(default)]
+    pub iterations: usize,
+}
+
+impl RunResult {
+    /// Write `result.json`.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
+        directory.write(&directory.result(), &self.to_json())
+    }
+
+    /// The file's content.
+    pub fn to_json(&self) -> Vec<u8> {
+        to_json(self)
+    }
+}
+
+/// Indented JSON with a line break at the end.
+pub(crate) fn to_json(value: &impl Serialize) -> Vec<u8> {
+    let mut bytes = serde_json::to_vec_pretty(value).expect("structs of numbers and text have a JSON form");
+    bytes.push(b'\n');
+    bytes
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn example() -> RunResult {
+        RunResult {
+            schema_version: 1,
+            command: "run".into(),
+            status: RunStatus::Converged,
+            stop_reason: StopReason::ObjectiveConverged,
+            evaluations: 8,
+            iterations: 7,
+            objective: Some(ObjectiveResult {
+                initial: 2.0,
+                best: 1.0,
+                ratio: 0.5,
+                best_evaluation: 7,
+                verified_ratio: Some(0.5),
+                verification: Some(Verification {
+                    refinement: 1.25,
+                    tets: 147_000,
+                    initial: 2.2,
+                    best: 1.1,
+                    ratio: 0.5,
+                }),
+                terms: vec![TermResult {
+                    kind: "loss".to_owned(),
+                    region: Some("plate".to_owned()),
+                    frequency: None,
+                    weight: 1.0,
+                    value: 1.0,
+                }],
+            }),
+            constraints: vec![ConstraintResult {
+                name: "volume_plate".to_owned(),
+                value: 1e-3,
+                bound: 1e-3,
+                satisfied: true,
+            }],
+            rounds: vec![fluxmorph_optimizer::rounds::RoundEvent {
+                round: 1,
+                kind: fluxmorph_optimizer::rounds::RoundKind::Round,
+                evaluation: Some(4),
+                worst_quality: [0.1; 2],
+                admitted: None,
+                stiffness: "inverse_size".to_owned(),
+                reach: [0.5, 0.75],
+                cause: "the search reached the edge of its box".to_owned(),
+            }],
+            design: Some(DesignResult {
+                values_m: vec![0.02],
+                lower_m: vec![-0.005],
+                upper_m: vec![0.02],
+                points_m: vec![[0.0, 0.0, -0.01]],
+            }),
+            mesh: MeshResult {
+                nodes: 100,
+                tets: 400,
+                unknowns: 350,
+                worst_quality_initial: 0.48,
+                worst_quality_final: 0.1,
+            },
+            frequencies_hz: vec![60.0],
+            probes: vec![],
+            losses_w: [("plate".to_owned(), 12.5)].into(),
+            states: vec![],
+            linear_solver: LinearSolverResult {
+                methods: vec!["direct_single".to_owned()],
+                worst_residual: 1e-11,
+                iterations: 4,
+            },
+            timings_s: [("total".to_owned(), 12.0)].into(),
+            peak_memory_bytes: 1 << 20,
+        }
+    }
+
+    #[test]
+    fn a_result_has_the_keys_of_the_contract_and_reads_back() {
+        let bytes = example().to_json();
+        let value: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+        let contract: &[(&str, &[&str])] = &[
+            ("", &["schema_version", "command", "evaluations", "iterations", "probes", "peak_memory_bytes"]),
+            ("/objective", &["initial", "best", "ratio", "best_evaluation", "verified_ratio"]),
+            ("/design", &["values_m", "lower_m", "upper_m", "points_m"]),
+            ("/mesh", &["nodes", "tets", "unknowns", "worst_quality_initial", "worst_quality_final"]),
+            ("/losses_w", &["plate"]),
+            ("/linear_solver", &["worst_residual"]),
+            ("/timings_s", &["total"]),
+        ];
+        for (pointer, keys) in contract {
+            let object = value.pointer(pointer).expect("an object");
+            assert!(keys.iter().all(|key| object.get(key).is_some()), "{pointer}: {object}");
+        }
+        assert_eq!(value["status"], "converged");
+        assert_eq!(value["stop_reason"], "objective_converged");
+        assert_eq!(serde_json::from_slice::<RunResult>(&bytes).expect("a result"), example());
+    }
+}

@@ -1,0 +1,165 @@
+//! The configuration in plain words.
+
+use super::ticks::{number, trimmed};
+use crate::config::{
+    Algorithm, BodyKind, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal, Limit,
+    ObjectiveKind, UpperBound, Weighting,
+};
+
+/// What is made small or large.
+pub(super) fn objective(config: &Config) -> Option<String> {
+    let objective = config.objective.as_ref()?;
+    let goal = match objective.goal {
+        Goal::Minimise => "Minimise",
+        Goal::Maximise => "Maximise",
+    };
+    let terms: Vec<String> = objective
+        .terms()
+        .iter()
+        .map(|term| {
+            let what = functional(&term.functional);
+            if term.weight == 1.0 { what } else { format!("{} times {what}", number(term.weight, 3)) }
+        })
+        .collect();
+    Some(format!("{goal} {}", terms.join(", plus ")))
+}
+
+/// A functional of the field.
+pub(super) fn functional(functional: &Functional) -> String {
+    let region = functional.region.as_deref().unwrap_or("the whole mesh");
+    let sum = |integrand: &str| match functional.weighting {
+        Some(Weighting::Volume) => format!("the integral of {integrand} over {region}"),
+        _ => format!("the sum of {integrand} over the cells of {region}"),
+    };
+    let what = match functional.kind {
+        ObjectiveKind::FluxDensitySquared => sum("|B|²"),
+        ObjectiveKind::Uniformity => {
+            let target = functional.target.unwrap_or_default().map(|c| number(c, 3)).join(", ");
+            sum(&format!("|B − ({target}) T|²"))
+        }
+        ObjectiveKind::FieldComponent => {
+            let along = functional.direction.unwrap_or_default().map(|c| trimmed(c, 3)).join(", ");
+            format!("the mean of B along ({along}) in {region}")
+        }
+        ObjectiveKind::Loss => format!("the eddy-current loss in {region}"),
+        ObjectiveKind::Energy => format!("the magnetic energy in {region}"),
+    };
+    match functional.frequency {
+        Some(frequency) => format!("{what} at {} Hz", trimmed(frequency, 6)),
+        None => what,
+    }
+}
+
+/// The frequencies.
+pub(super) fn frequencies(config: &Config) -> String {
+    match config.analysis.frequencies() {
+        [0.0] => "in a static field".to_owned(),
+        all => format!("at {} Hz", all.iter().map(|f| trimmed(*f, 6)).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// What moves, which way and how far, with so many variables.
+pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String> {
+    let design = config.design.as_ref()?;
+    let way = match design.direction {
+        DesignDirection::Word(DirectionWord::Normal) => "along its normal".to_owned(),
+        DesignDirection::Vector(vector) => match (0..3).find(|&d| vector[d].abs() == 1.0) {
+            Some(axis) => {
+                format!("along {}{}", if vector[axis] < 0.0 { "−" } else { "+" }, ["x", "y", "z"][axis])
+            }
+            None => format!("along ({})", vector.map(|c| trimmed(c, 3)).join(", ")),
+        },
+    };
+    let [lower, upper] = [design.lower, design.upper].map(|bound| trimmed(1e3 * bound, 3));
+    let mut text = format!("by moving {} {way} between {lower} and {upper} mm", design.surface.join(", "));
+    if let Some(variables) = variables {
+        text += &format!(" with {variables} variables");
+    }
+    match (design.grid, design.filter_radius) {
+        (Some([n, m]), _) => text += &format!(" (control grid {n} × {m})"),
+        (None, Some(radius)) => text += &format!(" (nodes, filtered over {} mm)", trimmed(1e3 * radius, 3)),
+        (None, None) => text += " (one a node)",
+    }
+    Some(text)
+}
+
+/// A constraint.
+pub(super) fn constraint(constraint: &Constraint) -> String {
+    let upper = |bound: &UpperBound, unit: &str| match bound {
+        UpperBound::Value(value) => format!("at most {}{unit}", number(*value, 4)),
+        UpperBound::Ratio(ratio) => format!("at most {} times its initial value", trimmed(*ratio, 6)),
+    };
+    match &constraint.limit {
+        Limit::Field { functional: measured, bound } => {
+            let unit = format!(" {}", measured.dimension().si_unit());
+            format!("{} {}", functional(measured), upper(bound, &unit))
+        }
+        Limit::Body { kind: BodyKind::Volume, region, bound } => {
+            format!("the volume of {region} {}", upper(bound, " m³"))
+        }
+        Limit::Body { kind: BodyKind::Mass, region, bound } => {
+            format!("the mass of {region} {}", upper(bound, " kg"))
+        }
+        Limit::Thickness { minimum, maximum, .. } => {
+            let bounds = [("at least", minimum), ("at most", maximum)];
+            let words = bounds.iter().filter_map(|(word, bound)| {
+                bound.map(|bound| format!("{word} {} mm", trimmed(1e3 * bound, 3)))
+            });
+            format!("a thickness of {}", words.collect::<Vec<_>>().join(" and "))
+        }
+    }
+}
+
+/// The method.
+pub(super) fn algorithm(algorithm: Algorithm) -> &'static str {
+    match algorithm {
+        Algorithm::Mma => "the method of moving asymptotes (MMA)",
+        Algorithm::Ccsaq => "conservative convex separable approximation (CCSAQ)",
+        Algorithm::Slsqp => "sequential quadratic programming (SLSQP)",
+        Algorithm::Lbfgs => "limited-memory BFGS",
+        Algorithm::Tnewton => "truncated Newton",
+        Algorithm::Var2 => "a limited-memory variable metric (VAR2)",
+    }
+}
+
+/// Everything in one paragraph.
+pub(super) fn summary(config: &Config, variables: Option<usize>, is_run: bool) -> String {
+    let frequencies = frequencies(config);
+    if !is_run {
+        return format!("One field analysis {frequencies}.");
+    }
+    let mut text = objective(config).unwrap_or_else(|| "Optimise".to_owned());
+    text += &format!(" {frequencies}");
+    if let Some(design) = design(config, variables) {
+        text += &format!(", {design}");
+    }
+    if !config.constraints.is_empty() {
+        let all: Vec<String> = config.constraints.iter().map(constraint).collect();
+        text += &format!(", subject to {}", all.join("; "));
+    }
+    text + &format!(", with {}.", algorithm(config.optimizer.algorithm))
+}
+
+/// A text as a sentence begins.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shield_is_told_in_a_sentence() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+        let (config, _) = Config::from_file(&path.join("shield.toml"), &[]).expect("shipped");
+        assert_eq!(
+            summary(&config, Some(91), true),
+            "Minimise the sum of |B|² over the cells of observation at 60 Hz, by moving plate_bottom along −z between −5 \
+             and 20 mm with 91 variables (control grid 7 × 13), with the method of moving asymptotes (MMA)."
+        );
+        let (config, _) = Config::from_file(&path.join("shield_mass_limit.toml"), &[]).expect("shipped");
+        assert!(summary(&config, None, true).contains("subject to the mass of plate at most"));
+    }
+}

@@ -1,0 +1,174 @@
+//! What a run keeps as its evaluations come: fields, journal, history.
+//!
+//! The order is that of what must be on the disk first: a field file and the collection that names it, then the record in
+//! the journal, which makes the evaluation one that a resumed run is told, then the rows of the history.
+
+use std::collections::VecDeque;
+
+use fluxmorph_geometry::io::pvd_text;
+
+use super::pieces::SharedPieces;
+use crate::config::FieldsKept;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::Recorder;
+use crate::error::Error;
+use crate::fields::{self, FieldData};
+use crate::journal::{Contents, Identity, Journal};
+use fluxmorph_optimizer::driver::Record;
+use crate::observer::Evaluation;
+use crate::output::{History, RunDirectory};
+use fluxmorph_optimizer::problem::{Analysis, Problem};
+
+/// Writes journal, history and fields into the run directory.
+pub(super) struct DirectoryRecorder<'a> {
+    directory: &'a RunDirectory,
+    journal: Journal,
+    history: History,
+    kept: FieldsKept,
+    /// Evaluations with a field file, ascending.
+    written: Vec<usize>,
+    /// Evaluations of before that are still to be told.
+    recalled: VecDeque<Record>,
+    /// Whether these have the bits of one process.
+    is_exact: bool,
+    /// Where all ranks write the fields.
+    pieces: Option<SharedPieces>,
+}
+
+impl<'a> DirectoryRecorder<'a> {
+    /// For a run that begins; `constraints` are the names of its constraints.
+    pub(super) fn create(
+        directory: &'a RunDirectory,
+        identity: Identity,
+        constraints: &[&str],
+        kept: FieldsKept,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            directory,
+            journal: Journal::create(directory, identity)?,
+            history: History::create(directory, constraints, &[])?,
+            kept,
+            written: Vec::new(),
+            recalled: VecDeque::new(),
+            is_exact: true,
+            pieces: None,
+        })
+    }
+
+    /// For a run that goes on behind what its journal holds: history, collection and field files are brought to that.
+    /// `ranks` are the most that have computed it; `None` where one process has.
+    pub(super) fn reopen(
+        directory: &'a RunDirectory,
+        contents: Contents,
+        constraints: &[&str],
+        kept: FieldsKept,
+        ranks: Option<usize>,
+    ) -> Result<Self, Error> {
+        let is_exact = ranks.is_none();
+        // The journal first: it holds the directory against other processes.
+        let journal = Journal::reopen(directory, &contents)?;
+        let records = contents.records;
+        let rows: Vec<&Evaluation> = records.iter().map(|record| &record.row).collect();
+        let history = History::create(directory, constraints, &rows)?;
+        let mut written = directory.evaluations_with_fields()?;
+        written.retain(|&evaluation| records.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
+        // No collection names a file that is removed.
+        if written.is_empty() {
+            directory.remove(&directory.collection())?;
+        } else {
+            write_collection(directory, &written)?;
+        }
+        directory.remove_leftovers(&written)?;
+        Ok(Self {
+            directory,
+            journal,
+            history,
+            kept,
+            written,
+            recalled: records.into(),
+            is_exact,
+            pieces: None,
+        })
+    }
+
+    /// The same with fields that all ranks write.
+    pub(super) fn written_by(mut self, pieces: Option<SharedPieces>) -> Self {
+        self.pieces = pieces;
+        self
+    }
+
+    /// Writes the field of an evaluation, and the collection of all.
+    pub(super) fn write(
+        &mut self,
+        evaluation: usize,
+        problem: &Problem,
+        analysis: &Analysis,
+    ) -> Result<(), Error> {
+        if self.written.last() == Some(&evaluation) {
+            return Ok(());
+        }
+        write_field(self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
+        self.written.push(evaluation);
+        write_collection(self.directory, &self.written)
+    }
+
+    /// Keeps a complete evaluation.
+    fn keep(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {
+        if is_wanted(self.kept, record) {
+            self.write(record.row.evaluation, problem, analysis)?;
+        }
+        self.journal.append(record)?;
+        Ok(self.history.append(&record.row)?)
+    }
+}
+
+impl Recorder for DirectoryRecorder<'_> {
+    fn is_exact(&self) -> bool {
+        self.is_exact
+    }
+
+    fn recall(&mut self) -> Option<Record> {
+        self.recalled.pop_front()
+    }
+
+    fn record(
+        &mut self,
+        record: &Record,
+        analysis: &Analysis,
+        problem: &Problem,
+    ) -> Result<(), OptimizerError> {
+        Ok(self.keep(record, analysis, problem)?)
+    }
+}
+
+/// Whether the field of an evaluation is written when it is computed.
+fn is_wanted(kept: FieldsKept, record: &Record) -> bool {
+    match kept {
+        FieldsKept::Every => true,
+        FieldsKept::Improved => record.improved,
+        FieldsKept::FirstLast => record.row.evaluation == 0,
+        FieldsKept::Nothing => false,
+    }
+}
+
+/// Writes the field file of an evaluation, or the pieces of all ranks.
+pub(super) fn write_field(
+    directory: &RunDirectory,
+    pieces: Option<&SharedPieces>,
+    evaluation: usize,
+    problem: &Problem,
+    analysis: &Analysis,
+) -> Result<(), Error> {
+    if let Some(pieces) = pieces {
+        return pieces.write(directory, evaluation, problem, analysis);
+    }
+    let bytes = fields::vtu(&problem.states, &FieldData::of(analysis))?;
+    Ok(directory.write_field(evaluation, &bytes)?)
+}
+
+/// Writes the PVD file over all field files; its time is the evaluation number.
+pub(super) fn write_collection(directory: &RunDirectory, evaluations: &[usize]) -> Result<(), Error> {
+    let files = directory.fields_in_collection(evaluations)?;
+    let text = pvd_text(evaluations.iter().zip(&files).map(|(&e, file)| (e as f64, file.as_str())))?;
+    Ok(directory.write(&directory.collection(), text.as_bytes())?)
+}

@@ -1,0 +1,199 @@
+//! The design surface of a configuration: its triangles, which side of them is the body, and the planes it meets.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
+
+use super::millimetres;
+use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, Source};
+use fluxmorph_optimizer::design::{
+    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
+};
+use crate::error::Error;
+
+/// The design surface on the mesh with all regions.
+pub(super) fn surface(
+    config: &Config,
+    source: &Source,
+    design: &config::Design,
+    mesh: &Mesh,
+) -> Result<DesignSurface, Error> {
+    let topology = mesh.topology();
+    let facets: BTreeMap<[NodeId; 3], &Facet> =
+        topology.facets().iter().map(|facet| (face_key(facet.nodes), facet)).collect();
+    let mut triangles = Vec::new();
+    let mut own = BTreeSet::new();
+    for name in &design.surface {
+        for &triangle in topology.surface(name)?.iter().filter(|t| own.insert(face_key(**t))) {
+            triangles.push(match design.direction {
+                DesignDirection::Vector(_) => triangle,
+                DesignDirection::Word(DirectionWord::Normal) => {
+                    let facet = facets.get(&face_key(triangle)).copied();
+                    out_of_body(config, topology, name, facet)
+                        .ok_or_else(|| unclear_side(source, mesh, name, triangle))?
+                }
+            });
+        }
+    }
+    let mut kept = Vec::new();
+    let applied = config.boundaries.uniform_field.iter().flat_map(|field| &field.surfaces);
+    let conditioned =
+        config.boundaries.flux_parallel.iter().chain(&config.boundaries.flux_normal).chain(applied);
+    let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
+    for name in conditioned.chain(slide).collect::<BTreeSet<_>>() {
+        kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&face_key(*t))));
+    }
+    let outer = |t: &[NodeId; 3]| facets.get(&face_key(*t)).is_some_and(|facet| facet.outside.is_none());
+    let setup = DesignSetup {
+        direction: match design.direction {
+            DesignDirection::Vector(direction) => Direction::Along(direction),
+            DesignDirection::Word(DirectionWord::Normal) => Direction::Normal,
+        },
+        control: match (design.grid, design.filter_radius) {
+            (Some(counts), _) => Control::Grid(counts),
+            (None, Some(radius)) => Control::Filter(radius),
+            (None, None) => Control::Nodes,
+        },
+        mirrors: design.symmetry.iter().map(mirror).collect(),
+        rim: match design.rim {
+            RimMotion::Free => Rim::Free,
+            RimMotion::Fixed => Rim::Fixed,
+        },
+        cuts: kept.iter().copied().filter(outer).collect(),
+        triangles,
+        kept,
+    };
+    let surface = DesignSurface::new(mesh, &setup).map_err(|error| fault(source, design, error))?;
+    if surface.variable_count() == 0 {
+        let fault = source
+            .fault("design", "no node of the design surface can move")
+            .expected("a surface with nodes off its rim and off the planes that it must keep")
+            .help("take rim = \"free\", or another surface or direction");
+        return Err(source.error(vec![fault]).into());
+    }
+    Ok(surface)
+}
+
+/// The triangles of the design surface, each once, on the mesh with all regions.
+pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Triangulation, Error> {
+    Ok(Triangulation::new(mesh, &triangles(design, mesh)?))
+}
+
+/// The triangles themselves.
+pub(super) fn triangles(design: &config::Design, mesh: &Mesh) -> Result<Vec<[NodeId; 3]>, Error> {
+    let mut own = BTreeSet::new();
+    let mut triangles = Vec::new();
+    for name in &design.surface {
+        let surface = mesh.topology().surface(name)?;
+        triangles.extend(surface.iter().copied().filter(|t| own.insert(face_key(*t))));
+    }
+    Ok(triangles)
+}
+
+/// The same surface on the mesh without the regions that impedance surfaces replace.
+pub(super) fn on_remaining(
+    source: &Source,
+    surface: &DesignSurface,
+    full_mesh: &Mesh,
+    mesh: &Mesh,
+) -> Result<DesignSurface, Error> {
+    let key = |point: [f64; 3]| point.map(f64::to_bits);
+    // Nodes keep their order where others are taken out.
+    let wanted: BTreeSet<_> = surface.nodes().iter().map(|&n| key(full_mesh.point(n))).collect();
+    let nodes: Vec<NodeId> =
+        mesh.topology().nodes().filter(|&n| wanted.contains(&key(mesh.point(n)))).collect();
+    if nodes.len() == surface.nodes().len() {
+        return Ok(surface.renumbered(nodes));
+    }
+    let message = format!(
+        "{} of {} nodes of the design surface lie inside a region that its impedance surface replaces",
+        surface.nodes().len().saturating_sub(nodes.len()),
+        surface.nodes().len()
+    );
+    let fault = source
+        .fault("design.surface", message)
+        .expected("a surface between such a region and a meshed one, or model = \"volume\"");
+    Err(source.error(vec![fault]).into())
+}
+
+/// A design triangle oriented out of the body; `None` where neither side is, or both are.
+///
+/// The body is the side with a `[regions]` entry; where that does not decide, the first region of a surface named
+/// `first|second`. Behind an outer face of air lies a body that is not meshed.
+fn out_of_body(
+    config: &Config,
+    topology: &Topology,
+    name: &str,
+    facet: Option<&Facet>,
+) -> Option<[NodeId; 3]> {
+    let facet = facet?;
+    let region = |e: ElementId| topology.region_names()[topology.region_of()[e.index()].index()].as_str();
+    let is_body = |e: ElementId| config.regions.contains_key(region(e));
+    let [a, b, c] = facet.nodes;
+    let (out_of_inside, out_of_outside) = ([a, b, c], [a, c, b]);
+    match (is_body(facet.inside), facet.outside.map(|e| (e, is_body(e)))) {
+        (true, None | Some((_, false))) => Some(out_of_inside),
+        (false, None | Some((_, true))) => Some(out_of_outside),
+        (_, Some((outside, _))) => {
+            let first = name.split_once('|')?.0.trim();
+            match (region(facet.inside) == first, region(outside) == first) {
+                (true, false) => Some(out_of_inside),
+                (false, true) => Some(out_of_outside),
+                _ => None,
+            }
+        }
+    }
+}
+
+fn unclear_side(source: &Source, mesh: &Mesh, name: &str, triangle: [NodeId; 3]) -> Error {
+    let place = fluxmorph_geometry::tet4::centroid(triangle.map(|n| mesh.point(n)));
+    let message = format!(
+        "which side of `{name}` is the body that the design thickens is not clear at {}",
+        millimetres(place)
+    );
+    let fault = source.fault("design.direction", message).expected(
+        "a surface with a [regions] entry on one side and air on the other, or a direction of three numbers",
+    );
+    source.error(vec![fault]).into()
+}
+
+fn mirror(plane: &config::SymmetryPlane) -> Mirror {
+    Mirror { axis: plane.axis.index(), at: plane.at }
+}
+
+/// The fault at the key that the surface does not fit.
+fn fault(source: &Source, design: &config::Design, error: DesignError) -> Error {
+    let names = design.surface.join("`, `");
+    let fault = match error {
+        DesignError::Empty => source.fault("design.surface", format!("the surface `{names}` has no triangles")),
+        DesignError::NoExtent { .. } => source
+            .fault("design.direction", format!("a control grid cannot be laid across `design.direction` on `{names}`"))
+            .expected("the direction that stands most upright on the surface, or no design.grid"),
+        DesignError::Folded { point, axis } => source
+            .fault(
+                "design.grid",
+                format!("a control grid cannot be laid over `{names}`: at {} it turns back along {axis}", millimetres(point)),
+            )
+            .expected("a surface that is a height over two coordinates, or design.filter_radius instead of design.grid"),
+        DesignError::NoPartner { what, point, axis, at, distance } => source
+            .fault(
+                "design.symmetry",
+                format!(
+                    "the {what} at {} has no partner in the mirror {axis} = {:.3} mm: the nearest lies {:.3e} mm from its \
+                     image",
+                    millimetres(point),
+                    at * 1e3,
+                    distance * 1e3
+                ),
+            )
+            .expected("a surface and a mesh that are symmetric about the plane")
+            .help("check `at`, mesh one half and mirror it, or leave the symmetry out"),
+        DesignError::WideFilter { .. } => source
+            .fault("design.filter_radius", error.to_string())
+            .help("take a smaller radius, or a coarser mesh on the surface"),
+        // Of a mirror plane.
+        _ => source.fault("design.symmetry", error.to_string()),
+    };
+    source.error(vec![fault]).into()
+}

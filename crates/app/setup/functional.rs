@@ -1,0 +1,236 @@
+//! Objective and constraints of a configuration on its states.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::{FieldModel, Functional};
+
+use fluxmorph_optimizer::Error as OptimizerError;
+use crate::config::{
+    self, BodyKind, Config, Fault, Limit as Written, ObjectiveKind, RegionModel, Source, UpperBound,
+};
+use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
+use crate::error::Error;
+use fluxmorph_optimizer::geometric;
+use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
+use fluxmorph_optimizer::problem::Shape;
+
+/// Every functional of the configuration with its key path: terms of the objective, then constraints.
+pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {
+    let terms = config.objective.iter().flat_map(|objective| {
+        let terms = objective.terms().iter().enumerate();
+        terms.map(|(k, term)| (objective.path(k), &term.functional))
+    });
+    let constraints = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
+        let Written::Field { functional, .. } = &constraint.limit else { return None };
+        Some((format!("constraints[{k}]"), functional))
+    });
+    terms.chain(constraints).collect()
+}
+
+/// Key path and name of every region that objective and constraints name.
+pub(super) fn regions(config: &Config) -> Vec<(String, &str)> {
+    let fields = functionals(config)
+        .into_iter()
+        .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
+    let bodies = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
+        let Written::Body { region, .. } = &constraint.limit else { return None };
+        Some((format!("constraints[{k}].region"), region.as_str()))
+    });
+    fields.chain(bodies).collect()
+}
+
+/// What objective and constraints ask of regions that these cannot give.
+pub(super) fn faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    let known = |name: &&str| topology.region(name).is_ok();
+    for (path, functional) in functionals(config) {
+        let Some(region) = functional.region.as_deref().filter(known) else { continue };
+        let entry = config.regions.get(region);
+        if functional.kind == ObjectiveKind::Loss {
+            if super::material(config, region).conductivity == 0.0 {
+                let message = format!("`{region}` does not conduct, so it has no eddy-current loss");
+                faults.push(
+                    source
+                        .fault(&format!("{path}.region"), message)
+                        .expected("a region whose material conducts"),
+                );
+            }
+        } else if entry.is_some_and(|entry| entry.model == RegionModel::Impedance) {
+            let message = format!("`{region}` is replaced by its impedance surface");
+            faults.push(
+                source
+                    .fault(&format!("{path}.region"), message)
+                    .expected("a region that is meshed, such as air"),
+            );
+        }
+    }
+    for (k, constraint) in config.constraints.iter().enumerate() {
+        let Written::Body { kind: BodyKind::Mass, region, .. } = &constraint.limit else { continue };
+        if known(&region.as_str()) && density(config, region).is_none() {
+            let message = format!("the mass of `{region}` is limited, but its material has no density");
+            let fault = source.fault(&format!("constraints[{k}].kind"), message);
+            faults.push(match config.regions.get(region) {
+                Some(entry) => fault.help(format!(
+                    "add a line like: density = \"7850 kg/m3\" to [materials.{}], or limit the volume",
+                    entry.material
+                )),
+                None => fault.expected("a region with a material, or kind = \"volume\""),
+            });
+        }
+    }
+    faults
+}
+
+/// Mass density [kg/m³] of a region's material, if it is given.
+fn density(config: &Config, region: &str) -> Option<f64> {
+    config.materials.get(&config.regions.get(region)?.material)?.density
+}
+
+/// The objective on the states of a configuration.
+pub(super) fn objective(
+    config: &Config,
+    mesh: &Mesh,
+    states: &[FieldModel],
+) -> Result<Option<WeightedSum>, Error> {
+    let Some(objective) = &config.objective else { return Ok(None) };
+    let terms = objective
+        .terms()
+        .iter()
+        .map(|written| {
+            Ok(Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? })
+        })
+        .collect::<Result<_, Error>>()?;
+    Ok(Some(WeightedSum { goal: objective.goal.into(), terms }))
+}
+
+/// A functional on the states that it is taken at, with the weight one.
+fn term(
+    config: &Config,
+    functional: &config::Functional,
+    mesh: &Mesh,
+    states: &[FieldModel],
+) -> Result<Term, Error> {
+    let frequencies = config.analysis.frequencies();
+    let taken = |k: &usize| functional.frequency.is_none_or(|own| own == frequencies[*k]);
+    let weighting = match functional.weighting {
+        Some(config::Weighting::Volume) => Weighting::Volume,
+        _ => Weighting::Point,
+    };
+    let name = functional.region.as_deref().unwrap_or_default();
+    let region = || mesh.topology().region(name);
+    // All states have the regions, conductors and node numbers of the first.
+    let model = &states[0];
+    let measured = match functional.kind {
+        ObjectiveKind::FluxDensitySquared => {
+            Functional::observation(mesh, region()?, Observed::Deviation { target: [0.0; 3], weighting })?
+        }
+        ObjectiveKind::Uniformity => {
+            let target = functional.target.unwrap_or_default();
+            Functional::observation(mesh, region()?, Observed::Deviation { target, weighting })?
+        }
+        ObjectiveKind::FieldComponent => {
+            let direction = functional.direction.unwrap_or_default();
+            Functional::observation(mesh, region()?, Observed::Component { direction })?
+        }
+        ObjectiveKind::Loss => Functional::loss(model, name)?,
+        ObjectiveKind::Energy => {
+            Functional::energy(model, functional.region.is_some().then(region).transpose()?)?
+        }
+    };
+    Ok(Term {
+        functional: measured,
+        states: (0..states.len()).filter(taken).collect(),
+        weight: 1.0,
+        label: Label {
+            kind: functional.kind.name(),
+            region: functional.region.clone(),
+            frequency: functional.frequency,
+        },
+    })
+}
+
+/// Elements that must not move, with the key path of the region they observe.
+pub(super) fn observed(
+    config: &Config,
+    mesh: &Mesh,
+    states: &[FieldModel],
+) -> Result<Vec<(String, Vec<ElementId>)>, Error> {
+    functionals(config)
+        .into_iter()
+        .map(|(path, functional)| {
+            let elements = term(config, functional, mesh, states)?.functional.fixed_elements().collect();
+            Ok((format!("{path}.region"), elements))
+        })
+        .collect()
+}
+
+/// The constraints of a configuration on its states and its shape.
+pub(super) fn constraints(
+    config: &Config,
+    source: &Source,
+    [full_mesh, mesh]: [&Mesh; 2],
+    states: &[FieldModel],
+    shape: &Shape,
+) -> Result<Vec<Constraint>, Error> {
+    let mut constraints = Vec::new();
+    for (k, written) in config.constraints.iter().enumerate() {
+        let mut add = |name: String, quantity: Quantity, limit: Limit| {
+            constraints.push(Constraint { name, quantity, limit });
+        };
+        match &written.limit {
+            Written::Field { functional, bound } => {
+                let term = term(config, functional, mesh, states)?;
+                add(written.name.clone(), Quantity::Field(term), upper(*bound));
+            }
+            Written::Body { kind, region, bound } => {
+                let conductor = states[0].conductors().iter().find(|c| c.name == *region);
+                let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
+                let body = geometric::Volume::new(mesh, full_mesh, region, surface).map_err(OptimizerError::from)?;
+                let body = match (kind, density(config, region)) {
+                    (BodyKind::Mass, Some(density)) => body.with_density(density),
+                    _ => body,
+                };
+                add(written.name.clone(), Quantity::Volume(body), upper(*bound));
+            }
+            Written::Thickness { minimum, maximum, .. } => {
+                // Both bounds of one entry are two constraints, told apart by their names.
+                let name = |suffix: &str| match (minimum, maximum) {
+                    (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
+                    _ => written.name.clone(),
+                };
+                let measure = |bound: geometric::Bound| {
+                    geometric::ThicknessBound::new(shape, bound).map_err(|error| {
+                        let fault = source.fault(&format!("constraints[{k}].kind"), error.to_string());
+                        source.error(vec![fault.help("limit design.lower and design.upper instead")])
+                    })
+                };
+                if let Some(bound) = *minimum {
+                    let measure = measure(geometric::Bound::Minimum(bound))?;
+                    add(name("minimum"), Quantity::Thickness { measure, bound }, Limit::AtLeast(bound));
+                }
+                if let Some(bound) = *maximum {
+                    let measure = measure(geometric::Bound::Maximum(bound))?;
+                    add(name("maximum"), Quantity::Thickness { measure, bound }, Limit::AtMost(bound));
+                }
+            }
+        }
+    }
+    // The suffixes of a thickness may meet another constraint's name.
+    let mut names = BTreeSet::new();
+    if let Some(twice) = constraints.iter().find(|constraint| !names.insert(constraint.name.as_str())) {
+        let message = format!("two constraints are named `{}`", twice.name);
+        return Err(source
+            .error(vec![source.fault("constraints", message).expected("a different name for each")])
+            .into());
+    }
+    Ok(constraints)
+}
+
+fn upper(bound: UpperBound) -> Limit {
+    match bound {
+        UpperBound::Value(value) => Limit::AtMost(value),
+        UpperBound::Ratio(ratio) => Limit::AtMostRatio(ratio),
+    }
+}

@@ -1,0 +1,443 @@
+//! The design surface and the elastic map of a configuration, and whether its bounds leave the mesh whole.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::ranks::{Member, Share};
+use fluxmorph_geometry::tet4::{centroid, dot, sub};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_remesh::{
+    Boundary, BoundaryKind, ElasticMap, Guidance, Limits, Motion, RemeshError, RemeshSetup, SolverChoice,
+    StiffnessPolicy, Subregion,
+};
+use fluxmorph_solver::FieldModel;
+
+use super::millimetres;
+use crate::config::{
+    self, Config, Design, DesignDirection, DirectionWord, Fault, Remesh, RemeshExtent, Source, StiffnessLaw,
+};
+use fluxmorph_optimizer::design::DesignSurface;
+use crate::error::Error;
+use fluxmorph_optimizer::problem::Shape;
+use fluxmorph_optimizer::thickness::Thickness;
+
+/// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
+const LEAST_QUALITY_SHARE: f64 = 0.05;
+
+/// What the shape is made from.
+pub(super) struct Inputs<'a> {
+    pub(super) source: &'a Source,
+    pub(super) design: &'a Design,
+    pub(super) remesh: &'a Remesh,
+    /// With all regions.
+    pub(super) full_mesh: &'a Mesh,
+    /// Without the regions that impedance surfaces replace.
+    pub(super) mesh: &'a Mesh,
+    /// The ranks among which it is shared out.
+    pub(super) share: Option<&'a Share>,
+}
+
+/// The design surface and the elastic map, before they are held against the field problem.
+pub(super) struct Body {
+    /// On the mesh with all regions.
+    full_surface: DesignSurface,
+    /// On the mesh that is left.
+    surface: DesignSurface,
+    motion: Motion,
+}
+
+/// Makes the design surface and the elastic map.
+pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<String>) -> Result<Body, Error> {
+    let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
+    let full_surface = super::design::surface(config, source, design, full_mesh)?;
+    let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
+    let mut weights = vec![0.0; surface.variable_count()];
+    surface.rows().iter().flatten().for_each(|&(k, weight)| weights[k] += weight);
+    let idle = weights.iter().filter(|&&weight| weight == 0.0).count();
+    if idle > 0 {
+        warnings.push(format!(
+            "{idle} of {} design variables move no node: the control grid is finer than the mesh, or lies on a rim that is \
+             held; refine the mesh, or take a smaller design.grid",
+            surface.variable_count()
+        ));
+    }
+    let materials: BTreeSet<&str> = regions_at(full_mesh, full_surface.nodes())
+        .into_iter()
+        .map(|region| {
+            let name = full_mesh.topology().region_names()[region.index()].as_str();
+            config.regions.get(name).map_or("air", |region| region.material.as_str())
+        })
+        .collect();
+    if materials.len() < 2 {
+        warnings.push(format!(
+            "both sides of the design surface `{}` have the same material: moving it changes no field; check [regions]",
+            design.surface.join("`, `")
+        ));
+    }
+    let guidance = guidance(source, Some(design), inputs.remesh)?;
+    let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
+    let setup = RemeshSetup { share: inputs.share.cloned(), ..setup };
+    let motion = Motion::new(mesh.clone(), setup)?;
+    Ok(Body { full_surface, surface, motion })
+}
+
+/// The shape of a body, held against the field problem and the bounds.
+pub(super) fn shape(
+    inputs: &Inputs<'_>,
+    config: &Config,
+    body: Body,
+    model: &FieldModel,
+    observed: &[(String, Vec<ElementId>)],
+) -> Result<Shape, Error> {
+    let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
+    let Body { full_surface, surface, motion } = body;
+    let mut faults = overlap_faults(inputs, config, motion.moving(), model, observed);
+    if faults.is_empty() {
+        faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
+    }
+    let thickness = thickened(full_mesh, &full_surface, config)
+        .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
+    let n = surface.variable_count();
+    let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
+        let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
+        faults.push(fault.expected(format!("one value for each of the {n} design variables")));
+        Vec::new()
+    });
+    let quality = motion.quality(mesh).worst;
+    if let Some(minimum) = config.optimizer.minimum_quality.filter(|minimum| quality < *minimum) {
+        let message = format!(
+            "the worst element of the undeformed mesh has the quality {quality:.3e}, below optimizer.minimum_quality = \
+             {minimum}"
+        );
+        let fault = source.fault("optimizer.minimum_quality", message);
+        faults.push(fault.expected(format!("at most {quality:.3e}")));
+    }
+    source.check(faults)?;
+    let limits = Limits {
+        inversion_share: inputs.remesh.inversion_share,
+        least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
+        rounds: inputs.remesh.rounds,
+        ..Limits::default()
+    };
+    let shape = Shape {
+        surface,
+        motion,
+        limits,
+        thickness,
+        lower: vec![design.lower; n],
+        upper: vec![design.upper; n],
+        initial,
+    };
+    check_bounds(source, &shape, inputs.share)?;
+    Ok(shape)
+}
+
+/// Subregions, boundary kinds and design nodes (ascending) of the elastic body.
+pub(super) fn remesh_setup(
+    source: &Source,
+    remesh: &Remesh,
+    mesh: &Mesh,
+    design_nodes: &[NodeId],
+    guidance: Guidance,
+    warnings: &mut Vec<String>,
+) -> Result<RemeshSetup, Error> {
+    let topology = mesh.topology();
+    let mut subregions: Vec<Subregion> = match &remesh.extent {
+        RemeshExtent::Regions(names) => {
+            let mut names: BTreeSet<String> = names.iter().cloned().collect();
+            for region in regions_at(mesh, design_nodes) {
+                let name = &topology.region_names()[region.index()];
+                if names.insert(name.clone()) {
+                    warnings.push(format!(
+                        "the region `{name}` touches the design surface and moves with it: it is taken into the remesh \
+                         region"
+                    ));
+                }
+            }
+            names
+                .iter()
+                .map(|name| Ok(Subregion::new(name, topology.elements_of(topology.region(name)?))))
+                .collect::<Result<_, Error>>()?
+        }
+        RemeshExtent::Box([lower, upper]) => {
+            let inside = |e: &ElementId| {
+                let c = centroid(mesh.vertices(*e));
+                (0..3).all(|d| lower[d] <= c[d] && c[d] <= upper[d])
+            };
+            let mut parts = Vec::new();
+            for (i, name) in topology.region_names().iter().enumerate() {
+                let elements: Vec<ElementId> =
+                    topology.elements_of(RegionId::new(i)).into_iter().filter(inside).collect();
+                if !elements.is_empty() {
+                    parts.push(Subregion::new(name, elements));
+                }
+            }
+            parts
+        }
+    };
+    // A region that an impedance surface replaces has no elements left, and is no part of the body.
+    subregions.retain(|part| !part.elements.is_empty());
+    let outside: Vec<Fault> = remesh
+        .subregions
+        .iter()
+        .enumerate()
+        .filter(|(_, own)| subregions.iter().all(|part| part.name != own.name))
+        .map(|(i, own)| {
+            source
+                .fault(
+                    &format!("remesh.subregions[{i}].name"),
+                    format!("the region `{}` is no part of the remesh region", own.name),
+                )
+                .help("name it in remesh.region too, or take the subregion out")
+        })
+        .collect();
+    source.check(outside)?;
+    if subregions.is_empty() {
+        let (key, expected) = match &remesh.extent {
+            RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
+            RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
+        };
+        let fault = source.fault(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+        return Err(source.error(vec![fault]).into());
+    }
+    for part in &mut subregions {
+        let own = remesh.subregions.iter().find(|own| own.name == part.name);
+        part.young = own.and_then(|own| own.young).unwrap_or(remesh.young);
+        part.poisson = own.and_then(|own| own.poisson).unwrap_or(remesh.poisson);
+        part.force = own.and_then(|own| own.force).unwrap_or(remesh.force);
+    }
+    let mut boundaries = Vec::new();
+    for (names, kind) in [
+        (&remesh.slide, BoundaryKind::Slide),
+        (&remesh.fixed, BoundaryKind::Fixed),
+        (&remesh.free, BoundaryKind::Free),
+    ] {
+        for name in names {
+            boundaries.push(Boundary::of_surface(topology, name, kind)?);
+        }
+    }
+    let policy = match remesh.stiffness {
+        StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
+        StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
+        StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
+        StiffnessLaw::Directional => StiffnessPolicy::Directional,
+    };
+    Ok(RemeshSetup {
+        subregions,
+        policy,
+        guidance,
+        design_nodes: design_nodes.to_vec(),
+        boundaries,
+        fixed_nodes: Vec::new(),
+        solver: SolverChoice::Automatic,
+        share: None,
+    })
+}
+
+/// The axis of the design's direction where the motion is to follow it.
+pub(super) fn guidance(source: &Source, design: Option<&Design>, remesh: &Remesh) -> Result<Guidance, Error> {
+    let axis = match design.map(|design| design.direction) {
+        Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
+        Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
+    };
+    match remesh.motion {
+        config::Motion::Free => Ok(Guidance::Free),
+        config::Motion::AlongDesign => match axis {
+            Some(axis) => Ok(Guidance::Axis(axis)),
+            None => {
+                let fault = source
+                    .fault("remesh.motion", "the design does not move along a coordinate axis")
+                    .expected("motion = \"free\", or a design.direction along x, y or z");
+                Err(source.error(vec![fault]).into())
+            }
+        },
+    }
+}
+
+/// Regions with an element that has a face between design nodes, which are ascending.
+pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
+    let topology = mesh.topology();
+    topology
+        .facets()
+        .iter()
+        .filter(|f| f.nodes.iter().all(|n| design_nodes.binary_search(n).is_ok()))
+        .flat_map(|f| std::iter::once(f.inside).chain(f.outside))
+        .map(|e| topology.region_of()[e.index()])
+        .collect()
+}
+
+/// The region that a positive design thickens: behind the design surface, and not air.
+pub(super) fn thickened(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+    let topology = mesh.topology();
+    let direction_at = |node: &NodeId| {
+        let row = surface.nodes().binary_search(node).ok()?;
+        Some(surface.directions()[row]).filter(|direction| *direction != [0.0; 3])
+    };
+    let (facet, direction) = topology
+        .facets()
+        .iter()
+        .filter(|f| f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
+        .filter(|f| f.outside.is_some())
+        .find_map(|f| Some((f, f.nodes.iter().find_map(direction_at)?)))?;
+    let behind = |e: &ElementId| {
+        let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
+        dot(offset, direction) < 0.0
+    };
+    let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
+    let region = topology.region_of()[element.index()];
+    config.regions.contains_key(&topology.region_names()[region.index()]).then_some(region)
+}
+
+/// Whether a node is a design node or has a component that the elastic map decides.
+fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
+    surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
+}
+
+/// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
+fn overlap_faults(
+    inputs: &Inputs<'_>,
+    config: &Config,
+    moving: &[ElementId],
+    model: &FieldModel,
+    observed: &[(String, Vec<ElementId>)],
+) -> Vec<Fault> {
+    let Inputs { source, mesh, .. } = *inputs;
+    let moves = |e: &ElementId| moving.binary_search(e).is_ok();
+    let mut faults = Vec::new();
+    for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
+        faults.push(
+            source
+                .fault(path, "the observation region lies inside the remesh region and would move")
+                .expected("an observation region that no remesh region holds")
+                .help("take the region out of remesh.region, or shrink remesh.box"),
+        );
+    }
+    if let Some(e) = model.source_elements().find(moves) {
+        let place = centroid(mesh.vertices(e));
+        faults.push(
+            source
+                .fault(
+                    &coil_at(config, mesh, e),
+                    format!("a coil reaches into the remesh region, at {}", millimetres(place)),
+                )
+                .expected(
+                    "coils and their windows outside the remesh region: a coil does not move with the mesh",
+                )
+                .help("shrink the remesh region, or move the coil"),
+        );
+    }
+    faults
+}
+
+/// The key path that says where the coil in an element lies; all coils where several may be it.
+fn coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> String {
+    let topology = mesh.topology();
+    let name = &topology.region_names()[topology.region_of()[element.index()].index()];
+    let in_region =
+        |coil: &config::Coil| matches!(&coil.shape, config::CoilShape::Region(own) if own.region == *name);
+    if let Some(i) = config.coils.iter().position(in_region) {
+        return format!("coils[{i}].region");
+    }
+    let analytic = |coil: &config::Coil| !matches!(coil.shape, config::CoilShape::Region(_));
+    let of_shape: Vec<usize> = (0..config.coils.len()).filter(|&i| analytic(&config.coils[i])).collect();
+    match of_shape.as_slice() {
+        [one] => format!("coils[{one}].center"),
+        _ => "coils".to_owned(),
+    }
+}
+
+/// Refuses a motion of nodes whose condition belongs to where they lie: on curved or oblique surfaces, and where A is
+/// prescribed.
+fn held_node_fault(
+    inputs: &Inputs<'_>,
+    surface: &DesignSurface,
+    map: &ElasticMap,
+    model: &FieldModel,
+) -> Option<Fault> {
+    let (space, unknowns) = (model.space(), model.unknowns());
+    let moves = |node: NodeId| may_move(surface, map, node);
+    let place = |node: NodeId| millimetres(space.position(inputs.mesh, node));
+    if let Some(node) = unknowns.held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
+        let message = format!(
+            "a surface with a condition that is curved, oblique or has an applied field would move at {}",
+            place(node)
+        );
+        let fault = inputs.source.fault("remesh", message);
+        return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
+    }
+    let leaves = |node: NodeId, axis: usize| match surface.nodes().binary_search(&node) {
+        Ok(i) => surface.directions()[i][axis] != 0.0,
+        Err(_) => map.is_unknown(node, axis),
+    };
+    let vertices = inputs.mesh.topology().node_count();
+    let (node, axis) =
+        unknowns.plane_nodes().filter(|(node, _)| node.index() < vertices).find_map(|(node, axes)| {
+            (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
+        })?;
+    let message = format!(
+        "a plane with a condition at right angles to {} would lose its nodes at {}",
+        ["x", "y", "z"][axis],
+        place(node)
+    );
+    let fault = inputs.source.fault("remesh", message);
+    Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
+}
+
+/// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
+/// solved.
+fn check_bounds(source: &Source, shape: &Shape, share: Option<&Share>) -> Result<(), Error> {
+    // A rank that follows gives no orders: the first one checks.
+    let follows = share.is_some_and(|share| share.team.member() == Member::Follower);
+    if shape.limits.rounds > 0 || follows {
+        return Ok(());
+    }
+    let mut faults = Vec::new();
+    if let Err(error @ RemeshError::Inverted { .. }) = shape.motion.moved(&shape.displacement(&shape.initial))
+    {
+        faults.push(
+            source
+                .fault("design.initial", format!("the first design breaks the mesh: {error}"))
+                .help("allow remesh.rounds, or start nearer to the undeformed shape"),
+        );
+    }
+    for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
+        let at = bound[0] * 1e3;
+        match shape.motion.moved(&shape.displacement(bound)) {
+            Ok(moved) => {
+                let quality = shape.motion.quality(&moved.mesh);
+                let least = shape.limits.least_quality;
+                if quality.worst < least {
+                    let message = format!(
+                        "`{key}`: at {at:.3} mm element {} has the quality {:.2e}",
+                        quality.worst_element, quality.worst
+                    );
+                    faults.push(
+                        source
+                            .fault(key, message)
+                            .expected(format!("at least {least:.2e} (optimizer.minimum_quality)"))
+                            .help(
+                                "narrow the bound, lower optimizer.minimum_quality, or allow remesh.rounds",
+                            ),
+                    );
+                }
+            }
+            Err(RemeshError::Inverted { element, region, centroid, fraction }) => {
+                let message = format!(
+                    "`{key}`: the mesh breaks at {at:.3} mm: element {element} of region `{region}` at {} is inverted",
+                    millimetres(centroid)
+                );
+                faults.push(
+                    source
+                        .fault(key, message)
+                        .expected(format!("a bound nearer to zero than {:.3} mm", at * fraction))
+                        .help(
+                            "allow remesh.rounds, narrow the bound, enlarge the remesh region, take another \
+                             remesh.stiffness, or let faces between regions beside the design follow it: they are held \
+                             unless remesh.slide or remesh.free lists them",
+                        ),
+                );
+            }
+            Err(other) => return Err(other.into()),
+        }
+    }
+    Ok(source.check(faults)?)
+}

@@ -1,0 +1,55 @@
+//! Who watches an optimisation: the driver reports what happens, an observer shows it.
+
+use super::record::Evaluation;
+use crate::rounds::RoundEvent;
+use crate::stage::Stage;
+
+/// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
+/// through [`Observer::line`].
+pub trait Observer {
+    /// Shows a line.
+    fn line(&mut self, text: &str) {
+        let _ = text;
+    }
+
+    /// A long part of the work begins, in a few words: `assembling`.
+    fn phase(&mut self, name: &str) {
+        let _ = name;
+    }
+
+    /// A part of that work begins, also within an evaluation.
+    fn stage(&mut self, stage: Stage) {
+        let _ = stage;
+    }
+
+    /// Something has happened, in a line.
+    fn note(&mut self, message: &str) {
+        self.line(message);
+    }
+
+    /// An evaluation is complete.
+    fn evaluation(&mut self, evaluation: &Evaluation) {
+        let _ = evaluation;
+    }
+
+    /// The mesh has a new reference, or a remedy was taken.
+    fn round(&mut self, event: &RoundEvent) {
+        self.line(&event.describe());
+    }
+
+    /// Something that was left out, and why; nothing to act on.
+    fn notice(&mut self, message: &str) {
+        self.line(&format!("note: {message}"));
+    }
+
+    /// Something the user should know; the run goes on.
+    fn warning(&mut self, message: &str) {
+        let _ = message;
+    }
+}
+
+/// Shows nothing.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Silent;
+
+impl Observer for Silent {}

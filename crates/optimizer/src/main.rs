@@ -1,5 +1,0 @@
-//! The program `fluxmorph`.
-
-fn main() -> std::process::ExitCode {
-    fluxmorph_optimizer::cli::main()
-}

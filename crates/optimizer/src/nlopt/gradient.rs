@@ -1,0 +1,351 @@
+//! NLopt's gradient methods behind one function.
+//!
+//! NLopt knows bounds, inequality constraints, values and gradients. It asks for objective and constraints of one design
+//! one after the other, in an order of its own: the first question evaluates the design, the others are answered from
+//! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
+//! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
+//! thrown away. A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
+//! NLopt's that is no number, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
+//! caught here and goes on after NLopt has returned.
+
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+
+use ::nlopt::{FailState, Nlopt, SuccessState, Target};
+
+use super::STOP_VALUE;
+use crate::error::Error;
+
+/// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres. The
+/// methods that are not invariant under scaling were measured there.
+const SCALED_SPAN: f64 = 25.0;
+
+/// Largest magnitude of a number that NLopt is shown: its methods square and multiply what is of order one at the start.
+const LARGEST: f64 = 1e100;
+
+/// Largest value of a constraint, relative to its bound, that counts as satisfied: far below the error of a mesh, and
+/// above what the conservative methods leave of rounding.
+pub const CONSTRAINT_TOLERANCE: f64 = 1e-6;
+
+/// Objective and constraints of one design.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// What is made small.
+    pub value: f64,
+    /// Its gradient, one entry a variable.
+    pub gradient: Vec<f64>,
+    /// Values of the constraints, satisfied where ≤ 0 and of order one, with their gradients.
+    pub constraints: Vec<(f64, Vec<f64>)>,
+}
+
+impl Sample {
+    /// Whether an optimiser may see it.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] names the first number that is none, or is beyond every range; [`Error::Optimisation`] where
+    /// there is not one derivative a variable, or another number of constraints.
+    pub fn check(&self, variables: usize, constraints: usize) -> Result<(), Error> {
+        let refuse = |what: String, value: f64| {
+            let expected = "expected a finite number below 1e100 after division by the initial design's value; check weights, \
+                            bounds of constraints and units";
+            Err(Error::NotFinite { what, value, expected })
+        };
+        let is_sound = |value: f64| value.abs() <= LARGEST;
+        let derivatives = |of: &str, gradient: &[f64]| {
+            if gradient.len() != variables {
+                return Err(Error::Optimisation {
+                    cause: "an evaluation gives another number of derivatives than there are design variables",
+                });
+            }
+            match gradient.iter().enumerate().find(|(_, g)| !is_sound(**g)) {
+                Some((k, &value)) => refuse(format!("the derivative of {of} by design variable {k}"), value),
+                None => Ok(()),
+            }
+        };
+        if !is_sound(self.value) {
+            return refuse("the relative objective".to_owned(), self.value);
+        }
+        derivatives("the relative objective", &self.gradient)?;
+        if self.constraints.len() != constraints {
+            return Err(Error::Optimisation {
+                cause: "an evaluation gives another number of constraints than the method was told",
+            });
+        }
+        for (number, (value, gradient)) in self.constraints.iter().enumerate() {
+            let name = format!("constraint {number}, relative to its bound,");
+            derivatives(&name, gradient)?;
+            if !is_sound(*value) {
+                return refuse(name, *value);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What to minimise within, and when to stop.
+#[derive(Clone, Debug)]
+pub struct Minimisation {
+    /// The method.
+    pub algorithm: Algorithm,
+    /// Lower bounds.
+    pub lower: Vec<f64>,
+    /// Upper bounds, above the lower ones.
+    pub upper: Vec<f64>,
+    /// Inequality constraints; only where the method takes them.
+    pub constraints: usize,
+    /// Relative change of the objective below which the method stops; 0 is off.
+    pub ftol_rel: f64,
+    /// Relative change of the variables below which the method stops; 0 is off.
+    pub xtol_rel: f64,
+}
+
+/// Why NLopt ended by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// The objective changes by less than its tolerance, or rounding allows no more.
+    Objective,
+    /// The variables change by less than their tolerance.
+    Step,
+}
+
+/// How a minimisation ended.
+#[derive(Debug)]
+pub enum Outcome<E> {
+    /// By itself.
+    Ended(Ending),
+    /// The closure stopped it.
+    Interrupted(E),
+    /// NLopt refused or failed.
+    Failed(&'static str),
+}
+
+/// Gradient methods of NLopt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Algorithm {
+    /// Method of moving asymptotes.
+    Mma,
+    /// Conservative convex separable approximation with quadratic terms.
+    Ccsaq,
+    /// Sequential least-squares quadratic programming.
+    Slsqp,
+    /// Limited-memory BFGS.
+    Lbfgs,
+    /// Truncated Newton with restarts and preconditioning.
+    Tnewton,
+    /// Limited-memory variable metric of rank 2.
+    Var2,
+}
+
+impl Algorithm {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Mma, Self::Ccsaq, Self::Slsqp, Self::Lbfgs, Self::Tnewton, Self::Var2];
+
+    /// Whether the method keeps inequality constraints.
+    pub fn takes_constraints(self) -> bool {
+        matches!(self, Self::Mma | Self::Ccsaq | Self::Slsqp)
+    }
+
+    fn library(self) -> ::nlopt::Algorithm {
+        match self {
+            Self::Mma => ::nlopt::Algorithm::Mma,
+            Self::Ccsaq => ::nlopt::Algorithm::Ccsaq,
+            Self::Slsqp => ::nlopt::Algorithm::Slsqp,
+            Self::Lbfgs => ::nlopt::Algorithm::Lbfgs,
+            Self::Tnewton => ::nlopt::Algorithm::TNewtonPrecondRestart,
+            Self::Var2 => ::nlopt::Algorithm::LdVar2,
+        }
+    }
+
+    /// Factor on the objective (about 1 at the start): the conservative approximations of MMA and CCSAQ are made for
+    /// values of order one; the quasi-Newton methods take their first step from the gradient's size and would stop at
+    /// once.
+    fn objective_scale(self) -> f64 {
+        match self {
+            Self::Mma | Self::Ccsaq => 1.0,
+            Self::Slsqp | Self::Lbfgs | Self::Tnewton | Self::Var2 => 1000.0,
+        }
+    }
+}
+
+/// Minimises from `start`: `evaluate` gives objective and constraints of a design, and is asked once for each.
+///
+/// The closure's error ends the minimisation as [`Outcome::Interrupted`], and so does a sample that
+/// [`Sample::check`] refuses.
+///
+/// # Panics
+/// When `evaluate` does.
+pub fn minimise<E: From<Error>>(
+    settings: &Minimisation,
+    start: &[f64],
+    evaluate: impl FnMut(&[f64]) -> Result<Sample, E>,
+) -> Outcome<E> {
+    let [lower, upper] = [&settings.lower, &settings.upper];
+    let are_sound = start.len() == lower.len()
+        && start.len() == upper.len()
+        && start.iter().all(|p| p.is_finite())
+        // Of infinite bounds the span is no length either.
+        && lower.iter().zip(upper).all(|(low, high)| low <= high && (high - low).is_finite());
+    if !are_sound {
+        return Outcome::Failed("a bound or the first design is not finite, or the bounds cross");
+    }
+    // A variable between equal bounds keeps its value in any unit.
+    let unit_of = |span: f64| if span > 0.0 { span / SCALED_SPAN } else { 1.0 };
+    let unit: Vec<f64> = lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect();
+    let factor = settings.algorithm.objective_scale();
+    let scaled =
+        |values: &[f64]| -> Vec<f64> { values.iter().zip(&unit).map(|(v, unit)| v / unit).collect() };
+    let bridge = RefCell::new(Bridge {
+        evaluate,
+        settings,
+        unit: &unit,
+        start: (start, scaled(start)),
+        last: None,
+        asked: 0,
+        interruption: None,
+    });
+    let fill = |target: &mut [f64], factor: f64, derivative: &[f64]| {
+        for ((g, d), unit) in target.iter_mut().zip(derivative).zip(&unit) {
+            *g = factor * d * unit;
+        }
+    };
+    let objective = |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| -> f64 {
+        let mut bridge = bridge.borrow_mut();
+        let Some(sample) = bridge.at(x) else { return 2.0 * STOP_VALUE };
+        if let Some(gradient) = gradient {
+            fill(gradient, factor, &sample.gradient);
+        }
+        factor * sample.value
+    };
+    let constraints = |values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>, (): &mut ()| {
+        let mut bridge = bridge.borrow_mut();
+        let Some(sample) = bridge.at(x) else {
+            // Feasible: NLopt heeds its stop value at feasible designs alone.
+            values.fill(-1.0);
+            if let Some(gradients) = gradients {
+                gradients.fill(0.0);
+            }
+            return;
+        };
+        for (value, (own, _)) in values.iter_mut().zip(&sample.constraints) {
+            *value = *own;
+        }
+        if let Some(gradients) = gradients {
+            for (row, (_, own)) in gradients.chunks_exact_mut(x.len()).zip(&sample.constraints) {
+                fill(row, 1.0, own);
+            }
+        }
+    };
+    let mut library = Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
+    let mut accepted = library
+        .set_lower_bounds(&scaled(&settings.lower))
+        .and_then(|_| library.set_upper_bounds(&scaled(&settings.upper)))
+        .and_then(|_| library.set_stopval(STOP_VALUE))
+        .and_then(|_| library.set_ftol_rel(settings.ftol_rel))
+        .and_then(|_| library.set_xtol_rel(settings.xtol_rel));
+    if settings.constraints > 0 {
+        let tolerance = vec![CONSTRAINT_TOLERANCE; settings.constraints];
+        accepted = accepted.and_then(|_| {
+            library.add_inequality_mconstraint(settings.constraints, constraints, (), &tolerance)
+        });
+    }
+    if accepted.is_err() {
+        return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
+    }
+    let mut x = scaled(start);
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = x.clamp(settings.lower[k] / unit[k], settings.upper[k] / unit[k]);
+    }
+    let ended = library.optimize(&mut x);
+    drop(library);
+    match bridge.into_inner().interruption {
+        Some(Interruption::Settled) => return Outcome::Ended(Ending::Step),
+        Some(Interruption::Error(error)) => return Outcome::Interrupted(error),
+        Some(Interruption::Panic(panic)) => resume_unwind(panic),
+        None => {}
+    }
+    match ended {
+        Ok((SuccessState::XtolReached, _)) => Outcome::Ended(Ending::Step),
+        Ok(_) | Err((FailState::RoundoffLimited, _)) => Outcome::Ended(Ending::Objective),
+        Err((FailState::InvalidArgs, _)) => Outcome::Failed("NLopt refuses its arguments"),
+        Err((FailState::OutOfMemory, _)) => Outcome::Failed("NLopt is out of memory"),
+        Err((FailState::Failure | FailState::ForcedStop, _)) => Outcome::Failed("NLopt failed"),
+    }
+}
+
+/// Questions for one design after which the method counts as settled there: MMA and CCSAQ, without a tolerance, ask for
+/// ever at a solution on its bounds. No method needs more than a few.
+const SETTLED: usize = 100;
+
+/// What ended the calls of the closure.
+enum Interruption<E> {
+    /// The method asks for the same design again and again.
+    Settled,
+    Error(E),
+    Panic(Box<dyn std::any::Any + Send>),
+}
+
+/// Between NLopt's questions and the closure.
+struct Bridge<'a, F, E> {
+    evaluate: F,
+    settings: &'a Minimisation,
+    /// Length of a scaled unit of every variable.
+    unit: &'a [f64],
+    /// The start, in metres and as NLopt sees it.
+    start: (&'a [f64], Vec<f64>),
+    /// The design asked for last, as NLopt sees it, and its answer.
+    last: Option<(Vec<f64>, Sample)>,
+    /// How often it has been asked for in a row.
+    asked: usize,
+    interruption: Option<Interruption<E>>,
+}
+
+impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
+    /// The sample at a design of NLopt's; `None` once the closure has been interrupted.
+    fn at(&mut self, x: &[f64]) -> Option<&Sample> {
+        if self.interruption.is_some() {
+            return None;
+        }
+        self.asked += 1;
+        if self.last.as_ref().is_none_or(|(design, _)| design != x) {
+            self.asked = 1;
+            if let Some(k) = x.iter().position(|x| !x.is_finite()) {
+                let what = format!("variable {k} of a design that the method asks for");
+                let expected = "the method broke down; take another algorithm, or other bounds";
+                let error = Error::NotFinite { what, value: x[k], expected };
+                self.interruption = Some(Interruption::Error(error.into()));
+                return None;
+            }
+            // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
+            // mesh that is known.
+            let (start, scaled_start) = &self.start;
+            let back = |k: usize| if x[k] == scaled_start[k] { start[k] } else { x[k] * self.unit[k] };
+            let physical: Vec<f64> =
+                (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
+            match catch_unwind(AssertUnwindSafe(|| (self.evaluate)(&physical))) {
+                Ok(Ok(sample)) => {
+                    if let Err(error) = sample.check(x.len(), self.settings.constraints) {
+                        self.interruption = Some(Interruption::Error(error.into()));
+                        return None;
+                    }
+                    self.last = Some((x.to_vec(), sample));
+                }
+                Ok(Err(error)) => {
+                    self.interruption = Some(Interruption::Error(error));
+                    return None;
+                }
+                Err(panic) => {
+                    self.interruption = Some(Interruption::Panic(panic));
+                    return None;
+                }
+            }
+        }
+        if self.asked > SETTLED {
+            self.interruption = Some(Interruption::Settled);
+            return None;
+        }
+        self.last.as_ref().map(|(_, sample)| sample)
+    }
+}
+
+#[cfg(test)]
+mod tests;

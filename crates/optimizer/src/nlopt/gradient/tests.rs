@@ -1,0 +1,330 @@
+//! Every method of NLopt on small functions with closed forms, and on evaluations that fail.
+
+use super::*;
+
+/// What the closures of these tests end a method with.
+#[derive(Debug)]
+enum Halt {
+    Enough,
+    Failed(Error),
+}
+
+impl From<Error> for Halt {
+    fn from(error: Error) -> Self {
+        Self::Failed(error)
+    }
+}
+
+fn settings(algorithm: Algorithm) -> Minimisation {
+    Minimisation {
+        algorithm,
+        lower: vec![-0.005; 8],
+        upper: vec![0.020; 8],
+        constraints: 0,
+        ftol_rel: 1e-8,
+        xtol_rel: 0.0,
+    }
+}
+
+/// Where a variable is best: inside the bounds, or beyond the upper one.
+fn centre(k: usize) -> f64 {
+    if k.is_multiple_of(3) { 0.03 } else { 0.004 }
+}
+
+/// `1 + Σ w_k ((p_k − c_k)/25 mm)²` with minima inside the bounds, and beyond the upper one.
+fn quadratic(p: &[f64]) -> Sample {
+    let mut sample = Sample { value: 1.0, ..Sample::default() };
+    for (k, p) in p.iter().enumerate() {
+        let (weight, centre) = (1.0 + k as f64, centre(k));
+        sample.value += weight * ((p - centre) / 0.025).powi(2);
+        sample.gradient.push(2.0 * weight * (p - centre) / 0.025_f64.powi(2));
+    }
+    sample
+}
+
+/// The quadratic with the mean of all variables at most 2 mm, and the seventh at most 10 mm.
+fn constrained(p: &[f64]) -> Sample {
+    let n = p.len() as f64;
+    let mean = p.iter().sum::<f64>() / n / 0.002 - 1.0;
+    let seventh = (0..p.len()).map(|k| if k == 6 { 100.0 } else { 0.0 }).collect();
+    Sample {
+        constraints: vec![(mean, vec![1.0 / n / 0.002; p.len()]), (100.0 * p[6] - 1.0, seventh)],
+        ..quadratic(p)
+    }
+}
+
+#[test]
+fn every_algorithm_finds_a_bounded_quadratic_minimum() {
+    for algorithm in Algorithm::ALL {
+        let mut best = (f64::INFINITY, vec![]);
+        let outcome = minimise::<Halt>(&settings(algorithm), &[0.0; 8], |p| {
+            let sample = quadratic(p);
+            if sample.value < best.0 {
+                best = (sample.value, p.to_vec());
+            }
+            Ok(sample)
+        });
+        assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
+        for (k, p) in best.1.iter().enumerate() {
+            let exact = if k % 3 == 0 { 0.020 } else { 0.004 };
+            assert!((p - exact).abs() < 1e-4, "{algorithm:?}: variable {k} is {p}");
+        }
+    }
+}
+
+#[test]
+fn without_a_tolerance_a_method_ends_where_it_settles() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq] {
+        // A linear function: the minimum is the corner of the upper bounds.
+        let settings = Minimisation { ftol_rel: 0.0, ..settings(algorithm) };
+        let outcome = minimise::<Halt>(&settings, &[0.0; 8], |p| {
+            Ok(Sample {
+                value: 1.0 - p.iter().sum::<f64>(),
+                gradient: vec![-1.0; p.len()],
+                ..Sample::default()
+            })
+        });
+        assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
+    }
+}
+
+#[test]
+fn every_algorithm_stops_at_once_when_the_closure_does() {
+    for algorithm in Algorithm::ALL {
+        for last in [1, 2, 4] {
+            let mut calls = 0;
+            let outcome = minimise(&settings(algorithm), &[0.0; 8], |p| {
+                calls += 1;
+                if calls == last { Err(Halt::Enough) } else { Ok(quadratic(p)) }
+            });
+            assert!(matches!(outcome, Outcome::Interrupted(Halt::Enough)), "{algorithm:?}: {outcome:?}");
+            assert_eq!(calls, last, "{algorithm:?}");
+        }
+    }
+}
+
+#[test]
+fn the_first_design_asked_for_is_the_start_to_the_last_bit() {
+    let start: Vec<f64> = (0..8).map(|k| 1e-3 * (f64::from(k)).sqrt()).collect();
+    for algorithm in Algorithm::ALL {
+        let mut first = None;
+        minimise::<Halt>(&settings(algorithm), &start, |p| {
+            first.get_or_insert_with(|| p.to_vec());
+            Ok(quadratic(p))
+        });
+        assert_eq!(first.as_ref(), Some(&start), "{algorithm:?}");
+    }
+}
+
+#[test]
+fn a_panic_in_the_closure_comes_out_on_this_side_of_every_algorithm() {
+    for algorithm in Algorithm::ALL {
+        for last in [1, 3] {
+            let mut calls = 0;
+            let caught = catch_unwind(AssertUnwindSafe(|| {
+                minimise::<Halt>(&settings(algorithm), &[0.0; 8], |p| {
+                    calls += 1;
+                    assert!(calls < last, "inside the callback");
+                    Ok(quadratic(p))
+                })
+            }));
+            let panic = caught.expect_err("the closure panics");
+            assert_eq!(panic.downcast_ref::<&str>(), Some(&"inside the callback"), "{algorithm:?}");
+            assert_eq!(calls, last, "{algorithm:?} asks no more");
+        }
+    }
+}
+
+#[test]
+fn a_panic_under_constraints_comes_out_too() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        let settings = Minimisation { constraints: 2, ..settings(algorithm) };
+        let caught = catch_unwind(|| minimise::<Halt>(&settings, &[0.015; 8], |_| panic!("inside")));
+        assert!(caught.is_err(), "{algorithm:?}");
+    }
+}
+
+/// What `minimise` says where the third sample is damaged, and how often it asked.
+fn with_a_bad_sample(algorithm: Algorithm, constraints: usize, damage: &dyn Fn(&mut Sample)) -> String {
+    let settings = Minimisation { constraints, ..settings(algorithm) };
+    let mut calls = 0;
+    let outcome = minimise::<Halt>(&settings, &[0.0; 8], |p| {
+        calls += 1;
+        let mut sample = if constraints > 0 { constrained(p) } else { quadratic(p) };
+        if calls == 3 {
+            damage(&mut sample);
+        }
+        Ok(sample)
+    });
+    assert_eq!(calls, 3, "{algorithm:?} asks no more");
+    match outcome {
+        Outcome::Interrupted(Halt::Failed(error)) => {
+            assert!(error.is_numerical());
+            error.to_string()
+        }
+        other => panic!("{algorithm:?}: {other:?}"),
+    }
+}
+
+#[test]
+fn no_algorithm_is_shown_an_objective_that_is_no_number() {
+    for algorithm in Algorithm::ALL {
+        // The last would be taken for the stop value, and the run for converged.
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e301] {
+            let message = with_a_bad_sample(algorithm, 0, &|sample| sample.value = bad);
+            assert!(message.starts_with("the relative objective is"), "{algorithm:?}: {message}");
+        }
+    }
+}
+
+#[test]
+fn no_algorithm_is_shown_a_derivative_that_is_no_number() {
+    for algorithm in Algorithm::ALL {
+        for bad in [f64::NAN, f64::INFINITY, 1e200] {
+            let message = with_a_bad_sample(algorithm, 0, &|sample| sample.gradient[6] = bad);
+            assert!(message.contains("objective by design variable 6 is"), "{algorithm:?}: {message}");
+        }
+    }
+}
+
+#[test]
+fn no_algorithm_is_shown_a_constraint_that_is_no_number() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[1].0 = bad);
+            assert!(message.starts_with("constraint 1, relative to its bound, is"), "{message}");
+            let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[0].1[3] = bad);
+            assert!(message.contains("constraint 0") && message.contains("variable 3"), "{message}");
+        }
+    }
+}
+
+/// A gradient that is too short would leave what NLopt's array held before.
+#[test]
+fn samples_of_other_lengths_than_announced_are_refused() {
+    for algorithm in Algorithm::ALL {
+        let message = with_a_bad_sample(algorithm, 0, &|sample| sample.gradient.truncate(7));
+        assert!(message.contains("number of derivatives"), "{message}");
+        let message = with_a_bad_sample(algorithm, 0, &|sample| sample.constraints.push((0.0, vec![0.0; 8])));
+        assert!(message.contains("number of constraints"), "{message}");
+    }
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints.truncate(1));
+        assert!(message.contains("number of constraints"), "{message}");
+        let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[1].1.truncate(1));
+        assert!(message.contains("number of derivatives"), "{message}");
+    }
+}
+
+#[test]
+fn bounds_and_starts_that_are_no_numbers_are_refused_before_anything_is_asked() {
+    let damages: [fn(&mut Minimisation, &mut Vec<f64>); 7] = [
+        |_, start| start[3] = f64::NAN,
+        |_, start| start[0] = f64::INFINITY,
+        |_, start| start.truncate(7),
+        |settings, _| settings.lower[2] = f64::NAN,
+        |settings, _| settings.upper[7] = f64::INFINITY,
+        |settings, _| settings.upper[1] = -0.006,
+        |settings, _| (settings.lower[1], settings.upper[1]) = (-1e308, 1e308),
+    ];
+    for algorithm in Algorithm::ALL {
+        for damage in damages {
+            let (mut settings, mut start) = (settings(algorithm), vec![0.0; 8]);
+            damage(&mut settings, &mut start);
+            let outcome = minimise::<Halt>(&settings, &start, |_| panic!("nothing is to be asked"));
+            assert!(matches!(outcome, Outcome::Failed(cause) if cause.contains("bound")), "{outcome:?}");
+        }
+    }
+}
+
+#[test]
+fn a_variable_between_equal_bounds_keeps_its_value() {
+    for algorithm in Algorithm::ALL {
+        let mut settings = settings(algorithm);
+        (settings.lower[2], settings.upper[2]) = (0.001, 0.001);
+        let mut calls = 0;
+        let outcome = minimise::<Halt>(&settings, &[0.001; 8], |p| {
+            calls += 1;
+            assert_eq!(p[2], 0.001);
+            if calls > 200 { Err(Halt::Enough) } else { Ok(quadratic(p)) }
+        });
+        assert!(calls > 0 && !matches!(outcome, Outcome::Interrupted(Halt::Failed(_))), "{outcome:?}");
+    }
+}
+
+/// Asked directly: no method of the library is known to do it on numbers.
+#[test]
+fn a_design_of_the_method_that_is_no_number_is_never_evaluated() {
+    for bad in [f64::NAN, f64::INFINITY] {
+        let (settings, unit) = (settings(Algorithm::Mma), [0.001; 8]);
+        let mut bridge = Bridge {
+            evaluate: |_: &[f64]| -> Result<Sample, Halt> { panic!("it is to be refused before") },
+            settings: &settings,
+            unit: &unit,
+            start: (&[0.0; 8], vec![0.0; 8]),
+            last: None,
+            asked: 0,
+            interruption: None,
+        };
+        let mut x = vec![0.0; 8];
+        x[4] = bad;
+        assert!(bridge.at(&x).is_none() && bridge.at(&[0.0; 8]).is_none());
+        match bridge.interruption {
+            Some(Interruption::Error(Halt::Failed(error))) => {
+                assert!(error.to_string().starts_with("variable 4 of a design"), "{error}");
+            }
+            _ => panic!("it is an error"),
+        }
+    }
+}
+
+#[test]
+fn constraints_are_kept_from_inside_and_from_outside() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        for start in [0.0, 0.015] {
+            let settings = Minimisation { constraints: 2, ..settings(algorithm) };
+            let (mut best, mut seen) = ((f64::INFINITY, vec![]), Vec::new());
+            let outcome = minimise::<Halt>(&settings, &[start; 8], |p| {
+                assert!(!seen.contains(&p.to_vec()), "{algorithm:?}: a design is evaluated once");
+                seen.push(p.to_vec());
+                let sample = constrained(p);
+                let feasible = sample.constraints.iter().all(|c| c.0 <= CONSTRAINT_TOLERANCE);
+                if feasible && sample.value < best.0 {
+                    best = (sample.value, p.to_vec());
+                }
+                Ok(sample)
+            });
+            assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
+            let p = &best.1;
+            // From far outside CCSAQ reaches a feasible design and ends there, short of the optimum.
+            if (algorithm, start) == (Algorithm::Ccsaq, 0.015) {
+                assert!(!p.is_empty(), "no feasible design");
+                continue;
+            }
+            // Lagrange's conditions: both bounds are active, and all free variables have w_k (p_k − c_k) = −μ.
+            assert!((p[6] - 0.010).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
+            assert!((p.iter().sum::<f64>() - 0.016).abs() < 1e-5, "{algorithm:?} from {start}: {p:?}");
+            let multiplier = |k: usize| (1.0 + k as f64) * (centre(k) - p[k]);
+            let free: Vec<f64> =
+                (0..8).filter(|&k| k != 6 && p[k] > -0.004999 && p[k] < 0.019999).map(multiplier).collect();
+            let spread = free.iter().fold(0.0_f64, |m, x| m.max((x - free[0]).abs()));
+            assert!(spread < 0.02 * free[0].abs(), "{algorithm:?} from {start}: {free:?}");
+        }
+    }
+}
+
+#[test]
+fn constrained_methods_stop_at_once_too() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        for (start, last) in [(0.0, 1), (0.0, 3), (0.015, 1), (0.015, 2), (0.015, 4)] {
+            let mut calls = 0;
+            let settings = Minimisation { constraints: 2, ..settings(algorithm) };
+            let outcome = minimise(&settings, &[start; 8], |p| {
+                calls += 1;
+                if calls == last { Err(Halt::Enough) } else { Ok(constrained(p)) }
+            });
+            assert!(matches!(outcome, Outcome::Interrupted(Halt::Enough)), "{algorithm:?}: {outcome:?}");
+            assert_eq!(calls, last, "{algorithm:?}");
+        }
+    }
+}

@@ -1,1 +1,0 @@
-../../../crates/optimizer/src/bobyqa.rs

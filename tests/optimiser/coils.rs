@@ -1,0 +1,99 @@
+//! From the tables of sources to the field model, and what is refused on the way.
+
+use fluxmorph::config::Config;
+use fluxmorph::setup::{Purpose, Setup, set_up};
+use fluxmorph_solver::coil::CoilShape;
+
+const BLOCK: &str = r#"
+[mesh]
+generator = "block"
+[mesh.block]
+size = ["20 mm", "50 mm", "30 mm"]
+cells = [2, 4, 3]
+[analysis]
+frequency = "50 Hz"
+[boundaries]
+flux_parallel = ["y_min", "y_max"]
+[[coils]]
+name = "bar"
+region = "block"
+ampere_turns = "1 kA"
+terminals = ["y_min", "y_max"]
+"#;
+
+fn prepared(text: &str) -> Result<Setup, String> {
+    let (config, source) = Config::from_str(text, "coils.toml").unwrap_or_else(|error| panic!("{error}"));
+    set_up(&config, &source, Purpose::Analysis).map_err(|error| error.to_string())
+}
+
+fn refused(text: &str) -> String {
+    prepared(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"))
+}
+
+#[test]
+fn a_coil_region_becomes_a_source_and_its_divergence_is_told() {
+    let setup = prepared(BLOCK).unwrap_or_else(|error| panic!("{error}"));
+    let coils = setup.problem.states[0].coils();
+    let CoilShape::Region(current) = &coils[0].shape else { panic!("a region") };
+    for (_, j) in current.current_density() {
+        assert!((j[1] * 0.02 * 0.03 - 1.0).abs() < 1e-11, "one ampere-turn through 20 mm x 30 mm");
+    }
+    let told = setup.warnings.iter().find(|w| w.starts_with("coil `bar`: residual divergence"));
+    assert!(told.is_some_and(|w| w.contains("100.00 to 100.00 %")), "{:?}", setup.warnings);
+}
+
+#[test]
+fn a_name_that_the_mesh_does_not_have_is_answered_with_the_nearest() {
+    let error = refused(
+        &BLOCK.replace("\"block\"\namp", "\"blok\"\namp").replace("s = [\"y_min\"", "s = [\"y_mim\""),
+    );
+    assert!(
+        error.contains("there is no region `blok`") && error.contains("did you mean `block`?"),
+        "{error}"
+    );
+    assert!(
+        error.contains("there is no surface `y_mim`") && error.contains("did you mean `y_min`?"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_winding_that_conducts_is_refused_at_a_frequency_only() {
+    let conducting = format!(
+        "{BLOCK}[materials.copper]\nconductivity = \"58 MS/m\"\n[regions.block]\nmaterial = \"copper\"\n"
+    );
+    let error = refused(&conducting);
+    assert!(error.contains("`block` conducts") && error.contains("without conductivity"), "{error}");
+    assert!(prepared(&conducting.replace("50 Hz", "0 Hz")).is_ok());
+}
+
+#[test]
+fn a_path_that_the_region_does_not_have_is_refused_with_the_coils_name() {
+    let closed = BLOCK.replace("terminals = [\"y_min\", \"y_max\"]", "center = [\"1 m\", 0, 0]");
+    let error = refused(&closed);
+    assert!(error.contains("the coil `bar`") && error.contains("goes round the line"), "{error}");
+    let error = refused(&BLOCK.replace("flux_parallel = [\"y_min\", ", "flux_parallel = ["));
+    assert!(error.contains("its terminal `y_min`") && error.contains("boundaries.flux_parallel"), "{error}");
+}
+
+#[test]
+fn an_analytic_coil_may_be_slanted() {
+    let slanted = BLOCK.replace(
+        "region = \"block\"\nampere_turns = \"1 kA\"\nterminals = [\"y_min\", \"y_max\"]",
+        "shape = \"circular\"\nampere_turns = \"1 kA\"\ncenter = [\"10 mm\", \"25 mm\", \"15 mm\"]\n\
+         axis = [1, 2, 0.5]\nradius = \"3 mm\"\nwidth = \"1 mm\"\nheight = \"2 mm\"",
+    );
+    let setup = prepared(&slanted).unwrap_or_else(|error| panic!("{error}"));
+    let CoilShape::Racetrack(coil) = &setup.problem.states[0].coils()[0].shape else { panic!("analytic") };
+    assert!((coil.axis()[1] - 2.0 / 5.25f64.sqrt()).abs() < 1e-15);
+}
+
+#[test]
+fn remanences_are_given_by_region() {
+    let magnet = BLOCK.replace("50 Hz", "0 Hz")
+        + "[materials.m]\n[regions.block]\nmaterial = \"m\"\nremanence = [0, \"1.2 T\", 0]\n";
+    let setup = prepared(&magnet).unwrap_or_else(|error| panic!("{error}"));
+    let model = &setup.problem.states[0];
+    assert_eq!(model.remanence_of(fluxmorph_geometry::ElementId(0)), [0.0, 1.2, 0.0]);
+    assert!(!model.is_unexcited());
+}

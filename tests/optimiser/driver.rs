@@ -1,0 +1,211 @@
+//! The optimisation loop on a coarse shield: every algorithm, and what happens when a mesh would break.
+
+use std::path::Path;
+
+use fluxmorph_optimizer::Error;
+use fluxmorph::config::{Algorithm, Config, Optimizer};
+use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph::observer::{Evaluation, Observer, Silent};
+use fluxmorph::output::StopReason;
+use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
+use fluxmorph_optimizer::rounds::{RoundEvent, RoundKind};
+use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify_all};
+
+fn quick() -> (Problem, Optimizer) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
+    let (config, source) = Config::from_file(&path, &[]).unwrap();
+    (set_up(&config, &source, Purpose::Optimisation).unwrap().problem, config.optimizer)
+}
+
+#[derive(Default)]
+struct Rows(Vec<Evaluation>);
+
+impl Recorder for Rows {
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.0.push(record.row.clone());
+        Ok(())
+    }
+}
+
+fn run(
+    problem: &mut Problem,
+    settings: &Optimizer,
+    observer: &mut dyn Observer,
+) -> (Optimised, Vec<Evaluation>) {
+    let mut rows = Rows::default();
+    let optimised = optimise(problem, settings, observer, &mut rows, &|| false).unwrap();
+    (optimised, rows.0)
+}
+
+#[test]
+fn every_algorithm_improves_the_shield_within_its_bounds() {
+    let (mut problem, settings) = quick();
+    for algorithm in Algorithm::ALL {
+        let settings = Optimizer { algorithm, max_evaluations: 8, ..settings.clone() };
+        let (optimised, rows) = run(&mut problem, &settings, &mut Silent);
+        let ratio = optimised.best.objective / optimised.initial;
+        println!("{algorithm:?}: F/F0 {ratio:.4} after {} evaluations", rows.len());
+        // The slowest, truncated Newton, reaches 0.89: anything that moves at all is below 0.97.
+        assert!(ratio < 0.97, "{algorithm:?}: {ratio}");
+        let shape = problem.shape.as_ref().unwrap();
+        for (k, p) in optimised.best.values.iter().enumerate() {
+            assert!(shape.lower[k] <= *p && *p <= shape.upper[k], "{algorithm:?}: variable {k} is {p}");
+        }
+    }
+}
+
+/// Rounds and remedies told.
+#[derive(Default)]
+struct Told(Vec<RoundEvent>);
+
+impl Observer for Told {
+    fn round(&mut self, event: &RoundEvent) {
+        self.0.push(event.clone());
+    }
+}
+
+/// What holds of every run, however its rounds went.
+fn check_rows(optimised: &Optimised, rows: &[Evaluation], least_quality: f64) {
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!(row.evaluation, k, "attempts without an objective are no evaluations");
+        assert!(row.worst_quality >= least_quality, "{row:?}");
+        assert!(row.objective.is_finite() && row.gradient_norm.is_finite(), "{row:?}");
+        assert!(k == 0 || row.round >= rows[k - 1].round, "{row:?}");
+    }
+    let best = &optimised.best;
+    assert_eq!(best.objective, rows[best.evaluation].objective);
+}
+
+fn shape(problem: &mut Problem) -> &mut Shape {
+    problem.shape.as_mut().unwrap()
+}
+
+#[test]
+fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
+    let (mut problem, settings) = quick();
+    let (free, free_rows) = run(&mut problem, &settings, &mut Silent);
+    assert_eq!(free_rows.last().unwrap().round, 0, "the shipped case needs one reference");
+    let (mut problem, settings) = quick();
+    let used = free_rows.iter().filter_map(|row| row.step_to_inversion).fold(f64::INFINITY, f64::min);
+    // Half of the way that the free run took.
+    shape(&mut problem).limits.inversion_share = 0.5 / used;
+    let settings = Optimizer { max_evaluations: 60, ..settings };
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &settings, &mut told);
+    check_rows(&optimised, &rows, 0.0);
+    println!("{:?}", told.0.iter().map(RoundEvent::describe).collect::<Vec<_>>());
+    let rounds: Vec<_> = told.0.iter().filter(|event| event.kind == RoundKind::Round).collect();
+    assert!(!rounds.is_empty());
+    for round in rounds {
+        let start = rows.iter().find(|row| row.round == round.round).unwrap();
+        let reference = &rows[round.evaluation.unwrap()];
+        assert_eq!(start.objective, reference.objective, "a round starts on the mesh of its reference");
+        assert_eq!(start.step_to_inversion, None);
+    }
+    let (ratio, free) = (rows[optimised.best.evaluation].ratio, free.best.objective / free.initial);
+    println!("F/F0 {ratio:.5} in rounds, {free:.5} in one, {} evaluations", rows.len());
+    assert!(ratio < free + 0.01, "rounds reach what one reference reaches: {ratio} against {free}");
+}
+
+#[test]
+fn the_gradient_is_exact_in_a_later_round() {
+    let (mut problem, settings) = quick();
+    shape(&mut problem).limits.inversion_share = 0.3;
+    let (optimised, _) = run(&mut problem, &Optimizer { max_evaluations: 12, ..settings }, &mut Silent);
+    assert!(shape(&mut problem).motion.round() >= 1);
+    let certificates =
+        certify_all(&problem, &optimised.best.values, &Settings::default(), |_, _, _| {}).unwrap();
+    let Certificate { holds, least_slope, largest_error, .. } = certificates.objective;
+    assert!(holds, "slope {least_slope}, error {largest_error}");
+}
+
+#[test]
+fn a_quality_that_stops_the_search_is_never_passed() {
+    let (mut problem, settings) = quick();
+    // The free run falls to 0.094.
+    shape(&mut problem).limits.least_quality = 0.15;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    check_rows(&optimised, &rows, 0.15);
+    assert!(!told.0.is_empty() && told.0[0].cause.contains("minimum_quality"), "{:?}", told.0);
+    assert!(rows[optimised.best.evaluation].ratio < 0.9, "what was reached is kept");
+}
+
+#[test]
+fn without_rounds_the_box_shrinks_and_the_reference_stays() {
+    let (mut problem, settings) = quick();
+    shape(&mut problem).limits.least_quality = 0.15;
+    shape(&mut problem).limits.rounds = 0;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
+    check_rows(&optimised, &rows, 0.15);
+    assert!(!told.0.is_empty());
+    assert!(
+        told.0.iter().all(|event| event.kind == RoundKind::SmallerSteps && event.round == 0),
+        "{:?}",
+        told.0
+    );
+    assert!(rows[optimised.best.evaluation].ratio < 0.9);
+}
+
+#[test]
+fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
+    let (mut problem, settings) = quick();
+    let initial = problem.quality(&problem.original).worst;
+    // A millionth below the initial quality: the first real step is refused, and every smaller one of note too.
+    let least = initial * (1.0 - 1e-6);
+    shape(&mut problem).limits.least_quality = least;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut told);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    check_rows(&optimised, &rows, least);
+    assert_eq!(optimised.stop_reason, StopReason::MeshLimit, "{} rows", rows.len());
+    // The box halves three times, and no remedy makes a step possible.
+    assert!(told.0.iter().all(|event| event.kind == RoundKind::SmallerSteps), "{:?}", told.0);
+    assert_eq!(told.0.len(), 3);
+}
+
+#[test]
+fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are_compared() {
+    let (mut problem, settings) = quick();
+    let n = shape(&mut problem).surface.variable_count();
+    (shape(&mut problem).lower, shape(&mut problem).upper) = (vec![-9e-3; n], vec![35e-3; n]);
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 150, ..settings }, &mut told);
+    let least = shape(&mut problem).limits.least_quality;
+    check_rows(&optimised, &rows, least);
+    for event in &told.0 {
+        println!("{}", event.describe());
+    }
+    println!(
+        "{:?} after {} rows, {:.4}",
+        optimised.stop_reason,
+        rows.len(),
+        rows[optimised.best.evaluation].ratio
+    );
+    let other_mesh = [RoundKind::Smoothing, RoundKind::Guided];
+    let changes: Vec<_> = told.0.iter().filter(|event| other_mesh.contains(&event.kind)).collect();
+    assert!(!changes.is_empty());
+    for change in changes {
+        let [before, after] = change.admitted.unwrap();
+        assert!(change.worst_quality[1] >= least && after >= before, "{change:?}");
+        let Some(first) = rows.iter().find(|row| row.round == change.round) else { continue };
+        assert_ne!(first.objective, rows[change.evaluation.unwrap()].objective);
+        assert!(optimised.best.evaluation >= first.evaluation);
+    }
+}
+
+#[test]
+fn a_first_design_far_away_is_approached_in_steps() {
+    let (mut problem, settings) = quick();
+    let far = shape(&mut problem).upper.clone();
+    shape(&mut problem).initial = far;
+    shape(&mut problem).limits.inversion_share = 0.1;
+    let mut told = Told::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut told);
+    check_rows(&optimised, &rows, 0.0);
+    assert!(told.0.len() > 1 && told.0.iter().all(|event| event.kind == RoundKind::Approach), "{:?}", told.0);
+}

@@ -1,0 +1,128 @@
+//! Volume and thickness of a plate, with their gradients.
+
+use std::path::Path;
+
+use fluxmorph::config::Config;
+use fluxmorph::setup::{Purpose, Setup, set_up};
+use fluxmorph_optimizer::geometric::{Bound, ThicknessBound, Volume};
+use fluxmorph_optimizer::problem::Problem;
+
+fn shield(overrides: &[&str]) -> Setup {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
+    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+    let (config, source) = Config::from_file(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
+    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A design inside the bounds that is flat nowhere.
+fn wavy(problem: &Problem) -> Vec<f64> {
+    let variables = problem.shape.as_ref().expect("a shape").surface.variable_count();
+    (0..variables).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
+}
+
+/// Slope 2 of the Taylor remainder, or a remainder that is rounding alone, in a direction that is flat nowhere.
+fn taylor(value: impl Fn(&[f64]) -> (f64, Vec<f64>), p: &[f64], first_step: f64) {
+    let direction: Vec<f64> = (0..p.len()).map(|k| (0.9 * k as f64 + 0.4).cos()).collect();
+    let (base, gradient) = value(p);
+    let slope: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
+    let remainder = |h: f64| {
+        let moved: Vec<f64> = p.iter().zip(&direction).map(|(p, d)| p + h * d).collect();
+        (value(&moved).0 - base - h * slope).abs()
+    };
+    let steps: Vec<f64> = (0..4).map(|i| first_step * 0.5_f64.powi(i)).collect();
+    let remainders: Vec<f64> = steps.iter().map(|&h| remainder(h)).collect();
+    println!("value {base:e}, slope {slope:e}, remainders {remainders:?}");
+    // A sum of some thousand terms of the value's size carries this much rounding.
+    let rounding = 1e-13 * base.abs();
+    for pair in remainders.windows(2).filter(|pair| pair[1] > 10.0 * rounding) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!((1.9..2.2).contains(&order), "order {order}: {remainders:?}");
+    }
+    // Without second order the remainder is nothing but rounding: then the gradient is exact as it stands.
+    assert!(
+        remainders[0] < 0.5 * (first_step * slope).abs() + rounding,
+        "{remainders:?} against {slope}"
+    );
+}
+
+const MESHED: [&str; 2] = ["regions.plate.model=\"volume\"", "remesh.region=[\"plate\", \"remesh\"]"];
+
+fn volume(setup: &Setup) -> Volume {
+    let problem = &setup.problem;
+    let surface = problem.states[0].conductors().first().map(|plate| plate.surface.as_slice());
+    Volume::new(&problem.original, &setup.full_mesh, "plate", surface).expect("a plate has a volume")
+}
+
+#[test]
+fn a_quarter_plate_has_its_volume_and_grows_with_its_face() {
+    for overrides in [&[][..], &MESHED] {
+        let setup = shield(overrides);
+        let (problem, plate) = (&setup.problem, volume(&setup));
+        let shape = problem.shape.as_ref().expect("a shape");
+        let uniform = vec![3e-3; shape.surface.variable_count()];
+        let mesh = problem.moved(&uniform).expect("inside the bounds").mesh;
+        let (value, gradient) = plate.evaluate(&mesh, shape).expect("a direct solve");
+        // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
+        assert!((value - 0.12 * 0.24 * 0.013).abs() < 1e-12 * value, "{value}");
+        let swept: f64 = gradient.iter().sum();
+        assert!((swept - 0.12 * 0.24).abs() < 1e-12, "{swept}");
+        let mass = plate.with_density(7850.0).value(&mesh);
+        assert!((mass - 7850.0 * value).abs() < 1e-12 * mass);
+    }
+}
+
+#[test]
+fn the_gradient_holds_in_both_models_and_both_agree() {
+    let values = [&[][..], &MESHED].map(|overrides| {
+        let setup = shield(overrides);
+        let (problem, plate) = (&setup.problem, volume(&setup));
+        let shape = problem.shape.as_ref().expect("a shape");
+        let at = |p: &[f64]| {
+            let mesh = problem.moved(p).expect("inside the bounds").mesh;
+            plate.evaluate(&mesh, shape).expect("a direct solve")
+        };
+        taylor(at, &wavy(problem), 1e-3);
+        at(&wavy(problem)).0
+    });
+    // The same triangles bound both.
+    assert!((values[0] - values[1]).abs() < 1e-12 * values[0], "{values:?}");
+}
+
+
+#[test]
+fn the_bound_is_conservative_by_no_more_than_its_margin() {
+    let setup = shield(&[]);
+    let shape = setup.problem.shape.as_ref().expect("a shape");
+    let p = wavy(&setup.problem);
+    let (least, most) =
+        shape.thickness.as_ref().expect("a plate has one").range(&shape.surface.heights(&p));
+    for (bound, excess, limit) in
+        [(Bound::Minimum(0.012), 0.012 - least, 0.012), (Bound::Maximum(0.014), most - 0.014, 0.014)]
+    {
+        let (value, _) = ThicknessBound::new(shape, bound).expect("a thickness").evaluate(shape, &p);
+        assert!(excess <= value && value <= excess + MARGIN * limit, "{bound:?}: {excess} {value}");
+    }
+}
+
+#[test]
+fn a_uniform_plate_meets_its_limit_by_the_margin() {
+    let setup = shield(&[]);
+    let shape = setup.problem.shape.as_ref().expect("a shape");
+    let bound = ThicknessBound::new(shape, Bound::Minimum(0.008)).expect("a thickness");
+    let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface.variable_count()]);
+    // 8 mm − 10 mm, and all nodes count alike: the whole margin of 0.08 mm.
+    assert!((value + 0.002 - 0.00008).abs() < 1e-12, "{value}");
+    let sum: f64 = gradient.iter().sum();
+    assert!((sum + 1.0).abs() < 1e-12, "a uniform motion changes all alike: {sum}");
+}
+
+#[test]
+fn the_gradient_holds() {
+    let setup = shield(&[]);
+    let shape = setup.problem.shape.as_ref().expect("a shape");
+    for bound in [Bound::Minimum(0.012), Bound::Maximum(0.014)] {
+        let bound = ThicknessBound::new(shape, bound).expect("a thickness");
+        // Well below 1/ρ, about 0.03 mm, where the function is smooth.
+        taylor(|p| bound.evaluate(shape, p), &wavy(&setup.problem), 2e-6);
+    }
+}

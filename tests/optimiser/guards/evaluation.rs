@@ -1,0 +1,142 @@
+//! One evaluation with something in it that cannot be computed.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_optimizer::Error;
+use fluxmorph::cli::ExitCode;
+use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_remesh::RemeshError;
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
+use fluxmorph_solver::{FieldModel, Functional, SolverError};
+
+use super::{initial, quick, with_field};
+
+/// The error of an evaluation of the initial design; it must be a numerical failure.
+#[track_caller]
+fn refused(problem: &Problem, want: Want) -> Error {
+    let error = problem.evaluate(&initial(problem), want).expect_err("it cannot be computed");
+    assert_eq!(error.exit_code(), ExitCode::Numerical, "{error}");
+    error
+}
+
+#[test]
+fn currents_out_of_range_name_the_state_and_its_frequency() {
+    for current in [1e200, 1e-200] {
+        let problem = with_field(quick(&[]).0, |setup| setup.coils[0].ampere_turns = c64::new(current, 0.0));
+        let error = refused(&problem, Want::Value);
+        let Error::Field { cause, .. } = &error else { panic!("{error}") };
+        assert!(matches!(**cause, SolverError::OutOfRange { .. }), "{error}");
+        let text = error.to_string();
+        assert!(text.starts_with("the state at 60 Hz: ") && text.contains("currents"), "{text}");
+    }
+}
+
+#[test]
+fn a_current_that_is_no_number_names_the_state() {
+    let problem = with_field(quick(&[]).0, |setup| setup.coils[0].ampere_turns = c64::new(0.0, f64::NAN));
+    let text = refused(&problem, Want::Gradient).to_string();
+    assert!(text.starts_with("the state at 60 Hz: ") && text.contains("NaN"), "{text}");
+}
+
+#[test]
+fn a_conductivity_that_overflows_leaves_no_factor() {
+    let meshed = ["regions.plate.model=\"volume\"", "remesh.region=[\"plate\", \"remesh\"]"];
+    let problem = with_field(quick(&meshed).0, |setup| {
+        for material in setup.materials.iter_mut().filter(|material| material.conductivity > 0.0) {
+            material.conductivity = 1e308;
+        }
+    });
+    let text = refused(&problem, Want::Value).to_string();
+    assert!(text.starts_with("the state at 60 Hz: ") && text.contains("diagonal entry"), "{text}");
+}
+
+#[test]
+fn a_solver_that_is_cut_short_names_residual_and_state() {
+    let problem = with_field(quick(&[]).0, |setup| {
+        setup.linear_solver = LinearSolverSettings {
+            method: LinearSolver::Fixed(Method::Incomplete),
+            max_iterations: Some(1),
+            factor_bytes: 0,
+            ..LinearSolverSettings::default()
+        }
+    });
+    let error = refused(&problem, Want::Value);
+    let Error::Field { problem: name, cause } = &error else { panic!("{error}") };
+    let SolverError::NotConverged { residual, .. } = **cause else { panic!("{error}") };
+    assert!(name == "the state at 60 Hz" && residual.is_finite(), "{error}");
+}
+
+/// With a factor to fall back to the same case is solved, and says how.
+#[test]
+fn a_solver_that_is_cut_short_is_followed_by_a_factor() {
+    let problem = with_field(quick(&[]).0, |setup| {
+        setup.linear_solver = LinearSolverSettings {
+            method: LinearSolver::Fixed(Method::Incomplete),
+            max_iterations: Some(1),
+            ..LinearSolverSettings::default()
+        }
+    });
+    let analysis = problem.evaluate(&initial(&problem), Want::Value).unwrap();
+    let sound = quick(&[]).0;
+    let expected = sound.evaluate(&initial(&sound), Want::Value).unwrap().objective.unwrap();
+    // Residuals of 1e-11 and the condition of the system.
+    assert!((analysis.objective.unwrap() / expected - 1.0).abs() < 1e-6);
+    assert!(analysis.solver_events.len() >= 2, "{:?}", analysis.solver_events);
+}
+
+#[test]
+fn a_weight_out_of_range_names_the_adjoint() {
+    for weight in [1e200, -1e250, 1e-200] {
+        let mut problem = quick(&[]).0;
+        problem.objective.as_mut().unwrap().terms[0].weight = weight;
+        let text = refused(&problem, Want::Gradient).to_string();
+        assert!(
+            text.starts_with("the adjoint of the objective at 60 Hz: ") && text.contains("weights"),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn a_weighted_sum_that_overflows_is_named() {
+    for (weight, value) in [(f64::MAX, "inf"), (-f64::MAX, "-inf"), (f64::NAN, "NaN")] {
+        // Energies of terajoules: any multiple of them by the largest number is none.
+        let mut problem = with_field(quick(&[]).0, |setup| setup.coils[0].ampere_turns *= 1e6);
+        let energy = Functional::energy(&problem.states[0], None).unwrap();
+        let term = &mut problem.objective.as_mut().unwrap().terms[0];
+        (term.functional, term.weight) = (energy, weight);
+        let text = refused(&problem, Want::Value).to_string();
+        assert!(text.starts_with(&format!("the objective is {value}")), "{text}");
+    }
+}
+
+#[test]
+fn a_design_that_is_no_number_has_no_mesh() {
+    let problem = quick(&[]).0;
+    for bad in [f64::NAN, f64::INFINITY] {
+        let mut p = initial(&problem);
+        p[17] = bad;
+        let error = problem.evaluate(&p, Want::Gradient).expect_err("no mesh");
+        assert!(matches!(error, Error::Remesh(RemeshError::NotFinite { .. })), "{error}");
+        assert_eq!(error.exit_code(), ExitCode::Numerical);
+    }
+}
+
+#[test]
+fn a_design_beyond_its_mesh_names_the_element() {
+    let problem = quick(&[]).0;
+    for far in [1.0, 1e10, 1e100] {
+        let p = vec![far; initial(&problem).len()];
+        let error = problem.evaluate(&p, Want::Gradient).expect_err("no mesh");
+        assert!(matches!(error, Error::Remesh(RemeshError::Inverted { .. })), "{far:e}: {error}");
+    }
+}
+
+#[test]
+fn of_two_frequencies_the_one_that_fails_is_named() {
+    let mut problem = quick(&[]).0;
+    let mut setup = problem.states[0].setup().clone();
+    (setup.frequency, setup.coils[0].ampere_turns) = (200.0, c64::new(f64::INFINITY, 0.0));
+    problem.states.push(FieldModel::new(&problem.original, setup).unwrap());
+    let text = refused(&problem, Want::Gradient).to_string();
+    assert!(text.starts_with("the state at 200 Hz: "), "{text}");
+}

@@ -1,0 +1,72 @@
+//! What a run directory holds after a failure or a panic.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+use fluxmorph::config::Config;
+use fluxmorph::observer::{Evaluation, Observer, Silent};
+use fluxmorph::output::{OlderRun, system_disk};
+use fluxmorph::session::{self, Limits, Options, SavedRun};
+use serde_json::Value;
+
+use super::quick_path;
+
+/// Panics when it is told of an evaluation.
+struct Faulty {
+    at: usize,
+}
+
+impl Observer for Faulty {
+    fn evaluation(&mut self, evaluation: &Evaluation) {
+        assert!(evaluation.evaluation != self.at, "a fault of the program");
+    }
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// A run of a few evaluations in a directory, with an observer.
+fn run(directory: &Path, observer: &mut dyn Observer) -> Result<(), fluxmorph_optimizer::Error> {
+    let overrides = ["output.verify_refinement=0".to_owned(), "output.fields=every".to_owned()];
+    let (mut config, source) = Config::from_file(&quick_path(), &overrides).unwrap();
+    config.output.directory = directory.to_owned();
+    let disk = system_disk();
+    let options =
+        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
+    session::run(&config, &source, options, observer).map(drop)
+}
+
+#[test]
+fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let [broken, sound] = ["broken", "sound"].map(|name| folder.path().join(name));
+    let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 2 })));
+    assert!(caught.is_err(), "the panic is not swallowed");
+    assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
+    assert!(!broken.join("result.json").exists());
+    let history = std::fs::read_to_string(broken.join("history.jsonl")).unwrap();
+    assert_eq!(history.lines().count(), 3);
+    for evaluation in 0..3 {
+        fluxmorph_geometry::io::read_vtu(&broken.join(format!("fields/eval_{evaluation:04}.vtu"))).unwrap();
+    }
+    // Its evaluations are not lost.
+    let disk = system_disk();
+    let options =
+        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
+    let limits = Limits { max_evaluations: None, max_time: None };
+    let resumed =
+        session::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();
+    run(&sound, &mut Silent).unwrap();
+    let expected = json(&sound.join("result.json"));
+    assert_eq!(expected["objective"], json(&broken.join("result.json"))["objective"]);
+    assert_eq!(Some(resumed.evaluations as u64), expected["evaluations"].as_u64());
+}
+
+#[test]
+fn a_panic_before_the_first_evaluation_is_kept_leaves_a_failed_manifest() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken");
+    assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 0 }))).is_err());
+    assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
+}
