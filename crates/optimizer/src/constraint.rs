@@ -94,7 +94,7 @@ impl Constraint {
                 return Err(Error::Constraint {
                     name: self.name.clone(),
                     value: initial,
-                    expected: "a value above zero for `upper_ratio` to be a share of; give `upper` instead",
+                    expected: "a value above zero for the bound to be a share of; give the bound itself instead",
                 });
             }
         };

@@ -4,22 +4,15 @@
 //! It composes [`fluxmorph_solver`] and [`fluxmorph_remesh`]. What a person sees is not here: configuration keys, files,
 //! exit codes and the terminal belong to the application.
 
-mod approach;
 pub mod constraint;
 pub mod design;
 pub mod driver;
 mod error;
-pub mod finite;
 pub mod geometric;
-pub mod lap;
-pub mod memory;
 pub mod memory_estimate;
 pub mod nlopt;
 pub mod objective;
 pub mod problem;
-pub mod rounds;
-pub mod stage;
-pub mod thickness;
 pub mod verify;
 
 pub use error::Error;

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 use crate::constraint::Quantity;
 use crate::error::Error;
-use crate::memory::Memory;
-use crate::problem::{Analysis, Problem, Want};
+use crate::problem::SolverCache;
+use crate::problem::{Analysis, Problem, Derivatives};
 
 /// Remainders over F(p) that count as rounding: above the solver's tolerance, and a thousand times below what a first
 /// step of 2 % of the span leaves of any function that bends.
@@ -127,9 +127,9 @@ pub fn certify(
     settings: &Settings,
     progress: impl FnMut(usize, &Direction),
 ) -> Result<Certificate, Error> {
-    let mut memory = Memory::default();
-    let base = problem.evaluate_with(&mut memory, p, Want::Gradient)?;
-    let value = |p: &[f64]| Ok(numbers(&problem.evaluate_with(&mut memory.lent(), p, Want::Value)?)[0]);
+    let mut memory = SolverCache::default();
+    let base = problem.evaluate_with(&mut memory, p, Derivatives::First)?;
+    let value = |p: &[f64]| Ok(numbers(&problem.evaluate_with(&mut memory.lent(), p, Derivatives::None)?)[0]);
     let objective = base.objective.expect("a certificate needs an objective");
     let gradient = base.gradient.as_ref().expect("the gradient was asked for");
     measure(&value, p, objective, gradient, &span(problem), settings, progress)
@@ -169,8 +169,8 @@ pub fn certify_until(
     mut progress: impl FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
     Error::unless(interrupted)?;
-    let mut memory = Memory::default();
-    let base = problem.evaluate_with(&mut memory, p, Want::Gradient)?;
+    let mut memory = SolverCache::default();
+    let base = problem.evaluate_with(&mut memory, p, Derivatives::First)?;
     let span = span(problem);
     let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
     let value = |p: &[f64], index: usize| -> Result<f64, Error> {
@@ -179,7 +179,7 @@ pub fn certify_until(
             return Ok(values[index]);
         }
         Error::unless(interrupted)?;
-        let values = numbers(&problem.evaluate_with(&mut memory.lent(), p, Want::Value)?);
+        let values = numbers(&problem.evaluate_with(&mut memory.lent(), p, Derivatives::None)?);
         let value = values[index];
         known.borrow_mut().insert(key, values);
         Ok(value)

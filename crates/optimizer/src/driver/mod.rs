@@ -32,7 +32,7 @@ use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
 use crate::constraint::Bound;
 use crate::error::Error;
 use crate::problem::{Analysis, Problem, Timings};
-use crate::rounds::{RoundEvent, RoundKind};
+use crate::driver::{RoundEvent, RoundKind};
 pub use observer::{Observer, Silent};
 pub use record::{Evaluation, Record, column, hash_points, reference_hash};
 use run::Run;

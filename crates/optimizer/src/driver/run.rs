@@ -12,11 +12,11 @@ use super::{Evaluation, Observer, Optimised, Record, Recorder, Settings, Stop, S
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::memory::Memory;
+use crate::problem::SolverCache;
 use crate::objective::Goal;
-use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Want};
-use crate::rounds::RoundEvent;
-use crate::stage::Stage;
+use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Derivatives};
+use crate::driver::RoundEvent;
+use crate::problem::Stage;
 use replay::Setting;
 
 /// What the first evaluation fixes for the rest of the run.
@@ -71,7 +71,7 @@ pub(super) struct Run<'a> {
     goal: Goal,
     settings: &'a Settings,
     /// What the linear solvers remember of the designs before: which methods work.
-    memory: Memory,
+    memory: SolverCache,
     pub(super) observer: &'a mut dyn Observer,
     recorder: &'a mut dyn Recorder,
     interrupted: &'a dyn Fn() -> bool,
@@ -109,7 +109,7 @@ impl<'a> Run<'a> {
             problem,
             goal,
             settings,
-            memory: Memory::default(),
+            memory: SolverCache::default(),
             observer,
             recorder,
             interrupted,
@@ -220,7 +220,7 @@ impl<'a> Run<'a> {
         let remesh = clock.elapsed().as_secs_f64();
         let Self { problem, memory, observer, .. } = self;
         let told = &mut |stage| observer.stage(stage);
-        let mut analysis = problem.analyse_watched(memory, p, moved, Want::Gradient, told)?;
+        let mut analysis = problem.analyse_watched(memory, p, moved, Derivatives::First, told)?;
         analysis.timings.remesh += remesh;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");

@@ -3,11 +3,13 @@
 //! Each gives its value and its exact gradient with respect to the design variables. None of them needs a field; what
 //! does lives with the objectives. Bounds on these values and their scaling are the caller's.
 
-mod thickness;
+mod thickness_bound;
 mod volume;
+mod wall_thickness;
 
-pub use thickness::{Bound, ThicknessBound};
+pub use thickness_bound::{Bound, ThicknessBound};
 pub use volume::Volume;
+pub use wall_thickness::WallThickness;
 
 use fluxmorph_geometry::MeshError;
 
@@ -29,7 +31,7 @@ pub enum GeometricError {
     /// The region is cut by two parallel outer planes along x, along y and along z.
     #[error(
         "the region `{region}` is replaced by its impedance surface and ends at two outer planes along each of x, y and \
-         z: its volume does not follow from that surface; take model = \"volume\""
+         z: its volume does not follow from that surface; mesh the region instead"
     )]
     Boxed {
         /// Its name.
@@ -38,7 +40,7 @@ pub enum GeometricError {
     /// The design has no thickness.
     #[error(
         "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \
-         line through it meets no opposite face; leave the thickness limit out, or give the body a [regions] entry"
+         line through it meets no opposite face; leave the thickness limit out, or name the body's region"
     )]
     NoThickness,
 }

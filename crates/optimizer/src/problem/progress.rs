@@ -1,7 +1,6 @@
-//! The stages of a long piece of work, as told to whoever watches it.
+//! Progress of a long piece of work, reported to whoever watches it.
 //!
-//! Whoever computes tells through a function that a stage begins; what comes of it (a word on a terminal, or nothing) is
-//! decided in [`crate::observer`].
+//! Whoever computes reports each stage as it begins; what comes of it, a word on a terminal or nothing, is decided above.
 
 /// What is being computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +25,7 @@ pub enum Stage {
     Differentiating,
     /// Files are written.
     Writing,
-    /// Something without a name of its own; its time is not told.
+    /// Something without a name of its own; its time is not reported.
     Other,
 }
 
@@ -49,5 +48,22 @@ impl Stage {
     }
 }
 
-/// A function that is told of stages.
-pub type Told<'a> = &'a mut dyn FnMut(Stage);
+/// Watches a long piece of work.
+pub trait Progress {
+    /// A stage begins.
+    fn stage(&mut self, stage: Stage);
+}
+
+impl<F: FnMut(Stage)> Progress for F {
+    fn stage(&mut self, stage: Stage) {
+        self(stage);
+    }
+}
+
+/// Watches nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoProgress;
+
+impl Progress for NoProgress {
+    fn stage(&mut self, _: Stage) {}
+}

@@ -1,4 +1,4 @@
-//! Taking the mesh of a problem to a design: in one step where that keeps the limits, else in rounds.
+//! Continuation: the mesh of a problem taken to a design, in one step where that keeps the limits, else in rounds.
 
 use std::ops::ControlFlow;
 
@@ -6,8 +6,8 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_remesh::{Event, Limits, Motion, Moved, RemeshError, Travelled};
 
 use crate::error::Error;
-use crate::problem::{Problem, Shape};
-use crate::rounds::RoundEvent;
+use super::{Problem, Shape};
+use crate::driver::RoundEvent;
 
 impl Problem {
     /// Makes the mesh of a design the reference of the present round; nothing where it is already, or where the problem
@@ -20,21 +20,21 @@ impl Problem {
     ///
     /// # Panics
     /// If `p` has another length than there are variables.
-    pub fn approach(&mut self, p: &[f64], interrupted: &dyn Fn() -> bool) -> Result<Vec<RoundEvent>, Error> {
+    pub fn continue_to(&mut self, p: &[f64], interrupted: &dyn Fn() -> bool) -> Result<Vec<RoundEvent>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let displacement = shape.displacement(p);
-        self.approach_displacement(displacement, interrupted)
+        self.continue_to_displacement(displacement, interrupted)
     }
 
-    /// As [`Problem::approach`] for displacements of the design nodes from the undeformed mesh [m], shape `(n_design, 3)`,
+    /// As [`Problem::continue_to`] for displacements of the design nodes from the undeformed mesh [m], shape `(n_design, 3)`,
     /// whether or not any variables give them.
     ///
     /// # Errors
-    /// As [`Problem::approach`].
+    /// As [`Problem::continue_to`].
     ///
     /// # Panics
     /// If there is not one displacement per design node.
-    pub fn approach_displacement(
+    pub fn continue_to_displacement(
         &mut self,
         goal: Vec<Point>,
         interrupted: &dyn Fn() -> bool,
@@ -42,7 +42,7 @@ impl Problem {
         let Some(shape) = self.shape.as_mut().filter(|shape| shape.limits.rounds > 0) else {
             return Ok(Vec::new());
         };
-        let Some((motion, events)) = shape.standing_at(&shape.motion, goal, interrupted)? else {
+        let Some((motion, events)) = shape.continued_to(&shape.motion, goal, interrupted)? else {
             return Ok(Vec::new());
         };
         shape.motion = motion;
@@ -54,18 +54,18 @@ impl Shape {
     /// The mesh of a design from the undeformed one, whatever the present round.
     ///
     /// # Errors
-    /// As [`Problem::approach`], and [`RemeshError::Inverted`] where there are no rounds.
+    /// As [`Problem::continue_to`], and [`RemeshError::Inverted`] where there are no rounds.
     pub fn from_undeformed(&self, p: &[f64]) -> Result<Moved, Error> {
         let (motion, goal) = (self.motion.restarted()?, self.displacement(p));
-        let standing =
-            if self.limits.rounds > 0 { self.standing_at(&motion, goal.clone(), &|| false)? } else { None };
-        let motion = standing.map_or(motion, |(motion, _)| motion);
+        let continued =
+            if self.limits.rounds > 0 { self.continued_to(&motion, goal.clone(), &|| false)? } else { None };
+        let motion = continued.map_or(motion, |(motion, _)| motion);
         Ok(motion.moved(&goal)?)
     }
 
     /// The round after a motion that stands at displacements of the design nodes, and what happened on the way there;
     /// `None` if the motion does.
-    fn standing_at(
+    fn continued_to(
         &self,
         motion: &Motion,
         goal: Vec<Point>,
@@ -95,7 +95,7 @@ impl Shape {
         };
         let mut events = Vec::new();
         let travelled = motion.clone().travel(&path, &limits, &mut |event: &Event| {
-            events.push(RoundEvent::approach(event));
+            events.push(RoundEvent::of_continuation(event));
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         let Travelled { motion, moved, reached, .. } = travelled;

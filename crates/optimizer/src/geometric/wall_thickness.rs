@@ -1,4 +1,4 @@
-//! Thickness of the designed body behind every design node, measured along the node's direction of motion.
+//! WallThickness of the designed body behind every design node, measured along the node's direction of motion.
 //!
 //! From each node of the design surface a ray runs against its direction to the body's opposite face. That face is held
 //! (docs/theory.md), so the thickness of a design is the initial one plus the node's height: exactly where one direction
@@ -19,12 +19,12 @@ const GRAZING: f64 = 0.1;
 
 /// Initial thickness [m] behind every design node.
 #[derive(Clone, Debug)]
-pub struct Thickness {
+pub struct WallThickness {
     /// `None` where the node has no direction.
     initial: Vec<Option<f64>>,
 }
 
-impl Thickness {
+impl WallThickness {
     /// Measures the body `region` of the undeformed mesh; `None` where some ray does not meet an opposite face.
     pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
         let topology = mesh.topology();
@@ -119,7 +119,7 @@ mod tests {
             DesignSurface::new(&mesh, &DesignSetup::new(triangles, Direction::Along([0.0, 0.0, -1.0])))
                 .expect("every node is a variable");
         let plate = mesh.topology().region("plate").expect("the shield has it");
-        let thickness = Thickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
+        let thickness = WallThickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
         let (low, high) = thickness.range(&vec![0.001; surface.nodes().len()]);
         assert!((low - 0.011).abs() < 1e-12 && (high - 0.011).abs() < 1e-12, "{low} {high}");
     }

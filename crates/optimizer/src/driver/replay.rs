@@ -8,8 +8,8 @@ use super::{BestSoFar, Field, Run};
 use crate::nlopt::Sample;
 use crate::driver::{Best, Record, Stop, reference_hash};
 use crate::error::Error;
-use crate::memory::Memory;
-use crate::problem::Want;
+use crate::problem::SolverCache;
+use crate::problem::Derivatives;
 
 /// In what an evaluation was computed: with both it comes out as it was.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub(super) struct Setting {
     /// The mesh motion of its round.
     pub(super) motion: Motion,
     /// What the linear solvers remembered before it.
-    memory: Memory,
+    memory: SolverCache,
 }
 
 /// Largest difference of a design to that of its record, relative to the largest variable, where the work of either is or was
@@ -62,7 +62,7 @@ impl Run<'_> {
         let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
         let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
         let sample = self.sample(&initial, &record);
-        let memory = std::mem::replace(&mut self.memory, Memory::with_methods(&record.methods));
+        let memory = std::mem::replace(&mut self.memory, SolverCache::with_methods(&record.methods));
         let standing = self.standing(record.row.objective, &sample);
         if standing.is_improved() != record.improved
             || self.iterations_after(standing) != record.row.iteration
@@ -96,7 +96,7 @@ impl Run<'_> {
                 self.observer.phase("computing the field of the best design");
                 let Setting { motion, mut memory } = *setting;
                 let own = std::mem::replace(&mut self.shape_mut().motion, motion);
-                let analysis = self.problem.evaluate_with(&mut memory, &values, Want::Gradient);
+                let analysis = self.problem.evaluate_with(&mut memory, &values, Derivatives::First);
                 self.shape_mut().motion = own;
                 analysis?
             }

@@ -44,7 +44,7 @@ pub struct RoundEvent {
 
 impl RoundEvent {
     /// A step of the way to the first design.
-    pub fn approach(event: &Event) -> Self {
+    pub fn of_continuation(event: &Event) -> Self {
         let (round, policy, quality) = match *event {
             Event::Stepped { round, policy, quality, .. } => (round + 1, policy, [quality; 2]),
             Event::Rescued { round, policy, rescued } => (round, policy, rescued.quality),

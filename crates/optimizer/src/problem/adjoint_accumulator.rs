@@ -1,0 +1,107 @@
+//! Sums of functionals over the states, with one adjoint solve a state.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_solver::linear::PreparedSystem;
+use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, adjoint};
+
+use super::finite;
+use super::progress::{Progress, Stage};
+use super::stopwatch::Stopwatch;
+use super::{Shape, Timings};
+use crate::error::Error;
+use crate::objective::Term;
+
+/// What all states of an evaluation share.
+pub(super) struct Work<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) timings: Timings,
+    pub(super) report: Worst,
+    pub(super) progress: &'a mut dyn Progress,
+}
+
+/// One state with its factor.
+pub(super) struct Solved<'a> {
+    pub(super) index: usize,
+    pub(super) model: &'a FieldModel,
+    pub(super) system: PreparedSystem,
+    pub(super) state: FieldSolution,
+}
+
+/// A sum of terms over the states.
+pub(super) struct AdjointAccumulator {
+    /// Value of every term without its weight.
+    pub(super) values: Vec<f64>,
+    /// dF/dx of the weighted sum, shape `(n_nodes, 3)`.
+    pub(super) nodal: Vec<Point>,
+}
+
+impl AdjointAccumulator {
+    pub(super) fn new(terms: usize, nodes: usize) -> Self {
+        Self { values: vec![0.0; terms], nodal: vec![[0.0; 3]; nodes] }
+    }
+
+    /// Adds what the terms `(number, term)` of `owner` have on one state; derivatives where a shape is given, by one adjoint.
+    pub(super) fn add(
+        &mut self,
+        owner: &str,
+        work: &mut Work<'_>,
+        solved: &mut Solved<'_>,
+        terms: &[(usize, &Term)],
+        shape: Option<&Shape>,
+    ) -> Result<(), Error> {
+        let Solved { index, model, system, state } = solved;
+        let mut clock = Stopwatch::start();
+        let mut right_side: Option<Vec<c64>> = None;
+        for (number, term) in terms.iter().filter(|(_, term)| term.states.contains(index)) {
+            let evaluated = term.functional.evaluate(model, work.mesh, state);
+            let FunctionalValue { value, derivative, explicit } =
+                evaluated.map_err(finite::of_term(owner, term, model))?;
+            self.values[*number] += value;
+            if shape.is_none() {
+                continue;
+            }
+            let sum = right_side.get_or_insert_with(|| vec![c64::default(); derivative.len()]);
+            for (sum, d) in sum.iter_mut().zip(derivative) {
+                *sum += term.weight * d;
+            }
+            self.add_nodal(term.weight, explicit.as_deref().unwrap_or_default());
+        }
+        work.timings.gradient += clock.lap();
+        let (Some(right_side), Some(shape)) = (right_side, shape) else { return Ok(()) };
+        let named = finite::of_field(&format!("the adjoint of {owner}"), model);
+        work.progress.stage(Stage::Adjoint);
+        let lambda = adjoint::solve(system, &right_side).map_err(named)?;
+        work.report.include(&lambda);
+        work.timings.adjoint += clock.lap();
+        work.progress.stage(Stage::Differentiating);
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving())?;
+        self.add_nodal(1.0, &nodal);
+        work.timings.gradient += clock.lap();
+        Ok(())
+    }
+
+    fn add_nodal(&mut self, weight: f64, nodal: &[Point]) {
+        for (sum, own) in self.nodal.iter_mut().zip(nodal) {
+            for d in 0..3 {
+                sum[d] += weight * own[d];
+            }
+        }
+    }
+}
+
+/// Sum of iterations and worst residual over several solves.
+#[derive(Default)]
+pub(super) struct Worst {
+    pub(super) iterations: usize,
+    pub(super) residual: f64,
+}
+
+impl Worst {
+    pub(super) fn include(&mut self, solution: &FieldSolution) {
+        let report = solution.report();
+        self.iterations += report.iterations;
+        self.residual = self.residual.max(report.residual);
+    }
+}

@@ -1,0 +1,220 @@
+//! One evaluation: mesh, states, objective and constraints, gradients.
+
+use std::time::Instant;
+
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_remesh::Moved;
+use fluxmorph_solver::linear::SolverEvent;
+use fluxmorph_solver::{FieldModel, FieldSolution};
+
+use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
+use super::finite;
+use super::progress::{Progress, Stage};
+use super::stopwatch::Stopwatch;
+use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings};
+use crate::constraint::{Constraint, Quantity};
+use crate::error::Error;
+use crate::objective::Term;
+
+/// Which derivatives an evaluation gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Derivatives {
+    /// Values alone.
+    None,
+    /// Objective and constraints with their gradients: the adjoint problems are solved too.
+    First,
+}
+
+/// What the states of an evaluation add up to.
+struct Sums<'a> {
+    /// The terms of the objective.
+    objective: AdjointAccumulator,
+    /// Constraints on functionals of the field, with their numbers.
+    fields: Vec<(usize, &'a Term)>,
+    /// One sum for each of these.
+    constrained: Vec<AdjointAccumulator>,
+    solutions: Vec<FieldSolution>,
+    events: Vec<SolverEvent>,
+}
+
+impl Problem {
+    /// Field, objective, constraints and, if wanted, gradients of a design in the present round.
+    ///
+    /// `cache` holds what the linear solvers keep from the designs before; it is empty where a solver failed.
+    ///
+    /// # Errors
+    /// [`Error::Remesh`] when the mesh would break or the elastic gradient cannot be computed, [`Error::Field`] when a
+    /// linear system cannot be solved, [`Error::NotFinite`] when something computed is not finite.
+    ///
+    /// # Panics
+    /// If `p` has another length than there are variables.
+    pub fn evaluate(
+        &self,
+        p: &[f64],
+        derivatives: Derivatives,
+        cache: &mut SolverCache,
+        progress: &mut dyn Progress,
+    ) -> Result<Analysis, Error> {
+        let clock = Instant::now();
+        progress.stage(Stage::Moving);
+        let moved = self.moved(p)?;
+        let remesh = clock.elapsed().as_secs_f64();
+        let mut analysis = self.analyse(moved, p, derivatives, cache, progress)?;
+        analysis.timings.remesh += remesh;
+        Ok(analysis)
+    }
+
+    /// The second half of [`Problem::evaluate`]: on the mesh of the variables `p`, for whoever looks at that first.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`].
+    pub fn analyse(
+        &self,
+        moved: Moved,
+        p: &[f64],
+        derivatives: Derivatives,
+        cache: &mut SolverCache,
+        progress: &mut dyn Progress,
+    ) -> Result<Analysis, Error> {
+        let Moved { mesh, displacement, inversion } = moved;
+        let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default(), progress };
+        let shape = self.shape.as_ref().filter(|_| derivatives == Derivatives::First);
+        let sums = self.sum_states(&mut work, cache, shape)?;
+        let Work { mut timings, report, .. } = work;
+        let mut clock = Stopwatch::start();
+        let terms = self.terms();
+        let value = terms.iter().zip(&sums.objective.values).map(|(term, value)| term.weight * value).sum();
+        let differentiated = shape.filter(|_| !terms.is_empty());
+        let gradient = differentiated
+            .map(|shape| shape.pull_back("the objective", &sums.objective.nodal))
+            .transpose()?;
+        let constraints = self.measure_constraints(p, &mesh, shape, &sums)?;
+        timings.remesh += clock.lap();
+        let Sums { objective, solutions, events, .. } = sums;
+        let quality = self.quality(&mesh);
+        let analysis = Analysis {
+            displacement,
+            inversion,
+            solutions,
+            objective: (!terms.is_empty()).then_some(value),
+            terms: objective.values,
+            constraints,
+            gradient,
+            sensitivity: differentiated.map(|shape| moved_only(shape, objective.nodal)),
+            quality,
+            linear_iterations: report.iterations,
+            worst_residual: report.residual,
+            solver_events: events,
+            timings,
+            mesh,
+        };
+        finite::analysis(&analysis, &self.constraints)?;
+        Ok(analysis)
+    }
+
+    fn terms(&self) -> &[Term] {
+        self.objective.as_ref().map_or(&[], |sum| &sum.terms)
+    }
+
+    /// Solves one state after the other, and adds up what objective and constraints have on it.
+    fn sum_states(
+        &self,
+        work: &mut Work<'_>,
+        cache: &mut SolverCache,
+        shape: Option<&Shape>,
+    ) -> Result<Sums<'_>, Error> {
+        let terms: Vec<(usize, &Term)> = self.terms().iter().enumerate().collect();
+        let nodes = work.mesh.points().len();
+        let fields: Vec<(usize, &Term)> = self.field_constraints().collect();
+        let mut sums = Sums {
+            objective: AdjointAccumulator::new(terms.len(), nodes),
+            constrained: fields.iter().map(|_| AdjointAccumulator::new(1, nodes)).collect(),
+            fields,
+            solutions: Vec::with_capacity(self.states.len()),
+            events: Vec::new(),
+        };
+        for (index, model) in self.states.iter().enumerate() {
+            let mut solved = solve_state(index, model, work, cache)?;
+            sums.objective.add("the objective", work, &mut solved, &terms, shape)?;
+            for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
+                let name = format!("the constraint `{}`", self.constraints[*k].name);
+                sum.add(&name, work, &mut solved, &[(0, *term)], shape)?;
+            }
+            let Solved { system, state, .. } = solved;
+            sums.events.extend_from_slice(system.events());
+            cache.keep(index, system);
+            sums.solutions.push(state);
+        }
+        Ok(sums)
+    }
+
+    /// Constraints on functionals of the field, with their numbers.
+    fn field_constraints(&self) -> impl Iterator<Item = (usize, &Term)> {
+        self.constraints.iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
+            Quantity::Field(term) => Some((k, term)),
+            _ => None,
+        })
+    }
+
+    /// All constraints in their order, from the sums over the states, the mesh and the variables.
+    fn measure_constraints(
+        &self,
+        p: &[f64],
+        mesh: &Mesh,
+        differentiated: Option<&Shape>,
+        sums: &Sums<'_>,
+    ) -> Result<Vec<Measured>, Error> {
+        let Some(shape) = &self.shape else { return Ok(Vec::new()) };
+        let of = |(k, constraint): (usize, &Constraint)| {
+            if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape)? {
+                return Ok(Measured { value, gradient: differentiated.map(|_| gradient) });
+            }
+            let position = sums.fields.iter().position(|(number, _)| *number == k);
+            let own = &sums.constrained[position.expect("every constraint of the field has a sum")];
+            let name = format!("the constraint `{}`", constraint.name);
+            let gradient = differentiated.map(|shape| shape.pull_back(&name, &own.nodal)).transpose()?;
+            Ok(Measured { value: own.values[0], gradient })
+        };
+        self.constraints.iter().enumerate().map(of).collect()
+    }
+}
+
+/// Assembles, factors and solves a state.
+fn solve_state<'a>(
+    index: usize,
+    model: &'a FieldModel,
+    work: &mut Work<'_>,
+    cache: &mut SolverCache,
+) -> Result<Solved<'a>, Error> {
+    let mut clock = Stopwatch::start();
+    work.progress.stage(Stage::Assembling);
+    let (matrix, load) = (model.assembled(work.mesh), model.load(work.mesh));
+    work.timings.assembly += clock.lap();
+    let named = || finite::of_field("the state", model);
+    work.progress.stage(Stage::Factoring);
+    let mut system = model.prepare_with(matrix, cache.of_state(index)).map_err(named())?;
+    work.timings.factor += clock.lap();
+    work.progress.stage(Stage::State);
+    let state = model.solve_prepared(&mut system, &load).map_err(named())?;
+    finite::state(model, work.mesh, &state)?;
+    work.report.include(&state);
+    work.timings.state += clock.lap();
+    Ok(Solved { index, model, system, state })
+}
+
+/// dF/dx with the components zeroed that cannot move.
+fn moved_only(shape: &Shape, mut nodal: Vec<Point>) -> Vec<Point> {
+    for (i, g) in nodal.iter_mut().enumerate() {
+        let node = NodeId::new(i);
+        if shape.surface().nodes().binary_search(&node).is_ok() {
+            continue;
+        }
+        for (component, g) in g.iter_mut().enumerate() {
+            if !shape.motion().map().is_unknown(node, component) {
+                *g = 0.0;
+            }
+        }
+    }
+    nodal
+}

@@ -1,0 +1,181 @@
+//! The optimisation problem as a function: design variables in, objective, constraints and exact gradients out.
+//!
+//! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. Within a round the
+//! reference mesh and the elastic factor are fixed, so `F(p)` is one function and not a path; [`Shape::motion`] holds the
+//! round. A problem owns one state a frequency; the objective costs one adjoint solve a state whatever the number of its
+//! terms, each constraint of the field another.
+//!
+//! Here: what is moved and solved (`mod`, `shape`), one evaluation (`evaluate`) with its sums (`adjoint_accumulator`) and
+//! result (`analysis`), the way to a design far away (`continuation`), and what may be published (`finite`). Nothing here
+//! knows an optimiser, a file or a terminal.
+
+mod adjoint_accumulator;
+mod analysis;
+mod continuation;
+mod evaluate;
+pub mod finite;
+mod progress;
+mod shape;
+mod solver_cache;
+mod stopwatch;
+
+use fluxmorph_geometry::quality::QualityReport;
+use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_remesh::{Moved, RemeshError, StepToInversion};
+use fluxmorph_solver::FieldModel;
+
+use crate::constraint::{Bound, Constraint, Limit};
+use crate::error::Error;
+use crate::objective::WeightedSum;
+
+pub use analysis::{Analysis, Measured, Timings};
+pub use evaluate::Derivatives;
+pub use progress::{NoProgress, Progress, Stage};
+pub use shape::Shape;
+pub use solver_cache::SolverCache;
+
+/// Objective, constraints, states and shape on a reference mesh.
+#[derive(Debug)]
+pub struct Problem {
+    original: Mesh,
+    states: Vec<FieldModel>,
+    objective: Option<WeightedSum>,
+    constraints: Vec<Constraint>,
+    shape: Option<Shape>,
+    share: Option<Share>,
+}
+
+impl Problem {
+    /// A field problem on the undeformed mesh `original`, with one state a frequency; without a shape nothing moves, and
+    /// no constraint has a meaning.
+    ///
+    /// # Panics
+    /// If there is no state, a term is measured on a state that is not there, or there are constraints without a shape.
+    pub fn new(
+        original: Mesh,
+        states: Vec<FieldModel>,
+        objective: Option<WeightedSum>,
+        constraints: Vec<Constraint>,
+        shape: Option<Shape>,
+    ) -> Self {
+        assert!(!states.is_empty(), "a problem has a state");
+        let terms = objective.iter().flat_map(|sum| &sum.terms);
+        assert!(
+            terms.flat_map(|term| &term.states).all(|&state| state < states.len()),
+            "a term is measured on states of the problem"
+        );
+        assert!(constraints.is_empty() || shape.is_some(), "what is constrained can move");
+        Self { original, states, objective, constraints, shape, share: None }
+    }
+
+    /// The same with its work shared out among ranks.
+    #[must_use]
+    pub fn shared_out(self, share: Option<Share>) -> Self {
+        Self { share, ..self }
+    }
+
+    /// The same without constraints.
+    #[must_use]
+    pub fn without_constraints(self) -> Self {
+        Self { constraints: Vec::new(), ..self }
+    }
+
+    /// The same with other states, as many as before.
+    ///
+    /// # Panics
+    /// If there is another number of them.
+    #[must_use]
+    pub fn with_states(self, states: Vec<FieldModel>) -> Self {
+        assert_eq!(states.len(), self.states.len(), "one state a frequency");
+        Self { states, ..self }
+    }
+
+    /// The undeformed mesh.
+    pub fn original(&self) -> &Mesh {
+        &self.original
+    }
+
+    /// One field problem per state, in the order of the analysis' frequencies; at least one.
+    pub fn states(&self) -> &[FieldModel] {
+        &self.states
+    }
+
+    /// What is optimised; `None` for a field analysis without objective.
+    pub fn objective(&self) -> Option<&WeightedSum> {
+        self.objective.as_ref()
+    }
+
+    /// What must keep within bounds; empty without a shape.
+    pub fn constraints(&self) -> &[Constraint] {
+        &self.constraints
+    }
+
+    /// What moves; `None` for a field analysis without design.
+    pub fn shape(&self) -> Option<&Shape> {
+        self.shape.as_ref()
+    }
+
+    /// What moves, to change the round or the limits of its motion.
+    pub fn shape_mut(&mut self) -> Option<&mut Shape> {
+        self.shape.as_mut()
+    }
+
+    /// The ranks among which the work is shared out; `None` for one process.
+    pub fn share(&self) -> Option<&Share> {
+        self.share.as_ref()
+    }
+
+    /// The mesh of a design in the present round; the undeformed one where nothing moves.
+    ///
+    /// # Errors
+    /// [`RemeshError::Inverted`] says which element breaks and how far the step may go.
+    ///
+    /// # Panics
+    /// If `p` has another length than there are variables.
+    pub fn moved(&self, p: &[f64]) -> Result<Moved, RemeshError> {
+        match &self.shape {
+            Some(shape) => shape.motion().moved(&shape.displacement(p)),
+            None => Ok(Moved {
+                mesh: self.original.clone(),
+                displacement: vec![[0.0; 3]; self.original.points().len()],
+                inversion: StepToInversion::NEVER,
+            }),
+        }
+    }
+
+    /// Elements of which a node may move, ascending; empty without a shape.
+    pub fn moving_elements(&self) -> &[ElementId] {
+        self.shape.as_ref().map_or(&[], |shape| shape.motion().moving())
+    }
+
+    /// Quality of the elements that may move, or of all where nothing moves.
+    pub fn quality(&self, mesh: &Mesh) -> QualityReport {
+        match &self.shape {
+            Some(shape) => shape.motion().quality(mesh),
+            None => QualityReport::of_mesh(mesh).expect("a mesh has elements"),
+        }
+    }
+
+    /// Bounds of the constraints; a share of the initial design's value costs its analysis, unless that is `p`.
+    ///
+    /// # Errors
+    /// As [`Problem::evaluate`], and [`Error::Constraint`].
+    pub fn bounds(&self, p: &[f64], analysis: &Analysis) -> Result<Vec<Bound>, Error> {
+        let Some(shape) = self.shape.as_ref().filter(|_| !self.constraints.is_empty()) else {
+            return Ok(Vec::new());
+        };
+        let is_ratio = |constraint: &Constraint| matches!(constraint.limit, Limit::AtMostRatio(_));
+        let initial;
+        let measured = if p != shape.initial() && self.constraints.iter().any(is_ratio) {
+            // Of the undeformed mesh's motion, as a run has it, and not of the round around `p`.
+            let (p, cache) = (shape.initial(), &mut SolverCache::default());
+            let moved = shape.from_undeformed(p)?;
+            initial = self.analyse(moved, p, Derivatives::None, cache, &mut NoProgress)?;
+            &initial.constraints
+        } else {
+            &analysis.constraints
+        };
+        self.constraints.iter().zip(measured).map(|(constraint, m)| constraint.bound(m.value)).collect()
+    }
+}
