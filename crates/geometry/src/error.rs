@@ -95,7 +95,7 @@ pub enum MeshError {
         /// What the library said.
         cause: String,
     },
-    /// A mesh cannot be shared out over so many ranks.
+    /// A mesh cannot be distributed over so many ranks.
     #[error(
         "{ranks} ranks cannot share a mesh of {nodes} nodes, since every rank owns at least one: take 1 to {nodes} ranks"
     )]

@@ -9,8 +9,8 @@
 use std::time::Instant;
 
 use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::quality::QualityReport;
-use fluxmorph_geometry::ranks::Share;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
@@ -60,7 +60,7 @@ pub struct Problem {
     /// What moves; `None` for a field analysis without design.
     pub shape: Option<Shape>,
     /// The ranks among which the work is shared out; `None` for one process.
-    pub share: Option<Share>,
+    pub share: Option<Ownership>,
 }
 
 /// Wall time of the parts of an evaluation [s].

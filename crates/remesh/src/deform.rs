@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup};
 use fluxmorph_geometry::quality::QualityReport;
-use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
@@ -60,8 +60,8 @@ pub struct RemeshSetup {
     pub fixed_nodes: Vec<NodeId>,
     /// How the elastic system is solved in one process.
     pub solver: SolverChoice,
-    /// The ranks among which it is shared out; `None` for one process.
-    pub share: Option<Share>,
+    /// The ranks over which it is distributed; `None` for one process.
+    pub ownership: Option<Ownership>,
 }
 
 /// What follows from topology and set-up alone, and outlives a new reference mesh.
@@ -244,7 +244,7 @@ impl ElasticMap {
         self.plan.unknowns.count()
     }
 
-    /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is shared out.
+    /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is distributed.
     pub fn solver_bytes(&self) -> usize {
         let of = |(pattern, _): &(BlockPattern<3>, _)| self.plan.analysis.solver_bytes(pattern.structure());
         self.plan.stiffness.as_ref().map_or(0, of)
@@ -260,8 +260,8 @@ impl ElasticMap {
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
         let own = || QualityReport::of_elements(mesh, self.moving()).expect("an elastic body has elements");
         match &self.plan.analysis {
-            // Where a rank fails, the next order that needs it says so; this one does not.
-            SolverAnalysis::Distributed(shared) => shared.quality(mesh).ok().flatten().unwrap_or_else(own),
+            // Where a rank fails, the next command that needs it says so; this one does not.
+            SolverAnalysis::Distributed(distributed) => distributed.quality(mesh).ok().flatten().unwrap_or_else(own),
             _ => own(),
         }
     }
@@ -303,10 +303,10 @@ impl Plan {
         let at_coupled = coupled.iter().map(|&position| topology.tet(elements[position as usize]));
         let coupling = bound(&unknowns, &prescribed, at_coupled.collect());
         let moving = moving_elements(&body, &unknowns, &constraints.design_nodes);
-        let (stiffness, analysis) = match &setup.share {
-            Some(share) => {
-                let shared = DistributedElastic::new(share, (&body, &unknowns), &moving);
-                (None, SolverAnalysis::Distributed(Arc::new(shared)))
+        let (stiffness, analysis) = match &setup.ownership {
+            Some(ownership) => {
+                let distributed = DistributedElastic::new(ownership, (&body, &unknowns), &moving);
+                (None, SolverAnalysis::Distributed(Arc::new(distributed)))
             }
             None => {
                 let tets = elements.iter().map(|&e| topology.tet(e)).collect();

@@ -36,7 +36,7 @@ pub fn solve(system: &mut PreparedSystem, derivative: &[c64]) -> Result<FieldSol
 /// is incomplete, and those nodes must be held. The mesh is the one that the state was solved on.
 ///
 /// # Errors
-/// [`SolverError::Rank`] where the problem is shared out.
+/// [`SolverError::Rank`] where the problem is distributed.
 pub fn node_gradient(
     model: &FieldModel,
     mesh: &Mesh,

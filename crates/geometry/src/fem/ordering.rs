@@ -7,11 +7,11 @@
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::{amd, cholesky::simplicial, qr};
+use fluxmorph_petsc::metis;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
 use crate::ids::NodeId;
-use crate::metis;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
@@ -21,7 +21,7 @@ pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
 
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
-    metis::dissected(structure, None)
+    metis::nested_dissection(&structure.row_starts, &structure.columns, None)
 }
 
 /// Nested dissection of the *nodes*, expanded to their unknowns; not postordered, `forward[new] = old`.
@@ -36,7 +36,7 @@ pub fn nested_dissection_of_nodes<const C: usize>(
     let (nodes, graph) = node_graph(structure, dofs);
     let unknowns = |node: NodeId| (0..C).filter_map(move |c| dofs.equation(node, c));
     let weights: Vec<i32> = nodes.iter().map(|&node| unknowns(node).count() as i32).collect();
-    let order = metis::dissected(&graph, Some(weights))?;
+    let order = metis::nested_dissection(&graph.row_starts, &graph.columns, Some(weights))?;
     Some(order.iter().flat_map(|&i| unknowns(nodes[i as usize])).map(|equation| equation as u32).collect())
 }
 

@@ -21,16 +21,16 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     let (mut config, source) = args.common.load()?;
     // The differences are between designs so near to each other that one factor serves them all.
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
-    let ranks = Ranks::joined(&config, signal.number())?;
+    let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |_| {
-        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let mut observer = observer(&args.common.work);
         observer.phase("setting up mesh and matrices");
         let told = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.team(), told)?;
+        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.group(), told)?;
         memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.older_run())?;
         for warning in &setup.warnings {
             observer.warning(warning);

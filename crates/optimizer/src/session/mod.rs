@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::ranks::{Member, Team};
+use fluxmorph_geometry::parallel::{RankGroup, Role};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::driver;
@@ -52,7 +52,7 @@ pub struct Options<'a> {
     /// Threads in use, for the manifest.
     pub threads: usize,
     /// The ranks among which the work is shared out; `None` for one process.
-    pub team: Option<&'a Team>,
+    pub team: Option<&'a RankGroup>,
     /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
 }
@@ -89,17 +89,17 @@ pub fn run(
     })
 }
 
-/// What a rank does that is not the first, whatever the first one is told: it sets the same problem up, and follows orders
-/// until the first one ends. A set-up that fails here and not there is told the first one with its first order.
+/// What a worker does, whatever the first rank is to do: it sets the same problem up, and executes commands until the first
+/// one ends. A set-up that fails here and not there is reported with the first command.
 ///
 /// # Panics
 /// At the first rank.
-pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
-    assert_eq!(team.member(), Member::Follower, "the first rank leads");
-    let setup = set_up_watched(config, source, purpose, Some(team), &mut |_| ());
+pub fn serve(group: &RankGroup, config: &Config, source: &Source, purpose: Purpose) {
+    assert_eq!(group.role(), Role::Worker, "the first rank leads");
+    let setup = set_up_watched(config, source, purpose, Some(group), &mut |_| ());
     let directory = config.output.directory.clone();
     let _pieces = setup.as_ref().ok().and_then(|setup| SharedPieces::of(&setup.problem, directory));
-    team.follow(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
+    group.serve(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
 }
 
 /// Analyses one design and writes its field and result.
@@ -208,7 +208,7 @@ impl<'a> Session<'a> {
         let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
         let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
-        manifest.ranks = options.team.map(Team::size);
+        manifest.ranks = options.team.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
         manifest.write(&directory)?;

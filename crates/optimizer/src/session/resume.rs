@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use fluxmorph_geometry::ranks::Team;
+use fluxmorph_geometry::parallel::RankGroup;
 
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session, constraint_names, unreached};
@@ -112,7 +112,7 @@ pub fn resume(
         setup_seconds,
     };
     let ranks = session.manifest.ranks;
-    session.manifest.ranks = session.manifest.ranks.max(options.team.map(Team::size));
+    session.manifest.ranks = session.manifest.ranks.max(options.team.map(RankGroup::size));
     let identity = session.identity();
     let contents = journal(&directory, &identity, observer)?;
     session.manifest.resumed(Resumption::now(

@@ -20,7 +20,7 @@ pub use outline::{Outline, OutlinedDesign, outline};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
-use fluxmorph_geometry::ranks::Team;
+use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
@@ -100,7 +100,7 @@ pub fn set_up_watched(
     config: &Config,
     source: &Source,
     purpose: Purpose,
-    team: Option<&Team>,
+    team: Option<&RankGroup>,
     told: Told<'_>,
 ) -> Result<Setup, Error> {
     if purpose == Purpose::Optimisation {
@@ -113,7 +113,7 @@ fn made(
     config: &Config,
     source: &Source,
     purpose: Purpose,
-    team: Option<&Team>,
+    team: Option<&RankGroup>,
     told: Told<'_>,
 ) -> Result<Setup, Error> {
     told(Stage::Mesh);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::ranks::{Member, Share};
+use fluxmorph_geometry::parallel::{Ownership, Role};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
@@ -33,7 +33,7 @@ pub(super) struct Inputs<'a> {
     /// Without the regions that impedance surfaces replace.
     pub(super) mesh: &'a Mesh,
     /// The ranks among which it is shared out.
-    pub(super) share: Option<&'a Share>,
+    pub(super) share: Option<&'a Ownership>,
 }
 
 /// The design surface and the elastic map, before they are held against the field problem.
@@ -75,7 +75,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
-    let setup = RemeshSetup { share: inputs.share.cloned(), ..setup };
+    let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
 }
@@ -229,7 +229,7 @@ pub(super) fn remesh_setup(
         boundaries,
         fixed_nodes: Vec::new(),
         solver: SolverChoice::Automatic,
-        share: None,
+        ownership: None,
     })
 }
 
@@ -384,10 +384,10 @@ fn held_node_fault(
 
 /// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
 /// solved.
-fn check_bounds(source: &Source, shape: &Shape, share: Option<&Share>) -> Result<(), Error> {
+fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
     // A rank that follows gives no orders: the first one checks.
-    let follows = share.is_some_and(|share| share.team.member() == Member::Follower);
-    if shape.limits.rounds > 0 || follows {
+    let is_worker = share.is_some_and(|share| share.group.role() == Role::Worker);
+    if shape.limits.rounds > 0 || is_worker {
         return Ok(());
     }
     let mut faults = Vec::new();

@@ -5,7 +5,7 @@
 //! [`PreparedSystem`] holds; what follows from the pattern alone is made once a run in [`SystemAnalysis`]; what one
 //! design leaves for the next (a factor, solutions to start from) is [`SolverMemory`], and whether an old factor still pays is
 //! decided by counted work (`cost`), never by a clock, so that a run has the same bits on any machine. All of that is a
-//! [`system::LocalSystem`]; where a mesh is shared out over ranks, a [`distributed`] system has an engine of theirs solve.
+//! [`system::LocalSystem`]; where a mesh is distributed over ranks, a [`distributed`] system has an engine of theirs solve.
 
 pub(crate) mod aggregation;
 mod analysis;

@@ -18,7 +18,7 @@ pub struct RankShare {
     pub touching: usize,
 }
 
-/// How a conductor, a connected set of the kept elements, is shared out.
+/// How a conductor, a connected set of the kept elements, is distributed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConductorShare {
     /// Its first node.
