@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Event, Limits, Motion, Moved, RemeshError, Travelled};
+use fluxmorph_remesh::{Motion, Moved, RemeshError, StepEvent, StepLimits, SteppingOutcome};
 
 use crate::error::Error;
 use crate::problem::{Problem, Shape};
@@ -71,12 +71,12 @@ impl Shape {
         goal: Vec<Point>,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<(Motion, Vec<RoundEvent>)>, Error> {
-        let start = motion.anchor();
+        let start = motion.reference_design();
         if start == goal {
             return Ok(None);
         }
         // The rounds of the limits are the optimisation's.
-        let limits = Limits { rounds: Limits::default().rounds, ..self.limits };
+        let limits = StepLimits { rounds: StepLimits::default().rounds, ..self.limits };
         match motion.moved(&goal) {
             Ok(moved)
                 if 1.0 / moved.inversion.step <= limits.inversion_share
@@ -94,11 +94,11 @@ impl Shape {
             if t == 1.0 { goal.clone() } else { start.iter().zip(&goal).map(between).collect() }
         };
         let mut events = Vec::new();
-        let travelled = motion.clone().travel(&path, &limits, &mut |event: &Event| {
+        let travelled = motion.clone().step_along(&path, &limits, &mut |event: &StepEvent| {
             events.push(RoundEvent::approach(event));
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let Travelled { motion, moved, reached, .. } = travelled;
+        let SteppingOutcome { motion, moved, reached, .. } = travelled;
         if reached < 1.0 {
             Error::unless(interrupted)?;
             return Err(Error::DesignUnreached { reached });

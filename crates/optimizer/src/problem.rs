@@ -13,7 +13,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
-use fluxmorph_remesh::{Limits, Motion, Moved, RemeshError, StepToInversion};
+use fluxmorph_remesh::{Motion, Moved, RemeshError, StepLimits, StepToInversion};
 use fluxmorph_solver::linear::{PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, adjoint};
 
@@ -35,7 +35,7 @@ pub struct Shape {
     /// Surface to mesh (Eq. 3) in the present round.
     pub motion: Motion,
     /// How far a design may lie from the reference of its round, and how many rounds there may be.
-    pub limits: Limits,
+    pub limits: StepLimits,
     /// Thickness of the designed body, where it has one.
     pub thickness: Option<Thickness>,
     /// Lower bound of every variable [m].

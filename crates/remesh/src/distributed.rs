@@ -8,16 +8,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, CsrMatrix, DofMap, c64};
-use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::parallel::{
-    Command, CommandChannel, CommandHandler, Communicator, DistributedMatrix, Krylov, Ownership, Preconditioning, Role,
-    RowLayout, Rows, SolverOptions, SubSolver, solution_of,
+    Command, CommandChannel, CommandHandler, Communicator, DistributedMatrix, Krylov, Ownership,
+    Preconditioning, Role, RowLayout, Rows, SolverOptions, SubSolver, solution_of,
 };
+use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::body::Body;
-use crate::deform::bound;
+use crate::deform::bind_pattern;
 use crate::error::RemeshError;
 use crate::policy::StiffnessPolicy;
 use crate::solver::{MAX_ITERATIONS, TOLERANCE};
@@ -138,10 +138,15 @@ struct ElasticHandler {
 }
 
 impl ElasticHandler {
-    fn new(ownership: &Ownership, (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>), moving: &[ElementId]) -> Self {
+    fn new(
+        ownership: &Ownership,
+        (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
+        moving: &[ElementId],
+    ) -> Self {
         let topology = &body.topology;
         let owner = |node: NodeId| ownership.partition.owner_of(node);
-        let layout = Arc::new(RowLayout::new(unknowns, ownership.group.size(), ownership.group.rank(), owner));
+        let layout =
+            Arc::new(RowLayout::new(unknowns, ownership.group.size(), ownership.group.rank(), owner));
         let rows = DofMap::new(topology.node_count(), |node, c| {
             ownership.owns(node) && unknowns.equation(node, c).is_some()
         });
@@ -149,7 +154,7 @@ impl ElasticHandler {
         let held: Vec<u32> =
             (0..).zip(&body.elements).filter(|&(_, &e)| touches(e)).map(|(position, _)| position).collect();
         let connectivity = held.iter().map(|&position| topology.tet(body.elements[position as usize]));
-        let (pattern, group) = bound(&rows, unknowns, connectivity.collect());
+        let (pattern, group) = bind_pattern(&rows, unknowns, connectivity.collect());
         let moving = ownership.owned_among(moving);
         let (body, slots) = (Arc::clone(body), BTreeMap::new());
         Self { body, layout, pattern, group, held, moving, slots }

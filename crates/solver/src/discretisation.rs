@@ -13,10 +13,10 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use crate::boundary::Boundary;
 use crate::element::lagrange::Lagrange;
 use crate::error::SolverError;
-use crate::framed::Framed;
-use crate::local_entities::LocalEntities;
 use crate::linear::aggregation;
+use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, prolongation};
+use crate::rotated::RotatedMatrix;
 use crate::space::{Order, Space};
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
@@ -138,7 +138,7 @@ impl Discretisation {
     ) {
         if self.unknowns.has_frames() {
             self.pattern.assemble(group, values, |e| {
-                Framed::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
+                RotatedMatrix::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
             });
         } else {
             self.pattern.assemble(group, values, matrix);

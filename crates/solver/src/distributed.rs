@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use fluxmorph_geometry::fem::CsrMatrix;
 use fluxmorph_geometry::parallel::{
-    Command, CommandChannel, CommandHandler, Communicator, DistributedMatrix, Ownership, RowLayout, Rows, complex_of,
-    numbers_of,
+    Command, CommandChannel, CommandHandler, Communicator, DistributedMatrix, Ownership, RowLayout, Rows,
+    complex_of, numbers_of,
 };
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};

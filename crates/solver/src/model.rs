@@ -19,7 +19,7 @@ use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::linear::{
-    DistributedSettings, FieldKind, LinearSolverSettings, LocalSystem, PreparedSystem, SolverMemory,
+    DistributedSettings, FieldKind, LinearSolverCache, LinearSolverSettings, LocalSystem, PreparedSystem,
     SystemAnalysis, SystemPattern,
 };
 use crate::load::Sources;
@@ -202,15 +202,15 @@ impl FieldModel {
         load
     }
 
-    /// Makes what the linear solver needs for a mesh; shared by the state and its adjoint.
+    /// Prepares what the linear solver needs for a mesh; shared by the state and its adjoint.
     ///
     /// # Errors
     /// As [`FieldModel::prepare_with`].
     pub fn prepare(&self, matrix: impl Into<AssembledMatrix>) -> Result<PreparedSystem, SolverError> {
-        self.prepare_with(matrix, &mut SolverMemory::default())
+        self.prepare_with(matrix, &mut LinearSolverCache::default())
     }
 
-    /// As [`FieldModel::prepare`], with what is remembered of an earlier mesh or of another frequency.
+    /// As [`FieldModel::prepare`], with what is cached of an earlier mesh or of another frequency.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] when the factorisation fails: the system is singular; [`SolverError::Rank`] where a rank does.
@@ -220,11 +220,11 @@ impl FieldModel {
     pub fn prepare_with(
         &self,
         matrix: impl Into<AssembledMatrix>,
-        memory: &mut SolverMemory,
+        cache: &mut LinearSolverCache,
     ) -> Result<PreparedSystem, SolverError> {
         match (matrix.into(), &self.distributed, &self.shared.analysis) {
             (AssembledMatrix::Local(matrix), _, Some(analysis)) => {
-                let system = LocalSystem::new(analysis, matrix, memory)?;
+                let system = LocalSystem::new(analysis, matrix, cache)?;
                 Ok(PreparedSystem::Local(Box::new(system)))
             }
             (AssembledMatrix::OnRanks(points), Some(distributed), _) => {

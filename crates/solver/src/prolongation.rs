@@ -12,7 +12,7 @@ use fluxmorph_geometry::fem::CsrMatrix;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::tet4::dot;
 
-use crate::constraint::Frame;
+use crate::fixed_directions::Frame;
 use crate::space::Space;
 use crate::unknowns::{PSI, Unknowns};
 

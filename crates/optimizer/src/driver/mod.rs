@@ -22,7 +22,7 @@
 mod run;
 mod trust;
 
-use fluxmorph_remesh::Rung;
+use fluxmorph_remesh::FallbackLevel;
 
 use crate::algorithm::{self, Ending, Minimisation, Outcome};
 use crate::cli::ExitCode;
@@ -165,7 +165,7 @@ pub fn optimise(
         trust: TrustRegion::new(run.shape(), &run.centre(), 1.0)?,
         ftol_rel: settings.ftol_rel,
         shrinks: 0,
-        rung: Rung::Ground,
+        rung: FallbackLevel::None,
         renewals: 0,
         refused: None,
     };
@@ -195,7 +195,7 @@ struct Search {
     /// How often the box shrank since the last gain.
     shrinks: usize,
     /// How far up the ladder since the last gain.
-    rung: Rung,
+    rung: FallbackLevel,
     renewals: usize,
     /// The design refused last, and why.
     refused: Option<(String, Vec<f64>)>,
@@ -297,7 +297,7 @@ impl Search {
         // What a box shrank to is doubled with every gain.
         let scale = (self.trust.scale / SHRINK).min(1.0);
         self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
-        (self.shrinks, self.rung, self.renewals) = (0, Rung::Ground, 0);
+        (self.shrinks, self.rung, self.renewals) = (0, FallbackLevel::None, 0);
         self.ftol_rel = RESTART_TOLERANCE * settings.ftol_rel;
         let event = self.event(run, cause);
         run.tell(event);
@@ -318,7 +318,7 @@ impl Search {
         }
         if gained {
             // Without rounds the reference stays, and so does what the mesh can carry: search nearer to the best.
-            (self.shrinks, self.rung) = (0, Rung::Ground);
+            (self.shrinks, self.rung) = (0, FallbackLevel::None);
         }
         if self.shrinks < MAX_SHRINKS {
             self.shrinks += 1;
@@ -326,7 +326,7 @@ impl Search {
             self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
             let shape = run.shape();
             let step = shape.motion.step(&shape.displacement(wanted))?;
-            let admitted = shape.motion.admitted(&step, &shape.limits);
+            let admitted = shape.motion.admissible_share(&step, &shape.limits);
             let event = self.event(run, cause);
             run.tell(RoundEvent { kind: RoundKind::SmallerSteps, admitted: Some([admitted; 2]), ..event });
             return Ok(None);
@@ -335,7 +335,7 @@ impl Search {
             // The remedies are for the mesh of the best design.
             run.stand_at_best()?;
             let shape = run.shape();
-            shape.motion.rescued(&shape.displacement(wanted), self.rung, &shape.limits)?
+            shape.motion.escalate(&shape.displacement(wanted), self.rung, &shape.limits)?
         } else {
             None
         };
@@ -348,7 +348,7 @@ impl Search {
             run.observer.warning(&format!("{cause}, {exhausted}: the mesh carries the design no further"));
             return Ok(Some(StopReason::MeshLimit));
         };
-        run.best_is_stale = rescued.rescue.changes_mesh();
+        run.best_is_stale = rescued.fallback.changes_mesh();
         run.shape_mut().motion = motion;
         self.rung = rung;
         (self.shrinks, self.renewals) = (0, 0);

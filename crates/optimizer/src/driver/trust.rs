@@ -1,7 +1,7 @@
 //! The box a method may search in during a round: how far the mesh of the round can be trusted.
 //!
 //! The mesh carries a motion of all variables towards their upper bounds up to some share, within
-//! [`fluxmorph_remesh::Limits::inversion_share`] of the first inversion. That share of the longest of these ways is how far
+//! [`fluxmorph_remesh::StepLimits::inversion_share`] of the first inversion. That share of the longest of these ways is how far
 //! every variable may go up, though never beyond its bound; down likewise. A variable that lies on its bound already asks
 //! nothing of the mesh, and one that is near it may go there. Without rounds the box is that of the bounds, since no other
 //! reference can be had. Designs inside the box may still be refused one by one; then `scale` makes it smaller.

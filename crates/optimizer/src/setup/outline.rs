@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
-use fluxmorph_remesh::Guidance;
+use fluxmorph_remesh::KinematicConstraint;
 
 use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
@@ -93,7 +93,8 @@ fn outlined(
         Some(remesh) => {
             let nodes: Vec<NodeId> =
                 surface.nodes().iter().filter_map(|node| node_of[node.index()]).collect();
-            let body = remesh_setup(source, remesh, mesh, &nodes, Guidance::Free, &mut Vec::new())?;
+            let body =
+                remesh_setup(source, remesh, mesh, &nodes, KinematicConstraint::Free, &mut Vec::new())?;
             let elements = body.subregions.iter().flat_map(|part| part.elements.iter().copied());
             elements.collect::<BTreeSet<_>>().into_iter().collect()
         }

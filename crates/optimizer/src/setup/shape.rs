@@ -6,8 +6,8 @@ use fluxmorph_geometry::parallel::{Ownership, Role};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, Guidance, Limits, Motion, RemeshError, RemeshSetup, SolverChoice,
-    StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, ElasticMap, KinematicConstraint, Motion, RemeshError, RemeshSetup, SolverChoice,
+    StepLimits, StiffnessPolicy, Subregion,
 };
 use fluxmorph_solver::FieldModel;
 
@@ -112,11 +112,11 @@ pub(super) fn shape(
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
     source.check(faults)?;
-    let limits = Limits {
+    let limits = StepLimits {
         inversion_share: inputs.remesh.inversion_share,
         least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
         rounds: inputs.remesh.rounds,
-        ..Limits::default()
+        ..StepLimits::default()
     };
     let shape = Shape {
         surface,
@@ -137,7 +137,7 @@ pub(super) fn remesh_setup(
     remesh: &Remesh,
     mesh: &Mesh,
     design_nodes: &[NodeId],
-    guidance: Guidance,
+    guidance: KinematicConstraint,
     warnings: &mut Vec<String>,
 ) -> Result<RemeshSetup, Error> {
     let topology = mesh.topology();
@@ -224,7 +224,7 @@ pub(super) fn remesh_setup(
     Ok(RemeshSetup {
         subregions,
         policy,
-        guidance,
+        kinematic_constraint: guidance,
         design_nodes: design_nodes.to_vec(),
         boundaries,
         fixed_nodes: Vec::new(),
@@ -234,15 +234,19 @@ pub(super) fn remesh_setup(
 }
 
 /// The axis of the design's direction where the motion is to follow it.
-pub(super) fn guidance(source: &Source, design: Option<&Design>, remesh: &Remesh) -> Result<Guidance, Error> {
+pub(super) fn guidance(
+    source: &Source,
+    design: Option<&Design>,
+    remesh: &Remesh,
+) -> Result<KinematicConstraint, Error> {
     let axis = match design.map(|design| design.direction) {
         Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
         Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
     };
     match remesh.motion {
-        config::Motion::Free => Ok(Guidance::Free),
+        config::Motion::Free => Ok(KinematicConstraint::Free),
         config::Motion::AlongDesign => match axis {
-            Some(axis) => Ok(Guidance::Axis(axis)),
+            Some(axis) => Ok(KinematicConstraint::Axis(axis)),
             None => {
                 let fault = source
                     .fault("remesh.motion", "the design does not move along a coordinate axis")

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::parallel::{
-    CommandChannel, Krylov, Preconditioning, RankError, Solved, SolverOptions, SubSolver, numbers_of, solution_of,
+    CommandChannel, Krylov, Preconditioning, RankError, Solved, SolverOptions, SubSolver, numbers_of,
+    solution_of,
 };
 
 use super::LinearSolverReport;
@@ -98,7 +99,11 @@ pub struct DistributedSystem {
 
 impl DistributedSystem {
     /// The system whose matrix every rank has just taken.
-    pub(crate) fn new(channel: Arc<CommandChannel>, settings: &LinearSolverSettings, taken: &Arc<AtomicU64>) -> Self {
+    pub(crate) fn new(
+        channel: Arc<CommandChannel>,
+        settings: &LinearSolverSettings,
+        taken: &Arc<AtomicU64>,
+    ) -> Self {
         let own = taken.fetch_add(1, Ordering::SeqCst) + 1;
         Self { channel, required: settings.required, own, taken: Arc::clone(taken) }
     }
