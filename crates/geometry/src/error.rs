@@ -70,7 +70,7 @@ pub enum MeshError {
     /// A parameter of a generator is out of range.
     #[error("{parameter} = {value}: {expected}")]
     Parameter {
-        /// The parameter's name, as in the configuration.
+        /// Generator and parameter, with a dot between them.
         parameter: &'static str,
         /// The value given.
         value: String,

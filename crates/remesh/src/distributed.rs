@@ -120,7 +120,7 @@ impl DistributedElastic {
         }
         let of_ranks = self.channel.execute(QUALITY, mesh.points().as_flattened().to_vec())?;
         let reports = of_ranks.chunks_exact(QualityReport::NUMBERS).map(QualityReport::of_numbers);
-        Ok(reports.reduce(QualityReport::with).map(|report| report.placed(mesh)))
+        Ok(reports.reduce(QualityReport::with).map(|report| report.located_on(mesh)))
     }
 }
 

@@ -75,7 +75,7 @@ impl Discretisation {
         };
         let (pattern, groups) =
             pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form.triangles());
-        let lifted = lifted(mesh, &space, &unknowns, weak_form.triangles());
+        let lifted = find_lifted(mesh, &space, &unknowns, weak_form.triangles());
         Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
 
@@ -237,7 +237,7 @@ fn pattern(
 }
 
 /// Elements and surface triangles with a node whose `A` is prescribed, ascending.
-fn lifted(
+fn find_lifted(
     mesh: &Mesh,
     space: &Space,
     unknowns: &Unknowns,

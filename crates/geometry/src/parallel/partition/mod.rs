@@ -113,7 +113,7 @@ impl Partition {
         if ranks == 1 {
             return Ok(Self::of_owners(topology, ranks, vec![0; nodes]));
         }
-        let weights: Vec<u64> = weights.iter().map(|&w| counted(w)).collect();
+        let weights: Vec<u64> = weights.iter().map(|&w| node_weight(w)).collect();
         let graph = Graph::new(topology, ranks, &weights, kept, strength);
         let part = cut(&graph, ranks).unwrap_or_else(|| ranges(&graph.weights, ranks));
         let mut owners: Vec<u32> = graph.vertex_of.iter().map(|&v| part[v as usize]).collect();
@@ -184,7 +184,7 @@ impl Partition {
 }
 
 /// What a node with so many unknowns weighs.
-fn counted(unknowns: u32) -> u64 {
+fn node_weight(unknowns: u32) -> u64 {
     u64::from(unknowns.max(1))
 }
 
