@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use fluxmorph_geometry::MeshError;
-use fluxmorph_geometry::ranks::RankError;
+use fluxmorph_geometry::parallel::RankError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 

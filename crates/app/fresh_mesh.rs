@@ -14,13 +14,13 @@ use crate::config::{Config, MeshConfig, Source};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::design::Triangulation;
 use crate::error::Error;
-use fluxmorph_optimizer::memory::Memory;
+use fluxmorph_optimizer::problem::SolverCache;
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
 use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{ObjectiveResult, Verification};
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem};
 use crate::setup::{Purpose, Setup, design_triangulation, set_up};
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
@@ -52,26 +52,26 @@ impl Shapes {
     /// # Panics
     /// If `best` has another length than there are variables.
     pub fn of(config: &Config, setup: &Setup, best: &[f64]) -> Result<Self, Error> {
-        let (Some(design), Some(shape)) = (&config.design, &setup.problem.shape) else {
+        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
             return Ok(Self::Unchanged);
         };
-        if best == shape.initial {
+        if best == shape.initial() {
             return Ok(Self::Unchanged);
         }
         if design.grid.is_some() {
-            return Ok(Self::Variables([shape.initial.clone(), best.to_vec()]));
+            return Ok(Self::Variables([shape.initial().to_vec(), best.to_vec()]));
         }
         let surface = Box::new(design_triangulation(design, &setup.full_mesh)?);
-        Ok(Self::Displacements { surface, pair: [&shape.initial, best].map(|p| shape.displacement(p)) })
+        Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
     }
 
     /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
     fn displacements(&self, config: &Config, setup: &Setup) -> Result<[Vec<Point>; 2], Error> {
-        let (Some(design), Some(shape)) = (&config.design, &setup.problem.shape) else {
+        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
             return Ok(Default::default());
         };
         match self {
-            Self::Unchanged => Ok([&shape.initial, &shape.initial].map(|p| shape.displacement(p))),
+            Self::Unchanged => Ok([shape.initial(), shape.initial()].map(|p| shape.displacement(p))),
             Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
             Self::Displacements { surface, pair: [initial, best] } => {
                 let fresh = design_triangulation(design, &setup.full_mesh)?;
@@ -179,12 +179,11 @@ impl Gain<'_> {
             return Ok(None);
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
-        let Setup { mut problem, .. } = setup;
-        let tets = problem.original.topology().tets().len();
-        // They decide nothing here.
-        problem.constraints = Vec::new();
+        // Constraints decide nothing here.
+        let mut problem = setup.problem.without_constraints();
+        let tets = problem.original().topology().tets().len();
         let mut values = [0.0; 2];
-        let mut memory = Memory::default();
+        let mut memory = SolverCache::default();
         for (value, displacement) in values.iter_mut().zip(displacements) {
             if interrupted() {
                 return Ok(None);
@@ -207,7 +206,7 @@ impl Gain<'_> {
 /// Bytes that the process holds at the peak of the check, about; `None` where there is none to be made.
 pub fn memory_estimate(config: &Config, problem: &Problem) -> Option<usize> {
     let factor = config.output.verify_refinement;
-    if factor == 0.0 || problem.shape.is_none() || problem.objective.is_none() {
+    if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
         return None;
     }
     let fresh = config.mesh.refined(factor)?.tet_count()?;
@@ -231,19 +230,19 @@ fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
 /// The objective at a shape, reached from the undeformed mesh.
 fn objective_at(
     problem: &mut Problem,
-    memory: &mut Memory,
+    memory: &mut SolverCache,
     displacement: Vec<Point>,
     interrupted: &dyn Fn() -> bool,
 ) -> Result<f64, Error> {
-    let undeformed = problem.shape.as_ref().map(|shape| shape.motion.clone());
-    problem.approach_displacement(displacement.clone(), interrupted)?;
-    let moved = match &problem.shape {
-        Some(shape) => shape.motion.moved(&displacement)?,
+    let undeformed = problem.shape().map(|shape| shape.motion().clone());
+    problem.continue_to_displacement(displacement.clone(), interrupted)?;
+    let moved = match problem.shape() {
+        Some(shape) => shape.motion().moved(&displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse_with(memory, &[], moved, Want::Value)?;
-    if let (Some(shape), Some(motion)) = (&mut problem.shape, undeformed) {
-        shape.motion = motion;
+    let analysis = problem.analyse(moved, &[], Derivatives::None, memory, &mut NoProgress)?;
+    if let (Some(shape), Some(motion)) = (problem.shape(), undeformed) {
+        shape.set_motion(motion);
     }
     Ok(analysis.objective.unwrap_or(f64::NAN))
 }
@@ -267,7 +266,7 @@ mod tests {
 
     /// A smooth shape near the frame that the shield's optimiser finds, by the place of every variable.
     fn dished(setup: &Setup) -> Vec<f64> {
-        let points = setup.problem.shape.as_ref().expect("a shape").surface.points();
+        let points = setup.problem.shape().expect("a shape").surface.points();
         points.iter().map(|x| 0.2 * x[0].max(0.5 * x[1]) - 4e-3).collect()
     }
 
@@ -321,11 +320,11 @@ mod tests {
             let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
             let best = dished(&setup);
             let value = |p: &[f64]| {
-                let analysis = setup.problem.evaluate(p, Want::Value).expect("a valid mesh");
+                let analysis = setup.problem.evaluate(p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress).expect("a valid mesh");
                 analysis.objective.expect("an objective")
             };
-            let shape = setup.problem.shape.as_ref().expect("a shape");
-            let expected = value(&best) / value(&shape.initial);
+            let shape = setup.problem.shape().expect("a shape");
+            let expected = value(&best) / value(shape.initial());
             let shapes = Shapes::of(&config, &setup, &best).expect("a design surface");
             assert_eq!(matches!(shapes, Shapes::Displacements { .. }), on_nodes);
             let (objective, told) =

@@ -6,7 +6,7 @@
 //! the field is one-dimensional and the mesh is not.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, subdivided, uniform};
+use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, subdivide, uniform};
 use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material};
@@ -56,7 +56,7 @@ impl Slab {
         z.extend(&growing("slab", &[0.0, 0.5 * t], Fine::Start, growth).expect("lines")[1..]);
         z.extend(&growing("slab", &[0.5 * t, t], Fine::End, growth).expect("lines")[1..]);
         z.extend(&uniform("gap", [t, t + GAP], GAP / 2.0).expect("lines")[1..]);
-        let z = subdivided(&z, parts);
+        let z = subdivide(&z, parts);
         let side = 0.5 * t;
         let across: Vec<f64> = (0..=ACROSS).map(|i| side * i as f64 / ACROSS as f64).collect();
         let (_, mesh) =

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph_geometry::io::{VtuArray, joined, pvtu_pieces, vtu_contents};
+use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
 use fluxmorph_geometry::{ElementId, Partition};
 use fluxmorph::config::Config;
 use fluxmorph::fields::{self, FieldData};
@@ -94,7 +94,7 @@ fn fields_in_pieces_are_those_of_the_whole_and_are_reported_alike() {
             assert!(elements.iter().map(|e| e.0 as i32).eq(ids.iter().copied()));
         }
     }
-    let found = joined(pieces).unwrap();
+    let found = join_pieces(pieces).unwrap();
     assert_eq!((&found.points, &found.tets), (&whole.points, &whole.tets));
     for (found, whole) in [(&found.point_data, &whole.point_data), (&found.cell_data, &whole.cell_data)] {
         assert!(found.keys().eq(whole.keys()), "{:?}", found.keys());

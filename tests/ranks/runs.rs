@@ -4,12 +4,12 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph_geometry::ranks::{Member, Team, threads};
-use fluxmorph::observer::Silent;
-use fluxmorph::output::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph::report::ReportedRun;
-use fluxmorph::session::{self, Limits, Options, SavedRun};
-use fluxmorph::setup::Purpose;
+use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
+use fluxmorph_optimizer::observer::Silent;
+use fluxmorph_optimizer::output::{OlderRun, RunResult, StopReason, system_disk};
+use fluxmorph_optimizer::report::ReportedRun;
+use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
+use fluxmorph_optimizer::setup::Purpose;
 
 use crate::support;
 
@@ -35,11 +35,11 @@ enum Task {
 /// A run into a directory on so many ranks; 0 for one process without a team.
 fn run(directory: &Path, size: usize, task: Task) -> RunResult {
     let disk = system_disk();
-    let lead = |team: Option<&Team>| {
+    let lead = |team: Option<&RankGroup>| {
         let (mut config, source) = support::config(CONFIG, &SETTINGS);
         config.output.directory = directory.to_owned();
-        if let Some(team) = team.filter(|team| team.member() == Member::Follower) {
-            session::follow(team, &config, &source, Purpose::Optimisation);
+        if let Some(team) = team.filter(|team| team.role() == Role::Worker) {
+            session::serve(team, &config, &source, Purpose::Optimisation);
             return None;
         }
         let asked = Cell::new(0);
@@ -57,14 +57,14 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
             _ => session::run(&config, &source, options, &mut Silent),
         };
         if let Some(team) = team {
-            team.end();
+            team.shut_down();
         }
         Some(result.unwrap_or_else(|error| panic!("{error}")))
     };
     match size {
         0 => lead(None).expect("one process leads"),
         _ => {
-            let led = threads::run(size, |ranks| lead(Some(&Team::new(ranks, Arc::default()))));
+            let led = threads::run(size, |ranks| lead(Some(&RankGroup::new(ranks, Arc::default()))));
             led.into_iter().flatten().next().expect("the first rank leads")
         }
     }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::ranks::{Member, Team, threads};
-use fluxmorph::session;
-use fluxmorph::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
+use fluxmorph_optimizer::session;
+use fluxmorph_optimizer::setup::{Purpose, Setup, set_up_watched};
 
 use crate::support;
 
@@ -16,15 +16,15 @@ pub(crate) fn led<T: Send>(
     lead: impl Fn(Setup) -> T + Sync,
 ) -> T {
     let led = threads::run(size, |ranks| {
-        let team = Team::new(ranks, Arc::default());
+        let team = RankGroup::new(ranks, Arc::default());
         let (config, source) = support::config(name, overrides);
-        if team.member() == Member::Follower {
-            session::follow(&team, &config, &source, Purpose::Optimisation);
+        if team.role() == Role::Worker {
+            session::serve(&team, &config, &source, Purpose::Optimisation);
             return None;
         }
         let setup = set_up_watched(&config, &source, Purpose::Optimisation, Some(&team), &mut |_| ());
         let result = lead(setup.unwrap_or_else(|error| panic!("{error}")));
-        team.end();
+        team.shut_down();
         Some(result)
     });
     led.into_iter().flatten().next().expect("the first rank leads")

@@ -6,7 +6,7 @@ mod support;
 
 use fluxmorph_optimizer::memory::Memory;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
-use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, SolverEvent, SolverMemory};
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
 use support::setup;
 
@@ -111,14 +111,14 @@ fn a_factor_serves_a_frequency_close_by() {
     let problem = problem(MESHED, &[REUSED]);
     let (mesh, at_60) = (&problem.original, &problem.states[0]);
     let at_61 = at_60.at_frequency(mesh, 61.0).expect("a frequency above zero");
-    let solved = |model: &FieldModel, memory: &mut SolverMemory| {
+    let solved = |model: &FieldModel, memory: &mut LinearSolverCache| {
         let mut system = model.prepare_with(model.assemble(mesh), memory).expect("a regular system");
         let field = model.solve_prepared(&mut system, &model.load(mesh)).expect("it converges");
-        (field, system.into_memory())
+        (field, system.into_cache())
     };
-    let (_, memory) = solved(at_60, &mut SolverMemory::default());
-    let (shared, _) = solved(&at_61, &mut memory.lent());
-    let (own, _) = solved(&at_61, &mut SolverMemory::default());
+    let (_, memory) = solved(at_60, &mut LinearSolverCache::default());
+    let (shared, _) = solved(&at_61, &mut memory.without_initial_guess());
+    let (own, _) = solved(&at_61, &mut LinearSolverCache::default());
     let (shared_count, own_count) = (shared.report().iterations, own.report().iterations);
     assert!(shared_count > own_count, "{shared_count} iterations, {own_count} with an own factor");
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();

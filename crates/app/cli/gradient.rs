@@ -10,7 +10,7 @@ use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up_watched};
-use fluxmorph_optimizer::verify::{Certificate, Settings, certify_until};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
 /// Do what the command line says.
 ///
@@ -21,29 +21,29 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     let (mut config, source) = args.common.load()?;
     // The differences are between designs so near to each other that one factor serves them all.
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
-    let ranks = Ranks::joined(&config, signal.number())?;
+    let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |_| {
-        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let mut observer = observer(&args.common.work);
         observer.phase("setting up mesh and matrices");
         let told = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.team(), told)?;
+        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.group(), told)?;
         memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.older_run())?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
-        let shape = setup.problem.shape.as_ref().expect("an optimisation has a shape");
+        let shape = setup.problem.shape().expect("an optimisation has a shape");
         let p = match &args.design {
-            Some(path) => read_design(path, shape.surface.variable_count())?,
-            None => shape.initial.clone(),
+            Some(path) => read_design(path, shape.surface().variable_count())?,
+            None => shape.initial().to_vec(),
         };
-        setup.problem.approach(&p, &interrupted)?;
+        setup.problem.continue_to(&p, &interrupted)?;
         let settings = Settings::default();
         let certificates =
-            certify_until(&setup.problem, &p, &settings, &interrupted, |constraint, index, direction| {
+            certify(&setup.problem, &p, &settings, &interrupted, |constraint, index, direction| {
                 observer.phase(&format!(
                     "{}direction {} of {}: slope {:.4}, difference {:.1e}",
                     constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),

@@ -13,7 +13,7 @@ use signal_hook::iterator::Signals;
 
 use super::ExitCode;
 use super::launcher;
-use super::ranks::is_idle;
+use super::ranks::is_worker;
 use crate::error::Error;
 use fluxmorph_optimizer::Error as OptimizerError;
 use crate::observer::take_down;
@@ -74,7 +74,7 @@ pub(super) fn watch(message: &'static str) -> Signal {
     // A handler must not write; a thread of its own does, while the others compute.
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
         // Of several ranks one speaks.
-        let speaks = !is_idle();
+        let speaks = !is_worker();
         std::thread::spawn(move || {
             if signals.forever().next().is_some() && speaks {
                 // A second signal ends the process where it stands: from here on nothing is left to tidy up.

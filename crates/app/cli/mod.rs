@@ -11,6 +11,8 @@ mod interrupt;
 pub(crate) mod launcher;
 mod morph;
 mod panic;
+#[cfg(feature = "petsc")]
+mod petsc;
 mod ranks;
 mod report;
 mod run;
@@ -41,7 +43,7 @@ pub fn main() -> std::process::ExitCode {
         Err(error) => {
             // Help and version are asked for, and go to standard output; a closed pipe is no reason to panic.
             let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Success };
-            if !ranks::is_idle() {
+            if !ranks::is_worker() {
                 let _ = error.print();
             }
             return code.into();
@@ -56,7 +58,7 @@ fn done(cli: &Cli) -> ExitCode {
         cli.command,
         Command::Run(_) | Command::Resume(_) | Command::Solve(_) | Command::Gradient(_)
     );
-    if ranks::is_idle() && !shared_out {
+    if ranks::is_worker() && !shared_out {
         return ExitCode::Success;
     }
     let outcome = match &cli.command {
@@ -73,7 +75,7 @@ fn done(cli: &Cli) -> ExitCode {
     };
     outcome.unwrap_or_else(|error| {
         // Of several ranks that fail alike one says so; what befalls one alone is said by that one.
-        if ranks::is_idle() {
+        if ranks::is_worker() {
             if matches!(error, Error::Ranks { .. } | Error::Threads { .. }) {
                 let _ = writeln!(std::io::stderr(), "rank {}: {}", launcher::rank(), message(&error));
             }

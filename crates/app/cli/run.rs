@@ -25,15 +25,15 @@ use crate::setup::Purpose;
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let (config, source) = args.load()?;
-    let ranks = Ranks::joined(&config, signal.number())?;
+    let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
-        if let Some(code) = ranks.followed(&config, &source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let disk = system_disk();
         let older_run = args.common.older_run();
-        let team = ranks.team();
+        let team = ranks.group();
         let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
         let result = session::run(&config, &source, options, &mut *observer);
@@ -53,10 +53,10 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let disk = system_disk();
     let saved = SavedRun::open(&disk, &args.directory)?;
-    let ranks = Ranks::joined(saved.config().0, signal.number())?;
+    let ranks = Ranks::join(saved.config().0, signal.number())?;
     let outcome = with_threads(ranks.threads(args.work.threads), |threads| {
         let (config, source) = saved.config();
-        if let Some(code) = ranks.followed(config, source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(config, source, Purpose::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
@@ -67,7 +67,7 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
             memory_limit::check_mesh(config, source)?;
         }
         let older_run = args.work.older_run();
-        let team = ranks.team();
+        let team = ranks.group();
         let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let report = config.output.report.then_some(&disk);
         let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };

@@ -16,9 +16,9 @@ use crate::setup::{Purpose, variable_count};
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (config, source) = args.common.load()?;
-    let ranks = Ranks::joined(&config, signal.number())?;
+    let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
-        if let Some(code) = ranks.followed(&config, &source, Purpose::Analysis) {
+        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Analysis) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
@@ -28,7 +28,7 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
         };
         let disk = system_disk();
         let older_run = args.common.older_run();
-        let team = ranks.team();
+        let team = ranks.group();
         let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let result = session::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::tet4::{Point, add, volume};
 use fluxmorph_geometry::{ElementId, Topology};
-use fluxmorph_remesh::{Event, Limits, Motion, RemeshError, Rescue, StepToInversion, Travelled};
+use fluxmorph_remesh::{
+    Fallback, Motion, RemeshError, StepEvent, StepLimits, StepToInversion, SteppingOutcome,
+};
 
 use crate::config::Increments;
 use crate::error::Error;
@@ -69,10 +71,10 @@ pub fn walk(
         Increments::Count(1) => Taken { displacement: step, reached: 1.0, increments: 1, rescues: 0 },
         Increments::Count(count) => equal(motion, &path, count, least_quality, tell)?,
         Increments::Auto(_) => {
-            let limits = Limits { least_quality, ..Limits::default() };
-            let Travelled { moved, reached, steps, rescues, .. } =
-                motion.travel(&path, &limits, &mut |event| tell(&line(event)))?;
-            Taken { displacement: moved.displacement, reached, increments: steps, rescues }
+            let limits = StepLimits { least_quality, ..StepLimits::default() };
+            let SteppingOutcome { moved, reached, steps, fallbacks, .. } =
+                motion.step_along(&path, &limits, &mut |event| tell(&line(event)))?;
+            Taken { displacement: moved.displacement, reached, increments: steps, rescues: fallbacks }
         }
     };
     let Taken { displacement, reached, increments, rescues } = taken;
@@ -130,23 +132,25 @@ fn equal(
     Ok(Taken { displacement, reached: 1.0, increments: count, rescues: 0 })
 }
 
-fn line(event: &Event) -> String {
+fn line(event: &StepEvent) -> String {
     match event {
-        Event::Stepped { round, reached, share, quality, .. } => format!(
+        StepEvent::Stepped { round, reached, share, quality, .. } => format!(
             "increment {}: {:.1} % of the motion, {:.0} % of the way to an inversion, worst quality {quality:.4}",
             round + 1,
             reached * 100.0,
             share * 100.0
         ),
-        Event::Rescued { rescued, .. } => {
-            let what = match rescued.rescue {
-                Rescue::Policy { from, to } => format!("stiffness {} instead of {}", to.name(), from.name()),
-                Rescue::Smoothing { nodes } => format!("{nodes} interior nodes smoothed"),
-                Rescue::Guided { axis } => {
+        StepEvent::FellBack { report, .. } => {
+            let what = match report.fallback {
+                Fallback::Policy { from, to } => {
+                    format!("stiffness {} instead of {}", to.name(), from.name())
+                }
+                Fallback::Smoothing { nodes } => format!("{nodes} interior nodes smoothed"),
+                Fallback::AxisConstraint { axis } => {
                     format!("the whole way anew, along {} only", ["x", "y", "z"][axis])
                 }
             };
-            let [before, after] = rescued.quality;
+            let [before, after] = report.quality;
             format!("rescue: {what}, worst quality {before:.4} -> {after:.4}")
         }
     }

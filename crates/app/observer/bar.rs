@@ -14,7 +14,7 @@ use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Colour, Evaluation, Observer, RunObserver, Paint, Started, show};
 use crate::output::RunResult;
-use fluxmorph_optimizer::stage::Stage;
+use fluxmorph_optimizer::problem::Stage;
 
 /// How often times on the bar move on.
 const TICK: Duration = Duration::from_millis(200);

@@ -7,7 +7,7 @@ use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Evaluation, Observer, RunObserver, Paint, Started, show};
 use crate::output::RunResult;
-use fluxmorph_optimizer::stage::Stage;
+use fluxmorph_optimizer::problem::Stage;
 
 /// A stage that takes longer [s] is told with its time, outside of evaluations: people begin to wonder then.
 const LONG_STAGE: f64 = 2.0;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory};
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::rounds::RoundEvent;
+use fluxmorph_optimizer::problem::RoundEvent;
 
 /// The content of `result.json`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -246,9 +246,9 @@ pub(crate) mod tests {
                 bound: 1e-3,
                 satisfied: true,
             }],
-            rounds: vec![fluxmorph_optimizer::rounds::RoundEvent {
+            rounds: vec![fluxmorph_optimizer::problem::RoundEvent {
                 round: 1,
-                kind: fluxmorph_optimizer::rounds::RoundKind::Round,
+                kind: fluxmorph_optimizer::problem::RoundKind::Round,
                 evaluation: Some(4),
                 worst_quality: [0.1; 2],
                 admitted: None,

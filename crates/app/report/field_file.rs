@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::io::{VtuContents, joined, pvtu_pieces, vtu_contents};
+use fluxmorph_geometry::io::{VtuContents, join_pieces, pvtu_pieces, vtu_contents};
 
 use super::data::damaged;
 use crate::output::{FieldForm, OutputError, RunDirectory};
@@ -38,7 +38,7 @@ pub(super) fn field_contents(
         Ok((name, contents))
     };
     let pieces = names.into_iter().map(piece).collect::<Result<Vec<_>, OutputError>>()?;
-    let whole = joined(pieces).map_err(damaged(&path))?;
+    let whole = join_pieces(pieces).map_err(damaged(&path))?;
     Ok((path, whole))
 }
 

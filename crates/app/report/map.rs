@@ -37,7 +37,7 @@ impl SurfaceValues {
             });
         let thickness = design.thickness.as_ref().filter(|_| along_one);
         let values = data.designs.each_ref().map(|values| {
-            let heights = design.surface.heights(values.as_ref()?);
+            let heights = design.surface.normal_displacements(values.as_ref()?);
             Some(match thickness {
                 None => heights.iter().map(|h| Some(1e3 * h)).collect(),
                 Some(thickness) => {

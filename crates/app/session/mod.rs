@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::ranks::{Member, Team};
+use fluxmorph_geometry::parallel::{RankGroup, Role};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -23,7 +23,7 @@ use crate::error::Error;
 use crate::exports;
 use crate::fresh_mesh::{self, Check, Gain, Shapes};
 use crate::journal::{self, Identity};
-use fluxmorph_optimizer::memory::Memory;
+use fluxmorph_optimizer::problem::SolverCache;
 use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::observer::{RunObserver, Started};
@@ -31,11 +31,11 @@ use crate::output::{
     Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus, StopReason,
     check_finite, peak_memory_bytes, resume_command, surface_files,
 };
-use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::rounds::RoundEvent;
+use fluxmorph_optimizer::problem::{Problem, Derivatives};
+use fluxmorph_optimizer::problem::RoundEvent;
 use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
-use fluxmorph_optimizer::stage::Stage;
+use fluxmorph_optimizer::problem::Stage;
 use pieces::SharedPieces;
 use recorder::{DirectoryRecorder, write_collection, write_field};
 pub(crate) use resume::configuration;
@@ -52,7 +52,7 @@ pub struct Options<'a> {
     /// Threads in use, for the manifest.
     pub threads: usize,
     /// The ranks among which the work is shared out; `None` for one process.
-    pub team: Option<&'a Team>,
+    pub team: Option<&'a RankGroup>,
     /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
 }
@@ -69,13 +69,13 @@ pub fn run(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Optimisation, options.team, told)?;
+    let progress = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(config, source, Purpose::Optimisation, options.team, progress)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     OptimizerError::unless(options.interrupted)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
-    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial, options.interrupted);
+    let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
+    let approach = setup.problem.continue_to(&initial, options.interrupted);
     let approach = approach.map_err(|error| unreached(error.into(), config, source))?;
     let session = Session::open("run", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
@@ -89,17 +89,17 @@ pub fn run(
     })
 }
 
-/// What a rank does that is not the first, whatever the first one is told: it sets the same problem up, and follows orders
-/// until the first one ends. A set-up that fails here and not there is told the first one with its first order.
+/// What a worker does, whatever the first rank is to do: it sets the same problem up, and executes commands until the first
+/// one ends. A set-up that fails here and not there is reported with the first command.
 ///
 /// # Panics
 /// At the first rank.
-pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
-    assert_eq!(team.member(), Member::Follower, "the first rank leads");
-    let setup = set_up_watched(config, source, purpose, Some(team), &mut |_| ());
+pub fn serve(group: &RankGroup, config: &Config, source: &Source, purpose: Purpose) {
+    assert_eq!(group.role(), Role::Worker, "the first rank leads");
+    let setup = set_up_watched(config, source, purpose, Some(group), &mut |_| ());
     let directory = config.output.directory.clone();
     let _pieces = setup.as_ref().ok().and_then(|setup| SharedPieces::of(&setup.problem, directory));
-    team.follow(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
+    group.serve(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
 }
 
 /// Analyses one design and writes its field and result.
@@ -115,14 +115,14 @@ pub fn solve(
 ) -> Result<RunResult, Error> {
     let clock = Instant::now();
     observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Analysis, options.team, told)?;
+    let progress = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(config, source, Purpose::Analysis, options.team, progress)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
     OptimizerError::unless(options.interrupted)?;
-    let values = match (&setup.problem.shape, design) {
+    let values = match (setup.problem.shape(), design) {
         (Some(shape), given) => {
-            let values = given.unwrap_or_else(|| shape.initial.clone());
-            let outside = |k: usize| values[k] < shape.lower[k] || values[k] > shape.upper[k];
+            let values = given.unwrap_or_else(|| shape.initial().to_vec());
+            let outside = |k: usize| values[k] < shape.lower()[k] || values[k] > shape.upper()[k];
             if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
                 observer.warning(&format!(
                     "design variable {k} = {} mm lies outside its bounds",
@@ -135,7 +135,7 @@ pub fn solve(
     };
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    let approach = setup.problem.approach(p, options.interrupted)?;
+    let approach = setup.problem.continue_to(p, options.interrupted)?;
     let moved = setup.problem.moved(p)?;
     let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
     session.conclude(observer, |session, observer| {
@@ -143,8 +143,8 @@ pub fn solve(
         approach.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
-        let told = &mut |stage| observer.stage(stage);
-        let analysis = problem.analyse_watched(&mut Memory::default(), p, moved, Want::Gradient, told)?;
+        let progress = &mut |stage| observer.stage(stage);
+        let analysis = problem.analyse(moved, p, Derivatives::First, &mut SolverCache::default(), progress)?;
         observer.stage(Stage::Writing);
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
@@ -156,7 +156,7 @@ pub fn solve(
         }
         exports::write(config, &session.directory, &analysis.mesh, observer)?;
         let value = analysis.objective;
-        let initial_quality = problem.quality(&problem.original).worst;
+        let initial_quality = problem.quality(problem.original()).worst;
         Ok(RunResult {
             evaluations: 1,
             objective: value.map(|value| ObjectiveResult {
@@ -208,7 +208,7 @@ impl<'a> Session<'a> {
         let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
         let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
-        manifest.ranks = options.team.map(Team::size);
+        manifest.ranks = options.team.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
         manifest.write(&directory)?;
@@ -220,15 +220,15 @@ impl<'a> Session<'a> {
     /// Tells what is set up.
     fn announce(&self, observer: &mut dyn RunObserver) {
         let Self { command, config, setup, directory, .. } = self;
-        let mesh = setup.problem.original.topology();
+        let mesh = setup.problem.original().topology();
         observer.started(&Started {
             title: &config.title,
             optimizer: (*command == "run").then_some(&config.optimizer),
             objective: config.objective.as_ref(),
-            variables: setup.problem.shape.as_ref().map_or(0, |s| s.surface.variable_count()),
+            variables: setup.problem.shape().map_or(0, |s| s.surface().variable_count()),
             nodes: mesh.node_count(),
             tets: mesh.tets().len(),
-            unknowns: setup.problem.states.iter().map(|model| model.unknown_count()).sum(),
+            unknowns: setup.problem.states().iter().map(|model| model.unknown_count()).sum(),
             directory: Some(directory.path()),
         });
         for warning in &setup.warnings {
@@ -244,7 +244,7 @@ impl<'a> Session<'a> {
     /// What the journal of this run belongs to.
     fn identity(&self) -> Identity {
         let Problem { shape, constraints, .. } = &self.setup.problem;
-        let variables = shape.as_ref().map_or(0, |shape| shape.surface.variable_count());
+        let variables = shape.as_ref().map_or(0, |shape| shape.surface().variable_count());
         Identity::new(self.config, &self.setup.full_mesh, variables, constraints.len())
     }
 
@@ -357,7 +357,7 @@ impl<'a> Session<'a> {
         check_finite(&result)?;
         result.write(&self.directory)?;
         let memory = fresh_mesh::memory_estimate(self.config, &self.setup.problem).unwrap_or(0);
-        (self.setup.problem.states, self.setup.problem.shape) = (Vec::new(), None);
+        self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
         let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
@@ -385,7 +385,7 @@ fn unreached(error: Error, config: &Config, source: &Source) -> Error {
 
 /// Names of the constraints in their order.
 fn constraint_names(problem: &Problem) -> Vec<&str> {
-    problem.constraints.iter().map(|constraint| constraint.name.as_str()).collect()
+    problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect()
 }
 
 /// Origin and content hash of the mesh with all its regions.

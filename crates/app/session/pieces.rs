@@ -6,7 +6,9 @@
 use std::path::PathBuf;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::ranks::{Communicator, Order, Part, Share, Shared, complex_of, numbers_of};
+use fluxmorph_geometry::parallel::{
+    Command, CommandChannel, CommandHandler, Communicator, Ownership, complex_of, numbers_of,
+};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
@@ -18,17 +20,17 @@ use fluxmorph_optimizer::problem::{Analysis, Problem};
 /// What all ranks write with.
 #[derive(Debug)]
 pub(super) struct SharedPieces {
-    shared: Shared,
+    channel: CommandChannel,
     ranks: usize,
 }
 
 impl SharedPieces {
     /// Shares the work of writing into a directory; every rank does, after its set-up. `None` for one process.
     pub(super) fn of(problem: &Problem, directory: PathBuf) -> Option<Self> {
-        let share = problem.share.as_ref()?;
-        let states = problem.states.iter().map(FieldModel::of_one_process).collect();
-        let part = PieceWriter { states, share: share.clone(), mesh: problem.original.clone(), directory };
-        Some(Self { shared: share.team.share(Box::new(part)), ranks: share.team.size() })
+        let share = problem.share()?;
+        let states = problem.states().iter().map(FieldModel::of_one_process).collect();
+        let writer = PieceWriter { states, share: share.clone(), mesh: problem.original().clone(), directory };
+        Some(Self { channel: share.group.register(Box::new(writer)), ranks: share.group.size() })
     }
 
     /// Writes the field of an evaluation.
@@ -54,28 +56,28 @@ impl SharedPieces {
         for solution in data.solutions {
             numbers.extend(numbers_of(solution.values()));
         }
-        self.shared.order(0, numbers).map_err(|cause| Error::Pieces { cause })?;
+        self.channel.execute(0, numbers).map_err(|cause| Error::Pieces { cause })?;
         let names: Vec<String> =
             (0..self.ranks).map(|rank| RunDirectory::piece_in_header(evaluation, rank)).collect();
-        Ok(directory.finish_pieces(evaluation, &fields::header(&problem.states, &data, &names))?)
+        Ok(directory.finish_pieces(evaluation, &fields::header(problem.states(), &data, &names))?)
     }
 }
 
 /// What a rank writes its pieces with.
 struct PieceWriter {
     states: Vec<FieldModel>,
-    share: Share,
+    share: Ownership,
     /// Of the topology that all designs have.
     mesh: Mesh,
     directory: PathBuf,
 }
 
-impl Part for PieceWriter {
-    fn work(&mut self, order: &Order, _: &dyn Communicator) -> Result<Vec<f64>, String> {
+impl CommandHandler for PieceWriter {
+    fn handle(&mut self, command: &Command, _: &dyn Communicator) -> Result<Vec<f64>, String> {
         let nodes = self.mesh.points().len();
-        let mut rest = order.numbers.as_slice();
+        let mut rest = command.numbers.as_slice();
         let mut take = |count: usize| -> Result<&[f64], String> {
-            let (taken, others) = rest.split_at_checked(count).ok_or("the order is too short")?;
+            let (taken, others) = rest.split_at_checked(count).ok_or("the command is too short")?;
             rest = others;
             Ok(taken)
         };
@@ -96,7 +98,7 @@ impl Part for PieceWriter {
             sensitivity: Some(&sensitivity),
             solutions: &solutions,
         };
-        let rank = self.share.team.rank();
+        let rank = self.share.group.rank();
         let own = self.share.partition.elements_of(rank);
         let bytes = fields::piece(&self.states, &data, own).map_err(|e| said(&e))?;
         let directory = RunDirectory::open(&system_disk(), &self.directory).map_err(|e| said(&e))?;

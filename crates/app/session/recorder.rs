@@ -123,11 +123,11 @@ impl<'a> DirectoryRecorder<'a> {
 }
 
 impl Recorder for DirectoryRecorder<'_> {
-    fn is_exact(&self) -> bool {
+    fn is_bitwise_reproducible(&self) -> bool {
         self.is_exact
     }
 
-    fn recall(&mut self) -> Option<Record> {
+    fn replay(&mut self) -> Option<Record> {
         self.recalled.pop_front()
     }
 
@@ -162,7 +162,7 @@ pub(super) fn write_field(
     if let Some(pieces) = pieces {
         return pieces.write(directory, evaluation, problem, analysis);
     }
-    let bytes = fields::vtu(&problem.states, &FieldData::of(analysis))?;
+    let bytes = fields::vtu(problem.states(), &FieldData::of(analysis))?;
     Ok(directory.write_field(evaluation, &bytes)?)
 }
 

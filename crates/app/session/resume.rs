@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use fluxmorph_geometry::ranks::Team;
+use fluxmorph_geometry::parallel::RankGroup;
 
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session, constraint_names, unreached};
@@ -90,14 +90,14 @@ pub fn resume(
         return Ok(result);
     }
     observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, options.team, told)?;
+    let progress = &mut |stage| observer.stage(stage);
+    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, options.team, progress)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), &source, options.older_run)?;
     if (options.interrupted)() {
         return Err(OptimizerError::InterruptedRun.into());
     }
-    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial, options.interrupted).map_err(|error| match error {
+    let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
+    let approach = setup.problem.continue_to(&initial, options.interrupted).map_err(|error| match error {
         OptimizerError::Interrupted => OptimizerError::InterruptedRun.into(),
         other => unreached(other.into(), &config, &source),
     })?;
@@ -113,7 +113,7 @@ pub fn resume(
         setup_seconds,
     };
     let ranks = session.manifest.ranks;
-    session.manifest.ranks = session.manifest.ranks.max(options.team.map(Team::size));
+    session.manifest.ranks = session.manifest.ranks.max(options.team.map(RankGroup::size));
     let identity = session.identity();
     let contents = journal(&directory, &identity, observer)?;
     session.manifest.resumed(Resumption::now(

@@ -32,16 +32,16 @@ impl Session<'_> {
         let mesh = &analysis.mesh;
         let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
         let located = locate(mesh, &places);
-        let states = (0..problem.states.len())
+        let states = (0..problem.states().len())
             .map(|index| self.state_result(index, analysis, &located, observer))
             .collect::<Vec<_>>();
         let StateResult { probes, losses_w, .. } = states[0].clone();
-        let design = match (&problem.shape, values) {
+        let design = match (problem.shape(), values) {
             (Some(shape), Some(values)) => Some(DesignResult {
                 values_m: values.to_vec(),
-                lower_m: shape.lower.clone(),
-                upper_m: shape.upper.clone(),
-                points_m: shape.surface.points().to_vec(),
+                lower_m: shape.lower().to_vec(),
+                upper_m: shape.upper().to_vec(),
+                points_m: shape.surface().points().to_vec(),
             }),
             _ => None,
         };
@@ -60,7 +60,7 @@ impl Session<'_> {
             mesh: MeshResult {
                 nodes: topology.node_count(),
                 tets: topology.tets().len(),
-                unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
+                unknowns: problem.states().iter().map(|model| model.unknown_count()).sum(),
                 worst_quality_initial: initial_quality,
                 worst_quality_final: analysis.quality.worst,
             },
@@ -91,7 +91,7 @@ impl Session<'_> {
         located: &[Option<Located>],
         observer: &mut dyn RunObserver,
     ) -> StateResult {
-        let (model, solution) = (&self.setup.problem.states[index], &analysis.solutions[index]);
+        let (model, solution) = (&self.setup.problem.states()[index], &analysis.solutions[index]);
         let mesh = &analysis.mesh;
         let mut located = located.iter();
         let probes = self
@@ -130,7 +130,7 @@ impl Session<'_> {
 
 /// The terms of the objective at a design.
 pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
-    let terms = problem.objective.iter().flat_map(|objective| &objective.terms);
+    let terms = problem.objective().into_iter().flat_map(|objective| &objective.terms);
     let of = |(term, &value): (&Term, &f64)| TermResult {
         kind: term.label.kind.to_owned(),
         region: term.label.region.clone(),
@@ -149,11 +149,11 @@ pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Boun
         bound: bound.value,
         satisfied: bound.is_satisfied(measured.value),
     };
-    problem.constraints.iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
+    problem.constraints().iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
 }
 
 /// How the linear systems were solved.
 pub(super) fn linear_solver(problem: &Problem, worst_residual: f64, iterations: usize) -> LinearSolverResult {
-    let methods = problem.states.iter().map(|model| model.method_name());
+    let methods = problem.states().iter().map(|model| model.method_name());
     LinearSolverResult { methods: methods.collect(), worst_residual, iterations }
 }

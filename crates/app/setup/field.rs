@@ -1,6 +1,6 @@
 //! The field problems of a configuration.
 
-use fluxmorph_geometry::ranks::{Krylov, Share, SubSolver};
+use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{Mesh, Topology};
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
 use fluxmorph_solver::linear::{
@@ -82,7 +82,7 @@ pub(super) fn field_models(
     mesh: &Mesh,
     impedance_surfaces: &[Conductor],
     coils: &[coil::Coil],
-    share: Option<&Share>,
+    share: Option<&Ownership>,
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
     for &frequency in config.analysis.frequencies() {
@@ -103,7 +103,7 @@ fn field_model(
     mesh: &Mesh,
     frequency: f64,
     (impedance_surfaces, coils): (Vec<Conductor>, Vec<coil::Coil>),
-    share: Option<&Share>,
+    share: Option<&Ownership>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
     let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
@@ -126,7 +126,7 @@ fn field_model(
         coils,
         boundaries,
         linear_solver,
-        share: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
+        ownership: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
     };
     Ok(FieldModel::new(mesh, setup)?)
 }

@@ -59,8 +59,8 @@ pub(crate) fn unit(config: &Config) -> LengthUnit {
 /// A parameter that a generator refuses becomes a fault at its key.
 fn parameter_fault(error: MeshError, source: &Source) -> Error {
     let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
-    let path = if parameter.starts_with("mesh.") { parameter } else { "mesh" };
-    source.error(vec![source.fault(path, format!("{parameter} = {value}")).expected(expected)]).into()
+    let path = format!("mesh.{parameter}");
+    source.error(vec![source.fault(&path, format!("{path} = {value}")).expected(expected)]).into()
 }
 
 /// A fault of a mesh file is shown at the key that names it.

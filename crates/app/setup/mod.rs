@@ -20,7 +20,7 @@ pub use outline::{Outline, OutlinedDesign, outline};
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
-use fluxmorph_geometry::ranks::Team;
+use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
@@ -28,7 +28,7 @@ use fluxmorph_solver::{FieldModel, Material};
 use crate::config::{self, Config, ConfigError, Fault, FaultReport, RegionModel, Source};
 use crate::error::Error;
 use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_optimizer::stage::{Stage, Told};
+use fluxmorph_optimizer::problem::{Progress, Stage};
 use blame::Gathered;
 
 /// A problem, and what the user should know of it.
@@ -92,7 +92,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
 }
 
 /// As [`set_up`], shared out among the ranks of a team if there is one: every rank sets the same up, and none but the first
-/// gives orders. `told` hears of every stage as it begins.
+/// gives orders. `progress` hears of every stage as it begins.
 ///
 /// # Errors
 /// As [`set_up`].
@@ -100,23 +100,23 @@ pub fn set_up_watched(
     config: &Config,
     source: &Source,
     purpose: Purpose,
-    team: Option<&Team>,
-    told: Told<'_>,
+    team: Option<&RankGroup>,
+    progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
     if purpose == Purpose::Optimisation {
         config.optimisation(source)?;
     }
-    made(config, source, purpose, team, told).map_err(|error| blame::placed(error, config, source))
+    made(config, source, purpose, team, progress).map_err(|error| blame::placed(error, config, source))
 }
 
 fn made(
     config: &Config,
     source: &Source,
     purpose: Purpose,
-    team: Option<&Team>,
-    told: Told<'_>,
+    team: Option<&RankGroup>,
+    progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
-    told(Stage::Mesh);
+    progress.stage(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     let mut faults = name_faults(config, source, full_mesh.topology());
     if let Some(first) = faults.first_mut() {
@@ -145,7 +145,7 @@ fn made(
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
         gathered.take::<()>(Err(source.error(vec![fault]).into()))?;
     }
-    told(Stage::Unknowns);
+    progress.stage(Stage::Unknowns);
     let share = team.map(|team| share::of_mesh(config, &mesh, team)).transpose()?;
     let coils = gathered.take(field::coils(config, source, &mesh))?;
     let design = match (&config.design, &config.remesh) {
@@ -183,16 +183,16 @@ fn made(
     let (mut shape, mut constraints) = (None, Vec::new());
     if let (Some(inputs), Some(body)) = (&design, body) {
         let observed = functional::observed(config, &mesh, &states)?;
-        told(Stage::Elasticity);
+        progress.stage(Stage::Elasticity);
         let made = shape::shape(inputs, config, body, &states[0], &observed)?;
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
         shape = Some(made);
     }
-    told(Stage::Other);
+    progress.stage(Stage::Other);
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
-    let problem = Problem { original: mesh, states, objective, constraints, shape, share };
+    let problem = Problem::new(mesh, states, objective, constraints, shape).shared_out(share);
     Ok(Setup { problem, audits, warnings, full_mesh })
 }
 

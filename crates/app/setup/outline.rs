@@ -5,14 +5,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
-use fluxmorph_remesh::Guidance;
+use fluxmorph_remesh::KinematicConstraint;
 
 use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, Source};
 use fluxmorph_optimizer::design::DesignSurface;
 use crate::error::Error;
-use fluxmorph_optimizer::thickness::Thickness;
+use fluxmorph_optimizer::geometric::WallThickness;
 
 /// Mesh, design surface and audits of a configuration.
 #[derive(Debug)]
@@ -38,8 +38,8 @@ pub struct OutlinedDesign {
     pub triangles: Vec<[NodeId; 3]>,
     /// The region that a positive design thickens; else those with an entry of their own at the surface; else none.
     pub bodies: Vec<RegionId>,
-    /// Thickness of the designed body, where it has one.
-    pub thickness: Option<Thickness>,
+    /// WallThickness of the designed body, where it has one.
+    pub thickness: Option<WallThickness>,
     /// Elements of `mesh` that may move, ascending.
     pub moving: Vec<ElementId>,
 }
@@ -83,7 +83,7 @@ fn outlined(
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
     let body = thickened(full_mesh, &surface, config);
-    let thickness = body.and_then(|region| Thickness::measure(full_mesh, region, &surface));
+    let thickness = body.and_then(|region| WallThickness::measure(full_mesh, region, &surface));
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     let bodies = match body {
         Some(region) => vec![region],
@@ -93,7 +93,8 @@ fn outlined(
         Some(remesh) => {
             let nodes: Vec<NodeId> =
                 surface.nodes().iter().filter_map(|node| node_of[node.index()]).collect();
-            let body = remesh_setup(source, remesh, mesh, &nodes, Guidance::Free, &mut Vec::new())?;
+            let body =
+                remesh_setup(source, remesh, mesh, &nodes, KinematicConstraint::Free, &mut Vec::new())?;
             let elements = body.subregions.iter().flat_map(|part| part.elements.iter().copied());
             elements.collect::<BTreeSet<_>>().into_iter().collect()
         }
@@ -118,12 +119,12 @@ mod tests {
             let (config, source) = shield(name);
             let outline = outline(&config, &source).expect("an outline");
             let setup = set_up(&config, &source, Purpose::Optimisation).expect("a problem");
-            assert_eq!(outline.mesh.points(), setup.problem.original.points());
-            let shape = setup.problem.shape.as_ref().expect("a shape");
+            assert_eq!(outline.mesh.points(), setup.problem.original().points());
+            let shape = setup.problem.shape().expect("a shape");
             let design = outline.design.as_ref().expect("a design");
             let kept: Vec<NodeId> =
                 design.surface.nodes().iter().filter_map(|n| outline.node_of[n.index()]).collect();
-            assert_eq!(kept, shape.surface.nodes());
+            assert_eq!(kept, shape.surface().nodes());
             assert_eq!(design.moving, setup.problem.moving_elements());
             let plate = outline.full_mesh.topology().region("plate").expect("a plate");
             assert_eq!(design.bodies, [plate]);

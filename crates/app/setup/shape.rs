@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::ranks::{Member, Share};
+use fluxmorph_geometry::parallel::{Ownership, Role};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, Guidance, Limits, Motion, RemeshError, RemeshSetup, SolverChoice,
-    StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, ElasticMap, KinematicConstraint, Motion, RemeshError, RemeshSetup, SolverChoice,
+    StepLimits, StiffnessPolicy, Subregion,
 };
 use fluxmorph_solver::FieldModel;
 
@@ -18,7 +18,7 @@ use crate::config::{
 use fluxmorph_optimizer::design::DesignSurface;
 use crate::error::Error;
 use fluxmorph_optimizer::problem::Shape;
-use fluxmorph_optimizer::thickness::Thickness;
+use fluxmorph_optimizer::geometric::WallThickness;
 
 /// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
 const LEAST_QUALITY_SHARE: f64 = 0.05;
@@ -33,7 +33,7 @@ pub(super) struct Inputs<'a> {
     /// Without the regions that impedance surfaces replace.
     pub(super) mesh: &'a Mesh,
     /// The ranks among which it is shared out.
-    pub(super) share: Option<&'a Share>,
+    pub(super) share: Option<&'a Ownership>,
 }
 
 /// The design surface and the elastic map, before they are held against the field problem.
@@ -75,7 +75,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
-    let setup = RemeshSetup { share: inputs.share.cloned(), ..setup };
+    let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
 }
@@ -95,7 +95,7 @@ pub(super) fn shape(
         faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
     }
     let thickness = thickened(full_mesh, &full_surface, config)
-        .and_then(|region| Thickness::measure(full_mesh, region, &full_surface));
+        .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
         let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
@@ -112,21 +112,14 @@ pub(super) fn shape(
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
     source.check(faults)?;
-    let limits = Limits {
+    let limits = StepLimits {
         inversion_share: inputs.remesh.inversion_share,
         least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
         rounds: inputs.remesh.rounds,
-        ..Limits::default()
+        ..StepLimits::default()
     };
-    let shape = Shape {
-        surface,
-        motion,
-        limits,
-        thickness,
-        lower: vec![design.lower; n],
-        upper: vec![design.upper; n],
-        initial,
-    };
+    let bounds = [vec![design.lower; n], vec![design.upper; n]];
+    let shape = Shape::new(surface, motion, limits, bounds).with_thickness(thickness).starting_at(initial);
     check_bounds(source, &shape, inputs.share)?;
     Ok(shape)
 }
@@ -137,7 +130,7 @@ pub(super) fn remesh_setup(
     remesh: &Remesh,
     mesh: &Mesh,
     design_nodes: &[NodeId],
-    guidance: Guidance,
+    guidance: KinematicConstraint,
     warnings: &mut Vec<String>,
 ) -> Result<RemeshSetup, Error> {
     let topology = mesh.topology();
@@ -224,25 +217,29 @@ pub(super) fn remesh_setup(
     Ok(RemeshSetup {
         subregions,
         policy,
-        guidance,
+        kinematic_constraint: guidance,
         design_nodes: design_nodes.to_vec(),
         boundaries,
         fixed_nodes: Vec::new(),
         solver: SolverChoice::Automatic,
-        share: None,
+        ownership: None,
     })
 }
 
 /// The axis of the design's direction where the motion is to follow it.
-pub(super) fn guidance(source: &Source, design: Option<&Design>, remesh: &Remesh) -> Result<Guidance, Error> {
+pub(super) fn guidance(
+    source: &Source,
+    design: Option<&Design>,
+    remesh: &Remesh,
+) -> Result<KinematicConstraint, Error> {
     let axis = match design.map(|design| design.direction) {
         Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
         Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
     };
     match remesh.motion {
-        config::Motion::Free => Ok(Guidance::Free),
+        config::Motion::Free => Ok(KinematicConstraint::Free),
         config::Motion::AlongDesign => match axis {
-            Some(axis) => Ok(Guidance::Axis(axis)),
+            Some(axis) => Ok(KinematicConstraint::Axis(axis)),
             None => {
                 let fault = source
                     .fault("remesh.motion", "the design does not move along a coordinate axis")
@@ -384,14 +381,14 @@ fn held_node_fault(
 
 /// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
 /// solved.
-fn check_bounds(source: &Source, shape: &Shape, share: Option<&Share>) -> Result<(), Error> {
+fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
     // A rank that follows gives no orders: the first one checks.
-    let follows = share.is_some_and(|share| share.team.member() == Member::Follower);
-    if shape.limits.rounds > 0 || follows {
+    let is_worker = share.is_some_and(|share| share.group.role() == Role::Worker);
+    if shape.limits.rounds > 0 || is_worker {
         return Ok(());
     }
     let mut faults = Vec::new();
-    if let Err(error @ RemeshError::Inverted { .. }) = shape.motion.moved(&shape.displacement(&shape.initial))
+    if let Err(error @ RemeshError::Inverted { .. }) = shape.motion().moved(&shape.displacement(shape.initial()))
     {
         faults.push(
             source
@@ -399,11 +396,11 @@ fn check_bounds(source: &Source, shape: &Shape, share: Option<&Share>) -> Result
                 .help("allow remesh.rounds, or start nearer to the undeformed shape"),
         );
     }
-    for (key, bound) in [("design.lower", &shape.lower), ("design.upper", &shape.upper)] {
+    for (key, bound) in [("design.lower", shape.lower()), ("design.upper", shape.upper())] {
         let at = bound[0] * 1e3;
-        match shape.motion.moved(&shape.displacement(bound)) {
+        match shape.motion().moved(&shape.displacement(bound)) {
             Ok(moved) => {
-                let quality = shape.motion.quality(&moved.mesh);
+                let quality = shape.motion().quality(&moved.mesh);
                 let least = shape.limits.least_quality;
                 if quality.worst < least {
                     let message = format!(

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::partition::Partition;
-use fluxmorph_geometry::ranks::{Share, Team};
+use fluxmorph_geometry::Partition;
+use fluxmorph_geometry::parallel::{Ownership, RankGroup};
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::material;
@@ -14,7 +14,7 @@ use crate::error::Error;
 ///
 /// # Errors
 /// [`Error::Mesh`] for more ranks than nodes.
-pub(super) fn of_mesh(config: &Config, mesh: &Mesh, team: &Team) -> Result<Share, Error> {
+pub(super) fn of_mesh(config: &Config, mesh: &Mesh, group: &RankGroup) -> Result<Ownership, Error> {
     let topology = mesh.topology();
     let harmonic = config.analysis.frequencies().iter().any(|&f| f > 0.0);
     let conducts: Vec<bool> = topology
@@ -28,9 +28,9 @@ pub(super) fn of_mesh(config: &Config, mesh: &Mesh, team: &Team) -> Result<Share
     for node in kept.iter().flat_map(|&e| topology.tet(e)) {
         weights[node.index()] = 4;
     }
-    let partition = Partition::of_mesh(mesh, team.size(), &weights, &kept)?;
-    team.identify(identity(config, mesh, &partition));
-    Ok(Share { team: team.clone(), partition: Arc::new(partition) })
+    let partition = Partition::of_mesh(mesh, group.size(), &weights, &kept)?;
+    group.set_identity(identity(config, mesh, &partition));
+    Ok(Ownership { group: group.clone(), partition: Arc::new(partition) })
 }
 
 /// A number that tells problems apart: configuration, mesh and owners.

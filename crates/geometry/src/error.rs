@@ -70,7 +70,7 @@ pub enum MeshError {
     /// A parameter of a generator is out of range.
     #[error("{parameter} = {value}: {expected}")]
     Parameter {
-        /// The parameter's name, as in the configuration.
+        /// Generator and parameter, with a dot between them.
         parameter: &'static str,
         /// The value given.
         value: String,
@@ -95,7 +95,7 @@ pub enum MeshError {
         /// What the library said.
         cause: String,
     },
-    /// A mesh cannot be shared out over so many ranks.
+    /// A mesh cannot be distributed over so many ranks.
     #[error(
         "{ranks} ranks cannot share a mesh of {nodes} nodes, since every rank owns at least one: take 1 to {nodes} ranks"
     )]

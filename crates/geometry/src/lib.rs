@@ -16,15 +16,13 @@ pub mod incidence;
 pub mod io;
 pub mod locate;
 pub mod mesh;
-mod metis;
-pub mod partition;
+pub mod parallel;
 pub mod quality;
-pub mod ranks;
 pub mod tet4;
 pub mod topology;
 
 pub use error::MeshError;
 pub use ids::{ElementId, NodeId, RegionId};
 pub use mesh::Mesh;
-pub use partition::Partition;
+pub use parallel::Partition;
 pub use topology::{Facet, Topology};

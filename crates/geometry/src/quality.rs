@@ -164,7 +164,7 @@ impl QualityReport {
     }
 
     /// The report with the place of its worst element on a mesh.
-    pub fn placed(self, mesh: &Mesh) -> Self {
+    pub fn located_on(self, mesh: &Mesh) -> Self {
         Self { worst_centroid: tet4::centroid(mesh.vertices(self.worst_element)), ..self }
     }
 

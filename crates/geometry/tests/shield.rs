@@ -201,7 +201,7 @@ fn bad_parameters_are_refused_by_name() {
         spoil(&mut parameters);
         match shield(&parameters) {
             Err(MeshError::Parameter { parameter, .. }) => {
-                assert_eq!(parameter, format!("mesh.shield.{name}"), "{parameters:?}");
+                assert_eq!(parameter, format!("shield.{name}"), "{parameters:?}");
             }
             Err(other) => panic!("{name}: {other}"),
             Ok(_) => panic!("{name} was accepted"),
@@ -214,5 +214,5 @@ fn an_observation_area_that_would_move_names_both_boxes() {
     let mut parameters = ShieldParameters::default();
     parameters.observation.z = [-0.05, -0.03];
     let text = shield(&parameters).expect_err("it overlaps").to_string();
-    assert!(text.contains("mesh.shield.observation") && text.contains("mesh.shield.remesh_z"), "{text}");
+    assert!(text.contains("shield.observation") && text.contains("remesh_z"), "{text}");
 }

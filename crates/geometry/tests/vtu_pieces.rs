@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::generate::{BlockParameters, block};
 use fluxmorph_geometry::io::{
-    ArrayData, Field, VtuArray, VtuContents, VtuPiece, joined, pvtu_pieces, pvtu_text, vtu_bytes,
+    ArrayData, Field, VtuArray, VtuContents, VtuPiece, join_pieces, pvtu_pieces, pvtu_text, vtu_bytes,
     vtu_contents,
 };
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Partition};
@@ -111,9 +111,9 @@ fn joined_pieces_are_the_whole_bit_for_bit() {
         "borders are shared"
     );
     // The numbers compare as numbers: none of them is NaN, and zeros have one sign here.
-    assert_eq!(joined(pieces.clone()).expect("a whole"), whole);
+    assert_eq!(join_pieces(pieces.clone()).expect("a whole"), whole);
     pieces.reverse();
-    assert_eq!(joined(pieces).expect("a whole"), whole);
+    assert_eq!(join_pieces(pieces).expect("a whole"), whole);
 }
 
 #[test]
@@ -182,8 +182,8 @@ fn what_makes_no_whole_is_refused_and_the_piece_is_named() {
     for (expected, fault) in faults {
         let mut pieces = sound.clone();
         fault(&mut pieces);
-        let error = joined(pieces).expect_err(expected).to_string();
+        let error = join_pieces(pieces).expect_err(expected).to_string();
         assert!(error.contains(expected), "{error}, expected: {expected}");
     }
-    assert!(joined(Vec::new()).is_err());
+    assert!(join_pieces(Vec::new()).is_err());
 }

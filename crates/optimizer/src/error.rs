@@ -4,7 +4,7 @@ use fluxmorph_geometry::MeshError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
-use crate::design::Apart;
+use crate::design::SurfaceMismatch;
 use crate::geometric::GeometricError;
 
 /// Errors of this crate.
@@ -43,7 +43,7 @@ pub enum Error {
     Geometric(#[from] GeometricError),
     /// A shape cannot be taken over by another mesh.
     #[error(transparent)]
-    Apart(#[from] Apart),
+    SurfaceMismatch(#[from] SurfaceMismatch),
     /// The optimisation method refuses or fails.
     #[error("the optimisation failed: {cause}")]
     Optimisation {

@@ -48,18 +48,18 @@ struct Evaluation {
 
 impl Evaluation {
     fn of(problem: &Problem) -> Self {
-        let quadratic = problem.states.iter().any(|state| state.space().order() == Order::Quadratic);
-        let moving = if problem.shape.is_some() { MOVING } else { 0 };
+        let quadratic = problem.states().iter().any(|state| state.space().order() == Order::Quadratic);
+        let moving = if problem.shape().is_some() { MOVING } else { 0 };
         let element = moving + if quadratic { QUADRATIC_ELEMENT } else { LINEAR_ELEMENT };
-        let elastic = problem.shape.as_ref().map_or(0, |shape| shape.motion.map().solver_bytes());
+        let elastic = problem.shape().map_or(0, |shape| shape.motion().map().solver_bytes());
         let mut evaluation = Self {
-            arrays: problem.original.topology().tets().len() * element + elastic,
+            arrays: problem.original().topology().tets().len() * element + elastic,
             matrices: 0,
             preconditioners: 0,
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
-        for solver in problem.states.iter().filter_map(FieldModel::linear_solver) {
+        for solver in problem.states().iter().filter_map(FieldModel::linear_solver) {
             let sizes =
                 (solver.matrix_bytes(), solver.preconditioner_bytes(solver.method()).unwrap_or_default());
             match solver.reuse() {
@@ -83,11 +83,11 @@ impl Evaluation {
     /// The same on a mesh with so many times the elements.
     fn grown(&self, problem: &Problem, growth: f64) -> usize {
         let times = |bytes: usize, factor: f64| (bytes as f64 * factor) as usize;
-        let solvers = || problem.states.iter().filter_map(FieldModel::linear_solver);
+        let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
         let unknowns = times(solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0), growth);
         let preconditioners = if solvers().any(|solver| is_factor(solver.method())) {
             let factor = times(self.preconditioners, growth.powf(FACTOR_GROWTH));
-            let is_static = problem.states.iter().all(|state| state.angular_frequency() == 0.0);
+            let is_static = problem.states().iter().all(|state| state.angular_frequency() == 0.0);
             if is_static || unknowns < TWO_LEVELS_FROM {
                 factor
             } else {
@@ -112,6 +112,6 @@ pub fn of_evaluation(problem: &Problem) -> usize {
 /// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the
 /// problem's own mesh and patterns are still held, about.
 pub fn of_other_mesh(problem: &Problem, growth: f64) -> usize {
-    let held = problem.original.topology().tets().len() * HELD_BY_SETUP;
+    let held = problem.original().topology().tets().len() * HELD_BY_SETUP;
     PROCESS + held + Evaluation::of(problem).grown(problem, growth)
 }

@@ -13,8 +13,7 @@ use std::collections::BTreeMap;
 
 use crate::constraint::Quantity;
 use crate::error::Error;
-use crate::problem::SolverCache;
-use crate::problem::{Analysis, Problem, Derivatives};
+use crate::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 /// Remainders over F(p) that count as rounding: above the solver's tolerance, and a thousand times below what a first
 /// step of 2 % of the span leaves of any function that bends.
@@ -114,10 +113,13 @@ pub struct Named {
     pub certificate: Certificate,
 }
 
-/// Measures the certificate of a problem's objective at the design `p`; `progress` is told after each direction.
+/// Measures the certificates of a problem's objective and constraints at the design `p`; `progress` gets the name of the
+/// constraint, if it is one, after each direction. `interrupted` is asked before each evaluation.
+///
+/// The directions are the same for all, and each design is evaluated once.
 ///
 /// # Errors
-/// When an evaluation fails.
+/// [`Error::Interrupted`], or when an evaluation fails.
 ///
 /// # Panics
 /// If the problem has no shape or no objective.
@@ -125,52 +127,12 @@ pub fn certify(
     problem: &Problem,
     p: &[f64],
     settings: &Settings,
-    progress: impl FnMut(usize, &Direction),
-) -> Result<Certificate, Error> {
-    let mut memory = SolverCache::default();
-    let base = problem.evaluate_with(&mut memory, p, Derivatives::First)?;
-    let value = |p: &[f64]| Ok(numbers(&problem.evaluate_with(&mut memory.lent(), p, Derivatives::None)?)[0]);
-    let objective = base.objective.expect("a certificate needs an objective");
-    let gradient = base.gradient.as_ref().expect("the gradient was asked for");
-    measure(&value, p, objective, gradient, &span(problem), settings, progress)
-}
-
-/// Measures the certificates of a problem's objective and constraints at the design `p`; `progress` is told the name of
-/// the constraint, if it is one, after each direction.
-///
-/// The directions are the same for all, and each design is evaluated once.
-///
-/// # Errors
-/// When an evaluation fails.
-///
-/// # Panics
-/// If the problem has no shape or no objective.
-pub fn certify_all(
-    problem: &Problem,
-    p: &[f64],
-    settings: &Settings,
-    progress: impl FnMut(Option<&str>, usize, &Direction),
-) -> Result<Certificates, Error> {
-    certify_until(problem, p, settings, &|| false, progress)
-}
-
-/// As [`certify_all`], until `interrupted` says so; it is asked before each evaluation.
-///
-/// # Errors
-/// [`Error::Interrupted`], or when an evaluation fails.
-///
-/// # Panics
-/// As [`certify_all`].
-pub fn certify_until(
-    problem: &Problem,
-    p: &[f64],
-    settings: &Settings,
     interrupted: &dyn Fn() -> bool,
     mut progress: impl FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
     Error::unless(interrupted)?;
-    let mut memory = SolverCache::default();
-    let base = problem.evaluate_with(&mut memory, p, Derivatives::First)?;
+    let mut cache = SolverCache::default();
+    let base = problem.evaluate(p, Derivatives::First, &mut cache, &mut NoProgress)?;
     let span = span(problem);
     let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
     let value = |p: &[f64], index: usize| -> Result<f64, Error> {
@@ -179,7 +141,8 @@ pub fn certify_until(
             return Ok(values[index]);
         }
         Error::unless(interrupted)?;
-        let values = numbers(&problem.evaluate_with(&mut memory.lent(), p, Derivatives::None)?);
+        let cache = &mut cache.without_initial_guess();
+        let values = numbers(&problem.evaluate(p, Derivatives::None, cache, &mut NoProgress)?);
         let value = values[index];
         known.borrow_mut().insert(key, values);
         Ok(value)
@@ -187,12 +150,12 @@ pub fn certify_until(
     let objective = base.objective.expect("a certificate needs an objective");
     let gradient = base.gradient.as_ref().expect("the gradient was asked for");
     let function = |p: &[f64]| value(p, 0);
-    let tell = |index: usize, direction: &Direction| progress(None, index, direction);
-    let objective = measure(&function, p, objective, gradient, &span, settings, tell)?;
-    let mut constraints = Vec::with_capacity(problem.constraints.len());
-    for (k, (constraint, measured)) in problem.constraints.iter().zip(&base.constraints).enumerate() {
+    let report = |index: usize, direction: &Direction| progress(None, index, direction);
+    let objective = measure(&function, p, objective, gradient, &span, settings, report)?;
+    let mut constraints = Vec::with_capacity(problem.constraints().len());
+    for (k, (constraint, measured)) in problem.constraints().iter().zip(&base.constraints).enumerate() {
         // What no field has a say in is computed without one.
-        let function = |p: &[f64]| match (&constraint.quantity, &problem.shape) {
+        let function = |p: &[f64]| match (&constraint.quantity, problem.shape()) {
             (Quantity::Field(_), _) | (_, None) => value(p, k + 1),
             (_, Some(shape)) => {
                 let mesh = problem.moved(p)?.mesh;
@@ -200,13 +163,13 @@ pub fn certify_until(
             }
         };
         let gradient = measured.gradient.as_ref().expect("the gradient was asked for");
-        let tell = |index: usize, direction: &Direction| progress(Some(&constraint.name), index, direction);
+        let report = |index: usize, direction: &Direction| progress(Some(&constraint.name), index, direction);
         let [first_step, difference_step] = match constraint.quantity {
             Quantity::Thickness { .. } => FINE,
             _ => [settings.first_step, settings.difference_step],
         };
         let settings = Settings { first_step, difference_step, ..*settings };
-        let certificate = measure(&function, p, measured.value, gradient, &span, &settings, tell)?;
+        let certificate = measure(&function, p, measured.value, gradient, &span, &settings, report)?;
         constraints.push(Named { name: constraint.name.clone(), certificate });
     }
     Ok(Certificates { objective, constraints })
@@ -227,8 +190,8 @@ fn numbers(analysis: &Analysis) -> Vec<f64> {
 
 /// Distance of the bounds of every variable.
 fn span(problem: &Problem) -> Vec<f64> {
-    let shape = problem.shape.as_ref().expect("a certificate needs a shape");
-    shape.upper.iter().zip(&shape.lower).map(|(high, low)| high - low).collect()
+    let shape = problem.shape().expect("a certificate needs a shape");
+    shape.upper().iter().zip(shape.lower()).map(|(high, low)| high - low).collect()
 }
 
 /// Measures the certificate of any function with the value `objective` and what is said to be its gradient at `p`; `span` scales the directions.

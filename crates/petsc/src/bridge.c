@@ -28,7 +28,7 @@ static void say(const char *text) {
     }
 }
 
-/* PETSc tells of an error once in every function on the way back: the first text is the cause. */
+/* PETSc reports an error once in every function on the way back: the first text is the cause. */
 static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                PetscErrorType type, const char *text, void *context) {
     (void)comm, (void)line, (void)file, (void)type, (void)context;
@@ -195,7 +195,7 @@ void fm_solver_destroy(fm_solver *solver) {
 }
 
 /* Whether all ranks got through a part of the work that was each one's own: none may wait for one that did not. */
-static int agreed(PetscErrorCode code) {
+static int agree(PetscErrorCode code) {
     int own = code != 0, any = 0;
     MPI_Allreduce(&own, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
     if (any) {
@@ -213,7 +213,7 @@ static int agreed(PetscErrorCode code) {
         }                                                                                                                      \
     } while (0)
 
-static int made(fm_solver *solver, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
+static int create(fm_solver *solver, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
                 double tolerance, int max_iterations, int symmetric) {
     PetscInt own = solver->own;
     if (count > (int64_t)PETSC_MAX_INT) {
@@ -267,14 +267,14 @@ int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const in
         return 1;
     }
     solver->own = (PetscInt)own;
-    return made(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric);
+    return create(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric);
 }
 
 /* The name of what KSPSolve ended with. */
 const char *fm_reason(int reason) { return KSPConvergedReasons[reason]; }
 
 /* Inserts values into the own rows; no rank waits for another. */
-static PetscErrorCode inserted(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
+static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
     PetscInt longest = 0;
     for (PetscInt row = 0; row < solver->own; row++) {
         PetscInt length = (PetscInt)(starts[row + 1] - starts[row]);
@@ -297,7 +297,7 @@ static PetscErrorCode inserted(fm_solver *solver, const uint32_t *starts, const 
 /* Takes values: entries of own row i are at starts[i] .. starts[i + 1], `columns` are numbers in the distributed matrix. */
 int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
     message[0] = 0;
-    if (agreed(inserted(solver, starts, columns, values))) {
+    if (agree(insert_values(solver, starts, columns, values))) {
         return 1;
     }
     TRY(MatAssemblyBegin(solver->matrix, MAT_FINAL_ASSEMBLY));

@@ -1,19 +1,9 @@
-//! The parallel engine: ranks by MPI, distributed linear solvers by PETSc.
+//! The foreign libraries: METIS for orderings and partitions, MPI and PETSc for several ranks.
 //!
-//! [`Petsc`] is the [`Communicator`](fluxmorph_geometry::ranks::Communicator) that a program under `mpirun` is led by. The two
-//! libraries are called through a bridge in C (`bridge.c`), which knows their headers, and whose functions take plain numbers;
-//! `bridge` is the only place that is not safe Rust. Which options a solver begins with is in [`options`]; a user's own
-//! come after these and win. Without the feature `link` the crate is empty, so that a machine without the libraries can
-//! build everything else.
+//! This is the one crate that calls C, and the only one with `unsafe`. Its functions take plain numbers, check their lengths
+//! and are safe; what a graph, a rank or a matrix means is the callers' business. `metis` needs nothing but a C compiler, and
+//! without its feature has no answers. [`petsc`], behind the feature `link`, needs the two libraries on the machine.
 
+pub mod metis;
 #[cfg(feature = "link")]
-mod bridge;
-#[cfg(feature = "link")]
-mod engine;
-#[cfg(feature = "link")]
-pub mod options;
-#[cfg(feature = "link")]
-mod solver;
-
-#[cfg(feature = "link")]
-pub use engine::Petsc;
+pub mod petsc;

@@ -36,7 +36,7 @@ pub enum BoundaryKind {
 }
 
 impl BoundaryKind {
-    /// Its name in configurations and messages.
+    /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Design => "design",
@@ -71,7 +71,7 @@ impl Boundary {
 
 /// What is known at every node of the mesh.
 #[derive(Debug)]
-pub(crate) struct Constraints {
+pub(crate) struct NodeConditions {
     /// Design nodes in the order of the design displacement.
     pub(crate) design_nodes: Vec<NodeId>,
     /// By node: whether it is a design node.
@@ -83,7 +83,7 @@ pub(crate) struct Constraints {
 /// All three components.
 const ALL: u8 = 0b111;
 
-impl Constraints {
+impl NodeConditions {
     /// Decides every node; `elements` are those of the remesh region.
     pub(crate) fn new(mesh: &Mesh, setup: &RemeshSetup, elements: &[ElementId]) -> Result<Self, RemeshError> {
         let topology = mesh.topology();
@@ -126,9 +126,9 @@ impl Constraints {
         }
         setup.fixed_nodes.iter().for_each(|n| held[n.index()] = ALL);
 
-        let mut constraints = Self { design_nodes: Vec::new(), is_design: vec![false; node_count], held };
-        constraints.add_design_nodes(mesh, setup, &rules.design_nodes, elements)?;
-        Ok(constraints)
+        let mut conditions = Self { design_nodes: Vec::new(), is_design: vec![false; node_count], held };
+        conditions.add_design_nodes(mesh, setup, &rules.design_nodes, elements)?;
+        Ok(conditions)
     }
 
     fn add_design_nodes(

@@ -7,13 +7,13 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup};
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::quality::QualityReport;
-use fluxmorph_geometry::ranks::Share;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::body::Body;
-use crate::boundary::{Boundary, Constraints};
+use crate::boundary::{Boundary, NodeConditions};
 use crate::distributed::DistributedElastic;
 use crate::error::RemeshError;
 use crate::force::nodal_force;
@@ -24,17 +24,17 @@ use crate::subregion::Subregion;
 
 /// Which way the nodes of the elastic body may move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Guidance {
+pub enum KinematicConstraint {
     /// Every way: the paper's elasticity.
     #[default]
     Free,
-    /// Along one coordinate axis (0, 1, 2) only, as if on rails. For designs that move along that axis: a column of thin
+    /// Along one coordinate axis (0, 1, 2) only. For designs that move along that axis: a column of thin
     /// cells then inverts only where it is squeezed to nothing, never through sideways motion, and the system has a third
     /// of the unknowns.
     Axis(usize),
 }
 
-impl Guidance {
+impl KinematicConstraint {
     fn allows(self, component: usize) -> bool {
         match self {
             Self::Free => true,
@@ -51,7 +51,7 @@ pub struct RemeshSetup {
     /// How stiffness follows element size, over the whole region, on the first reference mesh; a rebase may take another.
     pub policy: StiffnessPolicy,
     /// Which way nodes may move; design nodes move as the design says.
-    pub guidance: Guidance,
+    pub kinematic_constraint: KinematicConstraint,
     /// Nodes whose displacement the design prescribes, in the order in which it comes.
     pub design_nodes: Vec<NodeId>,
     /// Surfaces with a kind; nodes of [`crate::BoundaryKind::Design`] surfaces follow the listed design nodes, ascending.
@@ -60,8 +60,8 @@ pub struct RemeshSetup {
     pub fixed_nodes: Vec<NodeId>,
     /// How the elastic system is solved in one process.
     pub solver: SolverChoice,
-    /// The ranks among which it is shared out; `None` for one process.
-    pub share: Option<Share>,
+    /// The ranks over which it is distributed; `None` for one process.
+    pub ownership: Option<Ownership>,
 }
 
 /// What follows from topology and set-up alone, and outlives a new reference mesh.
@@ -102,7 +102,7 @@ impl ElasticMap {
     /// [`RemeshError::NotConverged`] for a fictitious force.
     pub fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let policy = setup.policy;
-        Self::assembled(reference, Arc::new(Plan::new(reference, setup)?), policy)
+        Self::assemble(reference, Arc::new(Plan::new(reference, setup)?), policy)
     }
 
     /// The map of the same set-up on a moved mesh of the same topology, a new reference, with this or another stiffness
@@ -115,10 +115,10 @@ impl ElasticMap {
     /// If the mesh has another topology.
     pub fn rebased(&self, reference: &Mesh, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
         assert!(Arc::ptr_eq(reference.topology(), self.plan.topology()), "a rebase keeps the topology");
-        Self::assembled(reference, Arc::clone(&self.plan), policy)
+        Self::assemble(reference, Arc::clone(&self.plan), policy)
     }
 
-    fn assembled(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
+    fn assemble(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
         let body = &plan.body;
         let weighting = policy.weighting(reference, &body.elements);
         let stiffness_matrix = || {
@@ -135,7 +135,7 @@ impl ElasticMap {
         let solver = ElasticSolver::new(&plan.analysis, stiffness_matrix, (reference, policy))?;
         let mut map = Self { plan, policy, solver, coupling, offset: Vec::new() };
         map.offset = match map.plan.force.clone() {
-            Some(force) => map.solved(force)?,
+            Some(force) => map.solve(force)?,
             None => vec![[0.0; 3]; map.plan.topology().node_count()],
         };
         Ok(map)
@@ -175,7 +175,7 @@ impl ElasticMap {
         }
         let mut right_side = vec![0.0; plan.unknowns.count()];
         self.coupling.mul(&prescribed, &mut right_side);
-        let mut displacement = self.solved(right_side)?;
+        let mut displacement = self.solve(right_side)?;
         for (node, u) in plan.design_nodes.iter().zip(design) {
             displacement[node.index()] = *u;
         }
@@ -189,7 +189,7 @@ impl ElasticMap {
     }
 
     /// Solves for the unknowns and spreads them over the mesh nodes.
-    fn solved(&self, mut unknowns: Vec<f64>) -> Result<Vec<Point>, RemeshError> {
+    fn solve(&self, mut unknowns: Vec<f64>) -> Result<Vec<Point>, RemeshError> {
         self.solver.solve_in_place(&mut unknowns, "displacement")?;
         let topology = self.plan.topology();
         Ok(topology.nodes().map(|node| self.plan.unknowns.gather(&unknowns, node)).collect())
@@ -225,8 +225,8 @@ impl ElasticMap {
     }
 
     /// Which way the nodes may move.
-    pub fn guidance(&self) -> Guidance {
-        self.plan.setup.guidance
+    pub fn kinematic_constraint(&self) -> KinematicConstraint {
+        self.plan.setup.kinematic_constraint
     }
 
     /// The design nodes, in the order of their displacements.
@@ -244,7 +244,7 @@ impl ElasticMap {
         self.plan.unknowns.count()
     }
 
-    /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is shared out.
+    /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is distributed.
     pub fn solver_bytes(&self) -> usize {
         let of = |(pattern, _): &(BlockPattern<3>, _)| self.plan.analysis.solver_bytes(pattern.structure());
         self.plan.stiffness.as_ref().map_or(0, of)
@@ -260,8 +260,10 @@ impl ElasticMap {
     pub fn quality(&self, mesh: &Mesh) -> QualityReport {
         let own = || QualityReport::of_elements(mesh, self.moving()).expect("an elastic body has elements");
         match &self.plan.analysis {
-            // Where a rank fails, the next order that needs it says so; this one does not.
-            SolverAnalysis::Distributed(shared) => shared.quality(mesh).ok().flatten().unwrap_or_else(own),
+            // Where a rank fails, the next command that needs it says so; this one does not.
+            SolverAnalysis::Distributed(distributed) => {
+                distributed.quality(mesh).ok().flatten().unwrap_or_else(own)
+            }
             _ => own(),
         }
     }
@@ -288,35 +290,35 @@ impl Plan {
     fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let body = Arc::new(Body::new(reference.topology(), &setup.subregions)?);
         let Body { topology, elements, .. } = &*body;
-        let constraints = Constraints::new(reference, &setup, elements)?;
+        let conditions = NodeConditions::new(reference, &setup, elements)?;
         let node_count = topology.node_count();
         let unknowns = Arc::new(DofMap::<3>::new(node_count, |node, c| {
-            setup.guidance.allows(c) && constraints.is_unknown(node, c)
+            setup.kinematic_constraint.allows(c) && conditions.is_unknown(node, c)
         }));
-        let prescribed = DofMap::<3>::new(node_count, |node, _| constraints.is_design[node.index()]);
+        let prescribed = DofMap::<3>::new(node_count, |node, _| conditions.is_design[node.index()]);
         restraint::check(reference, elements, &unknowns)?;
 
         // Positions in the body of those at a design node: no other couples to the design.
-        let at_design = |e: ElementId| topology.tet(e).iter().any(|n| constraints.is_design[n.index()]);
+        let at_design = |e: ElementId| topology.tet(e).iter().any(|n| conditions.is_design[n.index()]);
         let coupled: Vec<u32> =
             (0..).zip(elements).filter(|&(_, &e)| at_design(e)).map(|(position, _)| position).collect();
         let at_coupled = coupled.iter().map(|&position| topology.tet(elements[position as usize]));
-        let coupling = bound(&unknowns, &prescribed, at_coupled.collect());
-        let moving = moving_elements(&body, &unknowns, &constraints.design_nodes);
-        let (stiffness, analysis) = match &setup.share {
-            Some(share) => {
-                let shared = DistributedElastic::new(share, (&body, &unknowns), &moving);
-                (None, SolverAnalysis::Distributed(Arc::new(shared)))
+        let coupling = bind_pattern(&unknowns, &prescribed, at_coupled.collect());
+        let moving = moving_elements(&body, &unknowns, &conditions.design_nodes);
+        let (stiffness, analysis) = match &setup.ownership {
+            Some(ownership) => {
+                let distributed = DistributedElastic::new(ownership, (&body, &unknowns), &moving);
+                (None, SolverAnalysis::Distributed(Arc::new(distributed)))
             }
             None => {
                 let tets = elements.iter().map(|&e| topology.tet(e)).collect();
-                let stiffness = bound(&unknowns, &unknowns, tets);
+                let stiffness = bind_pattern(&unknowns, &unknowns, tets);
                 let analysis = SolverAnalysis::new(setup.solver, &unknowns, stiffness.0.structure())?;
                 (Some(stiffness), analysis)
             }
         };
         let force = nodal_force(topology, &setup.subregions, &unknowns);
-        let design_nodes = constraints.design_nodes;
+        let design_nodes = conditions.design_nodes;
         Ok(Self {
             setup,
             body,
@@ -334,7 +336,7 @@ impl Plan {
 }
 
 /// The pattern of the rows against the columns over some elements, and these bound to it.
-pub(crate) fn bound(
+pub(crate) fn bind_pattern(
     rows: &DofMap<3>,
     columns: &DofMap<3>,
     connectivity: Vec<[NodeId; 4]>,

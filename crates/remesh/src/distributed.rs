@@ -1,6 +1,6 @@
-//! The elastic system shared out among ranks: rows, factors and quality of each rank's own part.
+//! The elastic system distributed over ranks: rows, factors and quality of each rank's own part.
 //!
-//! Several references may be in use at once, as when a remedy is tried; each has a *slot* with its matrix on every rank.
+//! Several references may be in use at once, as when a fallback is tried; each has a *slot* with its matrix on every rank.
 //! Prescribed displacements, couplings and the mesh check stay with rank 0.
 
 use std::collections::BTreeMap;
@@ -8,53 +8,53 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, CsrMatrix, DofMap, c64};
-use fluxmorph_geometry::quality::QualityReport;
-use fluxmorph_geometry::ranks::{
-    Communicator, DistributedMatrix, Krylov, Member, Order, Part, Preconditioning, RowLayout, Rows, Share,
-    Shared, SolverOptions, SubSolver, solution_of,
+use fluxmorph_geometry::parallel::{
+    Command, CommandChannel, CommandHandler, Communicator, DistributedMatrix, Krylov, Ownership,
+    Preconditioning, Role, RowLayout, Rows, SolverOptions, SubSolver, solution_of,
 };
+use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::body::Body;
-use crate::deform::bound;
+use crate::deform::bind_pattern;
 use crate::error::RemeshError;
 use crate::policy::StiffnessPolicy;
 use crate::solver::{MAX_ITERATIONS, TOLERANCE};
 
-/// The order to assemble and factor: slot, policy, places of the nodes.
+/// The command to assemble and factor: slot, policy, places of the nodes.
 const FACTOR: u32 = 1;
-/// The order to solve: slot, right side.
+/// The command to solve: slot, right side.
 const SOLVE: u32 = 2;
-/// The order to forget a slot.
+/// The command to forget a slot.
 const RELEASE: u32 = 3;
-/// The order to judge the elements that may move: places of the nodes.
+/// The command to judge the elements that may move: places of the nodes.
 const QUALITY: u32 = 4;
 
 /// Unknowns up to which a distributed factor is taken.
 const LARGEST_DIRECT: usize = 400_000;
 
-/// The shared-out elastic system, as rank 0 holds it.
+/// The distributed elastic system, as rank 0 holds it.
 #[derive(Debug)]
 pub(crate) struct DistributedElastic {
-    shared: Shared,
+    channel: CommandChannel,
     next: AtomicU64,
     unknowns: usize,
 }
 
 impl DistributedElastic {
-    /// Shares a body out; every rank does.
+    /// Distributes a body; every rank does.
     pub(crate) fn new(
-        share: &Share,
+        ownership: &Ownership,
         (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
         moving: &Arc<[ElementId]>,
     ) -> Self {
-        let part = ElasticPart::new(share, (body, unknowns), moving);
-        let shared = share.team.share(Box::new(part));
-        Self { shared, next: AtomicU64::new(0), unknowns: unknowns.count() }
+        let handler = ElasticHandler::new(ownership, (body, unknowns), moving);
+        let channel = ownership.group.register(Box::new(handler));
+        Self { channel, next: AtomicU64::new(0), unknowns: unknowns.count() }
     }
 
-    /// Has all ranks assemble and factor on a reference; the slot. Ranks that follow have none of their own.
+    /// Has all ranks assemble and factor on a reference; the slot. Workers have none of their own.
     ///
     /// # Errors
     /// [`RemeshError::Rank`].
@@ -63,14 +63,14 @@ impl DistributedElastic {
         reference: &Mesh,
         policy: StiffnessPolicy,
     ) -> Result<Option<u64>, RemeshError> {
-        if self.unknowns == 0 || self.shared.team().member() == Member::Follower {
+        if self.unknowns == 0 || self.channel.group().role() == Role::Worker {
             return Ok(None);
         }
         let slot = self.next.fetch_add(1, Ordering::SeqCst);
         let policy = StiffnessPolicy::ALL.iter().position(|&p| p == policy).expect("all are listed");
         let mut numbers = vec![slot as f64, policy as f64];
         numbers.extend_from_slice(reference.points().as_flattened());
-        if let Err(error) = self.shared.order(FACTOR, numbers) {
+        if let Err(error) = self.channel.execute(FACTOR, numbers) {
             // Where it did not fail, it is kept.
             self.release(slot);
             return Err(error.into());
@@ -88,7 +88,7 @@ impl DistributedElastic {
         }
         let mut numbers = vec![slot as f64];
         numbers.extend_from_slice(right_side);
-        let answer = self.shared.order(SOLVE, numbers)?;
+        let answer = self.channel.execute(SOLVE, numbers)?;
         let (solution, solved) = solution_of(&answer);
         // The recurrence of the iteration and the true residual part in the last digits.
         if solved.residual.is_nan() || solved.residual > 10.0 * TOLERANCE {
@@ -105,27 +105,27 @@ impl DistributedElastic {
     /// Forgets the matrix of a slot.
     pub(crate) fn release(&self, slot: u64) {
         if !std::thread::panicking() {
-            // A rank that failed is told of by the next order that has an answer.
-            let _ = self.shared.order(RELEASE, vec![slot as f64]);
+            // A rank that failed is named by the next command that has an answer.
+            let _ = self.channel.execute(RELEASE, vec![slot as f64]);
         }
     }
 
-    /// Quality of the elements that may move, every rank of its own; `None` at a rank that only follows.
+    /// Quality of the elements that may move, every rank of its own; `None` at a worker.
     ///
     /// # Errors
     /// [`RemeshError::Rank`].
     pub(crate) fn quality(&self, mesh: &Mesh) -> Result<Option<QualityReport>, RemeshError> {
-        if self.shared.team().member() == Member::Follower {
+        if self.channel.group().role() == Role::Worker {
             return Ok(None);
         }
-        let of_ranks = self.shared.order(QUALITY, mesh.points().as_flattened().to_vec())?;
+        let of_ranks = self.channel.execute(QUALITY, mesh.points().as_flattened().to_vec())?;
         let reports = of_ranks.chunks_exact(QualityReport::NUMBERS).map(QualityReport::of_numbers);
-        Ok(reports.reduce(QualityReport::with).map(|report| report.placed(mesh)))
+        Ok(reports.reduce(QualityReport::with).map(|report| report.located_on(mesh)))
     }
 }
 
 /// What a rank holds of the elastic system.
-struct ElasticPart {
+struct ElasticHandler {
     body: Arc<Body>,
     layout: Arc<RowLayout>,
     pattern: BlockPattern<3>,
@@ -137,20 +137,25 @@ struct ElasticPart {
     slots: BTreeMap<u64, DistributedMatrix>,
 }
 
-impl ElasticPart {
-    fn new(share: &Share, (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>), moving: &[ElementId]) -> Self {
+impl ElasticHandler {
+    fn new(
+        ownership: &Ownership,
+        (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
+        moving: &[ElementId],
+    ) -> Self {
         let topology = &body.topology;
-        let owner = |node: NodeId| share.partition.owner_of(node);
-        let layout = Arc::new(RowLayout::new(unknowns, share.team.size(), share.team.rank(), owner));
+        let owner = |node: NodeId| ownership.partition.owner_of(node);
+        let layout =
+            Arc::new(RowLayout::new(unknowns, ownership.group.size(), ownership.group.rank(), owner));
         let rows = DofMap::new(topology.node_count(), |node, c| {
-            share.owns(node) && unknowns.equation(node, c).is_some()
+            ownership.owns(node) && unknowns.equation(node, c).is_some()
         });
-        let touches = |e: ElementId| topology.tet(e).iter().any(|&n| share.owns(n));
+        let touches = |e: ElementId| topology.tet(e).iter().any(|&n| ownership.owns(n));
         let held: Vec<u32> =
             (0..).zip(&body.elements).filter(|&(_, &e)| touches(e)).map(|(position, _)| position).collect();
         let connectivity = held.iter().map(|&position| topology.tet(body.elements[position as usize]));
-        let (pattern, group) = bound(&rows, unknowns, connectivity.collect());
-        let moving = share.own_among(moving);
+        let (pattern, group) = bind_pattern(&rows, unknowns, connectivity.collect());
+        let moving = ownership.owned_among(moving);
         let (body, slots) = (Arc::clone(body), BTreeMap::new());
         Self { body, layout, pattern, group, held, moving, slots }
     }
@@ -194,9 +199,9 @@ fn options(unknowns: usize) -> SolverOptions {
     }
 }
 
-impl Part for ElasticPart {
-    fn work(&mut self, order: &Order, ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
-        match (order.kind, order.numbers.as_slice()) {
+impl CommandHandler for ElasticHandler {
+    fn handle(&mut self, command: &Command, ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
+        match (command.kind, command.numbers.as_slice()) {
             (FACTOR, [slot, policy, points @ ..]) => {
                 let policy = StiffnessPolicy::ALL[*policy as usize];
                 let reference = self.mesh(points)?;
@@ -218,7 +223,7 @@ impl Part for ElasticPart {
                 let numbers = own.map_or(Vec::new(), |report| report.numbers().to_vec());
                 Ok(ranks.gather(&numbers).concat())
             }
-            (other, _) => Err(format!("an elastic body knows no order {other}")),
+            (other, _) => Err(format!("an elastic body has no command {other}")),
         }
     }
 }

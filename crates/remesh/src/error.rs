@@ -1,6 +1,6 @@
 //! What can be wrong with a remesh region or with a motion of it.
 
-use fluxmorph_geometry::ranks::RankError;
+use fluxmorph_geometry::parallel::RankError;
 use fluxmorph_geometry::{ElementId, MeshError, NodeId};
 
 /// Errors of this crate; each names the culprit.

@@ -121,20 +121,20 @@ fn largest_positive_root([a, b, c]: [f64; 3], bound: f64) -> f64 {
         let (x, y) = (far / 3.0, b / far);
         let (maximum, minimum) = (x.min(y), x.max(y));
         if minimum > 0.0 && q(minimum) <= 0.0 {
-            return bisected(q, minimum, bound);
+            return bisect(q, minimum, bound);
         }
         // Right of the minimum there is no root; left of the maximum q rises from q(0) = c.
         if minimum > 0.0 {
-            return if c < 0.0 && maximum > 0.0 { bisected(q, 0.0, maximum) } else { 0.0 };
+            return if c < 0.0 && maximum > 0.0 { bisect(q, 0.0, maximum) } else { 0.0 };
         }
     }
-    if c < 0.0 { bisected(q, 0.0, bound) } else { 0.0 }
+    if c < 0.0 { bisect(q, 0.0, bound) } else { 0.0 }
 }
 
 /// The root of `q` in `low ..= high`, where `q(low) ≤ 0 < q(high)` and `q` rises: bisection to neighbouring numbers.
 ///
 /// Returns the upper end: rounding errs towards the smaller step.
-fn bisected(q: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+fn bisect(q: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     loop {
         let middle = 0.5 * (low + high);
         if middle <= low || middle >= high {

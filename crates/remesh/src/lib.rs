@@ -5,8 +5,8 @@
 //! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Who moves freely, slides or stays is decided
 //! in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
 //! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,
-//! each frozen on its own reference mesh, [`travel`] takes a given motion in as many of them as needed, and [`rescue`] is
-//! what is tried when one cannot move on; [`smoothing`] is its last remedy.
+//! each frozen on its own reference mesh, [`load_stepping`] takes a given motion in as many of them as needed, and
+//! [`fallback`] is what is tried when a step is refused; [`smoothing`] is one of its levels.
 
 mod body;
 pub mod boundary;
@@ -14,27 +14,27 @@ pub mod deform;
 mod distributed;
 pub mod elasticity;
 pub mod error;
+pub mod fallback;
 pub mod force;
 pub mod guard;
+pub mod load_stepping;
 pub mod motion;
 pub mod policy;
-pub mod rescue;
 mod restraint;
 mod sensitivity;
 pub mod smoothing;
 mod solver;
 pub mod subregion;
-pub mod travel;
 
 pub use boundary::{Boundary, BoundaryKind};
-pub use deform::{ElasticMap, Guidance, RemeshSetup};
+pub use deform::{ElasticMap, KinematicConstraint, RemeshSetup};
 pub use elasticity::Isotropic;
 pub use error::RemeshError;
+pub use fallback::{Fallback, FallbackLevel, FallbackReport};
 pub use guard::{StepToInversion, check_step, step_to_inversion};
+pub use load_stepping::{OnStepEvent, StepEvent, StepLimits, SteppingOutcome};
 pub use motion::{Motion, Moved};
 pub use policy::StiffnessPolicy;
-pub use rescue::{Rescue, Rescued, Rung};
 pub use smoothing::{Smoothed, SmoothingSettings, least_shape, smooth, smooth_points};
 pub use solver::SolverChoice;
 pub use subregion::Subregion;
-pub use travel::{Event, Limits, Tell, Travelled};

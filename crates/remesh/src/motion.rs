@@ -1,29 +1,29 @@
-//! The motion of a mesh over rounds: which mesh is the reference, where the design stands there, and the elastic map
+//! The motion of a mesh over rounds: which mesh is the reference, at which design, and the elastic map
 //! that is frozen on it.
 //!
 //! Within a round every mesh is `x = X_r + Δx(Δx_b − Δx_b,r)`: `X_r` the reference of the round, `Δx_b,r` the design
-//! displacement at which it stands (the *anchor*), `Δx` the affine map of Eq. 3 frozen on `X_r`. That is what makes an
+//! displacement of that reference (the *reference design*), `Δx` the affine map of Eq. 3 frozen on `X_r`. That is what makes an
 //! objective a function of the design and its gradient exact. [`Motion::rebased`] starts the next round on a mesh that
 //! was reached: stiffness and factor are new, pattern and symbolic factor stay. The fictitious force acts in the first
 //! step only, else it would be taken again with every round. When a round ends is not decided here, but by
-//! [`crate::travel`] on a given path, and by an optimiser on its own.
+//! [`crate::load_stepping`] on a given path, and by an optimiser on its own.
 
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use std::sync::Arc;
 
 use fluxmorph_geometry::quality::{QualityReport, quality};
 use fluxmorph_geometry::tet4::{Point, add, sub};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use crate::deform::{ElasticMap, RemeshSetup};
 use crate::error::RemeshError;
 use crate::guard::{StepToInversion, check_step, step_to_inversion};
+use crate::load_stepping::StepLimits;
 use crate::policy::StiffnessPolicy;
 use crate::smoothing::least_shape;
-use crate::travel::Limits;
 
 /// Halvings in the search for the share of a step that keeps a quality: to a thousandth of the step.
-const ADMITTED_BITS: usize = 10;
+const SHARE_BITS: usize = 10;
 
 /// Whether the fictitious force is still to be taken: it acts once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ pub struct Motion {
     original: Mesh,
     reference: Mesh,
     displacement: Vec<Point>,
-    anchor: Vec<Point>,
+    reference_design: Vec<Point>,
     map: Arc<ElasticMap>,
     moving: Arc<[ElementId]>,
     force: Force,
@@ -64,19 +64,19 @@ impl Motion {
     /// As [`ElasticMap::new`].
     pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let map = Arc::new(ElasticMap::new(&original, setup)?);
-        Ok(Self::begun(original, map))
+        Ok(Self::start(original, map))
     }
 
     /// The first round with its map.
-    fn begun(original: Mesh, map: Arc<ElasticMap>) -> Self {
+    fn start(original: Mesh, map: Arc<ElasticMap>) -> Self {
         let moving = Arc::clone(map.moving());
-        let anchor = vec![[0.0; 3]; map.design_nodes().len()];
+        let reference_design = vec![[0.0; 3]; map.design_nodes().len()];
         let displacement = vec![[0.0; 3]; original.points().len()];
         Self {
             reference: original.clone(),
             original,
             displacement,
-            anchor,
+            reference_design,
             map,
             moving,
             force: Force::Due,
@@ -85,7 +85,7 @@ impl Motion {
     }
 
     /// The next round, on a mesh that this one reached: `displacement` is that of every node from the original mesh,
-    /// `anchor` that of the design nodes [m].
+    /// `design` that of the design nodes [m].
     ///
     /// # Errors
     /// As [`ElasticMap::rebased`].
@@ -96,15 +96,16 @@ impl Motion {
         &self,
         reference: Mesh,
         displacement: Vec<Point>,
-        anchor: Vec<Point>,
+        design: Vec<Point>,
         policy: StiffnessPolicy,
     ) -> Result<Self, RemeshError> {
         assert_eq!(displacement.len(), reference.points().len(), "one displacement per node");
-        assert_eq!(anchor.len(), self.anchor.len(), "one displacement per design node");
+        assert_eq!(design.len(), self.reference_design.len(), "one displacement per design node");
         let map = Arc::new(self.map.rebased(&reference, policy)?);
         let (original, moving) = (self.original.clone(), Arc::clone(&self.moving));
         let (force, round) = (Force::Taken, self.round + 1);
-        Ok(Self { original, reference, displacement, anchor, map, moving, force, round })
+        let reference_design = design;
+        Ok(Self { original, reference, displacement, reference_design, map, moving, force, round })
     }
 
     /// This motion, counted as the round after another.
@@ -118,25 +119,25 @@ impl Motion {
     /// As [`Motion::new`].
     pub fn restarted(&self) -> Result<Self, RemeshError> {
         let map = Arc::new(self.map.restarted(&self.original)?);
-        Ok(Self::begun(self.original.clone(), map))
+        Ok(Self::start(self.original.clone(), map))
     }
 
-    /// The same place with another stiffness: a round of its own.
+    /// The same design with another stiffness: a round of its own.
     ///
     /// # Errors
     /// As [`ElasticMap::rebased`].
     pub fn with_policy(&self, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
-        self.replaced(self.reference.clone(), self.displacement.clone(), policy)
+        self.with_reference(self.reference.clone(), self.displacement.clone(), policy)
     }
 
-    /// Another mesh, or another stiffness, at the same place.
-    pub(crate) fn replaced(
+    /// Another mesh, or another stiffness, at the same design.
+    pub(crate) fn with_reference(
         &self,
         reference: Mesh,
         displacement: Vec<Point>,
         policy: StiffnessPolicy,
     ) -> Result<Self, RemeshError> {
-        let motion = self.rebased(reference, displacement, self.anchor.clone(), policy)?;
+        let motion = self.rebased(reference, displacement, self.reference_design.clone(), policy)?;
         Ok(Self { force: self.force, ..motion })
     }
 
@@ -149,9 +150,9 @@ impl Motion {
     /// # Panics
     /// If there is not one displacement per design node.
     pub fn step(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
-        assert_eq!(design.len(), self.anchor.len(), "one displacement per design node");
+        assert_eq!(design.len(), self.reference_design.len(), "one displacement per design node");
         let change: Vec<Point> =
-            design.iter().zip(&self.anchor).map(|(u, anchor)| sub(*u, *anchor)).collect();
+            design.iter().zip(&self.reference_design).map(|(u, reference)| sub(*u, *reference)).collect();
         match self.force {
             Force::Due => self.map.displacement(&change),
             Force::Taken => self.map.linear(&change),
@@ -159,7 +160,7 @@ impl Motion {
     }
 
     /// The round's reference as a mesh of the round: what no step at all leads to.
-    pub(crate) fn unmoved(&self) -> Moved {
+    pub(crate) fn at_reference(&self) -> Moved {
         Moved {
             mesh: self.reference.clone(),
             displacement: self.displacement.clone(),
@@ -176,11 +177,11 @@ impl Motion {
     /// If there is not one displacement per design node.
     pub fn moved(&self, design: &[Point]) -> Result<Moved, RemeshError> {
         let step = self.step(design)?;
-        self.taken(&step, self.inversion(&step))
+        self.apply(&step, self.inversion(&step))
     }
 
     /// The mesh after a step from the round's reference, whose first inversion is known.
-    pub(crate) fn taken(&self, step: &[Point], inversion: StepToInversion) -> Result<Moved, RemeshError> {
+    pub(crate) fn apply(&self, step: &[Point], inversion: StepToInversion) -> Result<Moved, RemeshError> {
         let mesh = check_step(&self.reference, step)?;
         let displacement = self.displacement.iter().zip(step).map(|(u, step)| add(*u, *step)).collect();
         Ok(Moved { mesh, displacement, inversion })
@@ -192,7 +193,7 @@ impl Motion {
     }
 
     /// Largest share of a step from the round's reference that keeps the limits; 1 for the whole step.
-    pub fn admitted(&self, step: &[Point], limits: &Limits) -> f64 {
+    pub fn admissible_share(&self, step: &[Point], limits: &StepLimits) -> f64 {
         let most = (limits.inversion_share * self.inversion(step).step).min(1.0);
         let keeps = |share: f64| {
             let vertex = |n: NodeId| {
@@ -206,7 +207,7 @@ impl Motion {
             return most;
         }
         let (mut low, mut high) = (0.0, most);
-        for _ in 0..ADMITTED_BITS {
+        for _ in 0..SHARE_BITS {
             let middle = 0.5 * (low + high);
             if keeps(middle) { low = middle } else { high = middle }
         }
@@ -245,9 +246,9 @@ impl Motion {
         &self.displacement
     }
 
-    /// Displacement of the design nodes at which the reference stands [m], shape `(n_design, 3)`.
-    pub fn anchor(&self) -> &[Point] {
-        &self.anchor
+    /// Displacement of the design nodes of the reference [m], shape `(n_design, 3)`.
+    pub fn reference_design(&self) -> &[Point] {
+        &self.reference_design
     }
 
     /// The elastic map of the round.

@@ -56,7 +56,7 @@ impl StiffnessPolicy {
     /// Every policy.
     pub const ALL: [Self; 4] = [Self::Uniform, Self::InverseSize, Self::InverseVolume, Self::Directional];
 
-    /// Its word in the configuration and in messages.
+    /// Its name in messages and records.
     pub fn name(self) -> &'static str {
         match self {
             Self::Uniform => "uniform",

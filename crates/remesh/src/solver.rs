@@ -54,7 +54,7 @@ pub(crate) enum SolverAnalysis {
     Nothing,
     Direct(Arc<CholeskyAnalysis>),
     ComponentBlocks(Arc<ComponentAnalysis>),
-    /// Rows and factors are shared out among ranks.
+    /// Rows and factors are distributed over ranks.
     Distributed(Arc<DistributedElastic>),
 }
 
@@ -70,15 +70,15 @@ pub(crate) enum ElasticSolver {
 /// The matrix of one reference on all ranks, for as long as it is needed.
 #[derive(Debug)]
 pub(crate) struct DistributedSlot {
-    shared: Arc<DistributedElastic>,
-    /// `None` without unknowns, and at ranks that only follow.
+    system: Arc<DistributedElastic>,
+    /// `None` without unknowns, and at workers.
     slot: Option<u64>,
 }
 
 impl Drop for DistributedSlot {
     fn drop(&mut self) {
         if let Some(slot) = self.slot {
-            self.shared.release(slot);
+            self.system.release(slot);
         }
     }
 }
@@ -135,9 +135,9 @@ impl ElasticSolver {
                 let preconditioner = ComponentPreconditioner::new(analysis, &matrix)?;
                 Self::ComponentBlocks { matrix, preconditioner }
             }
-            SolverAnalysis::Distributed(shared) => {
-                let slot = shared.factor(reference, policy)?;
-                Self::Distributed(DistributedSlot { shared: Arc::clone(shared), slot })
+            SolverAnalysis::Distributed(system) => {
+                let slot = system.factor(reference, policy)?;
+                Self::Distributed(DistributedSlot { system: Arc::clone(system), slot })
             }
         })
     }
@@ -159,8 +159,8 @@ impl ElasticSolver {
         match self {
             Self::Nothing => {}
             Self::Direct(factor) => factor.solve_in_place(right_side),
-            Self::Distributed(DistributedSlot { shared, slot: Some(slot) }) => {
-                *right_side = shared.solve(*slot, right_side)?;
+            Self::Distributed(DistributedSlot { system, slot: Some(slot) }) => {
+                *right_side = system.solve(*slot, right_side)?;
             }
             Self::Distributed(DistributedSlot { slot: None, .. }) => right_side.fill(0.0),
             Self::ComponentBlocks { matrix, preconditioner } => {

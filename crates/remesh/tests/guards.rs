@@ -6,7 +6,7 @@ mod support;
 
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_remesh::{
-    ElasticMap, Limits, Motion, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion,
+    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StepLimits, StiffnessPolicy, Subregion,
     check_step, step_to_inversion,
 };
 use support::{Point, at, nodes_where, shaken, unit_cells, whole};
@@ -187,10 +187,10 @@ fn a_path_through_the_floor_ends_before_it_with_a_valid_mesh() {
     let motion = motion(SolverChoice::Direct);
     let nodes = motion.map().design_nodes().len();
     let path = |t: f64| vec![[0.0, 0.0, -6.0 * t]; nodes];
-    let limits = Limits { rounds: 12, ..Limits::default() };
-    let travelled = motion.travel(&path, &limits, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
-    assert!(travelled.reached < 1.0);
-    let quality = travelled.motion.quality(&travelled.moved.mesh).worst;
+    let limits = StepLimits { rounds: 12, ..StepLimits::default() };
+    let outcome = motion.step_along(&path, &limits, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
+    assert!(outcome.reached < 1.0);
+    let quality = outcome.motion.quality(&outcome.moved.mesh).worst;
     assert!(quality > 0.0 && quality.is_finite(), "{quality}");
 }
 
@@ -199,7 +199,8 @@ fn a_path_that_is_no_number_ends_with_an_error() {
     let motion = motion(SolverChoice::Direct);
     let nodes = motion.map().design_nodes().len();
     let path = |t: f64| vec![[0.0, 0.0, if t > 0.5 { f64::NAN } else { 0.0 }]; nodes];
-    let ended = motion.travel(&path, &Limits::default(), &mut |_| std::ops::ControlFlow::Continue(()));
+    let ended =
+        motion.step_along(&path, &StepLimits::default(), &mut |_| std::ops::ControlFlow::Continue(()));
     assert!(matches!(ended, Err(RemeshError::NotFinite { .. })));
 }
 

@@ -5,8 +5,8 @@ mod support;
 
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, Guidance, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy,
-    Subregion,
+    Boundary, BoundaryKind, ElasticMap, KinematicConstraint, RemeshError, RemeshSetup, SolverChoice,
+    StiffnessPolicy, Subregion,
 };
 use support::{Point, at, largest_difference, nodes_where, noise, outer_design, random, unit_cells, whole};
 
@@ -36,7 +36,7 @@ fn mixed(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> Re
     RemeshSetup {
         subregions,
         policy,
-        guidance: Guidance::Free,
+        kinematic_constraint: KinematicConstraint::Free,
         design_nodes: nodes_where(mesh, |p| p[2] == top && (2.0..=3.0).contains(&p[0])),
         boundaries: kinds.map(boundary).to_vec(),
         ..RemeshSetup::default()
@@ -141,11 +141,12 @@ fn the_gradient_is_the_transposed_map() {
 }
 
 #[test]
-fn guided_motion_stays_on_its_axis_and_keeps_patch_test_and_transpose() {
+fn motion_along_an_axis_stays_on_its_axis_and_keeps_patch_test_and_transpose() {
     let mesh = support::shaken(&unit_cells([6, 5, 4]), 0.15);
     let affine = |x: Point| [0.0, 0.0, 0.7 - 0.3 * x[0] + 0.02 * x[1] - 0.25 * x[2]];
-    let guided = |setup: RemeshSetup| RemeshSetup { guidance: Guidance::Axis(2), ..setup };
-    let setup = guided(outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform));
+    let constrained =
+        |setup: RemeshSetup| RemeshSetup { kinematic_constraint: KinematicConstraint::Axis(2), ..setup };
+    let setup = constrained(outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform));
     let map = ElasticMap::new(&mesh, setup).unwrap();
     let free = ElasticMap::new(&mesh, outer_design(&mesh, whole(&mesh), StiffnessPolicy::Uniform)).unwrap();
     assert_eq!(3 * map.equation_count(), free.equation_count());
@@ -153,7 +154,7 @@ fn guided_motion_stays_on_its_axis_and_keeps_patch_test_and_transpose() {
     assert!(largest_difference(&u, &at(&mesh, &all(&mesh), affine)) < 1e-12);
 
     for policy in StiffnessPolicy::ALL {
-        let map = ElasticMap::new(&mesh, guided(mixed(&mesh, whole(&mesh), policy))).unwrap();
+        let map = ElasticMap::new(&mesh, constrained(mixed(&mesh, whole(&mesh), policy))).unwrap();
         let along =
             |points: Vec<Point>| -> Vec<Point> { points.into_iter().map(|p| [0.0, 0.0, p[2]]).collect() };
         let x = along(random(map.design_nodes().len(), 5));

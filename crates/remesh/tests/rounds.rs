@@ -12,8 +12,8 @@ use fluxmorph_geometry::quality::qualities;
 use fluxmorph_geometry::tet4::{add, cross};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, Event, Guidance, Limits, Motion, RemeshSetup, Rescue, Rescued, Rung,
-    StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, Fallback, FallbackLevel, FallbackReport, KinematicConstraint, Motion,
+    RemeshSetup, StepEvent, StepLimits, StiffnessPolicy, Subregion,
 };
 use support::{Point, at, largest_difference, nodes_where, random, shaken, unit_cells, whole};
 
@@ -73,9 +73,9 @@ fn a_finite_rotation_of_all_surfaces_is_reproduced_in_one_step_and_in_rounds() {
         }
         assert_eq!(round.round(), 3);
         assert!(largest_difference(round.reference_displacement(), &expected) <= 1e-12 * size, "{name}");
-        let travelled = motion.travel(&path, &Limits::default(), &mut |_| Continue(())).unwrap();
-        assert_eq!((travelled.reached, travelled.steps, travelled.rescues), (1.0, 1, 0), "{name}");
-        assert_eq!(travelled.moved.displacement, one.displacement, "{name}");
+        let outcome = motion.step_along(&path, &StepLimits::default(), &mut |_| Continue(())).unwrap();
+        assert_eq!((outcome.reached, outcome.steps, outcome.fallbacks), (1.0, 1, 0), "{name}");
+        assert_eq!(outcome.moved.displacement, one.displacement, "{name}");
     }
 }
 
@@ -88,7 +88,7 @@ fn translations_and_small_rotations_are_reproduced_by_every_policy_in_every_roun
             let spin = |p: Point| add(cross([0.02, -0.03, 0.05], p), [0.1, 0.2, -0.1]);
             for _ in 0..3 {
                 let to = |n: &NodeId| spin(motion.reference().point(*n));
-                let design: Vec<Point> = (motion.map().design_nodes().iter().zip(motion.anchor()))
+                let design: Vec<Point> = (motion.map().design_nodes().iter().zip(motion.reference_design()))
                     .map(|(n, u)| add(*u, to(n)))
                     .collect();
                 let step = motion.step(&design).unwrap();
@@ -126,17 +126,17 @@ fn sinking(motion: &Motion, by: f64) -> impl Fn(f64) -> Vec<Point> + Sync + use<
 }
 
 #[test]
-fn a_later_round_is_affine_about_its_anchor_and_transposes_exactly() {
+fn a_later_round_is_affine_about_its_reference_design_and_transposes_exactly() {
     for policy in StiffnessPolicy::ALL {
         let first = lined([6, 6, 5], policy, [0.0; 3]);
-        let anchor = sinking(&first, -1.0)(1.0);
-        let moved = first.moved(&anchor).unwrap();
-        let second = first.rebased(moved.mesh, moved.displacement, anchor.clone(), policy).unwrap();
-        let x = random(anchor.len(), 3);
-        let design: Vec<Point> = anchor.iter().zip(&x).map(|(u, x)| add(*u, x.map(|x| 0.1 * x))).collect();
+        let reference = sinking(&first, -1.0)(1.0);
+        let moved = first.moved(&reference).unwrap();
+        let second = first.rebased(moved.mesh, moved.displacement, reference.clone(), policy).unwrap();
+        let x = random(reference.len(), 3);
+        let design: Vec<Point> = reference.iter().zip(&x).map(|(u, x)| add(*u, x.map(|x| 0.1 * x))).collect();
         let (step, linear) = (second.step(&design).unwrap(), second.map().linear(&x).unwrap());
         let tenth: Vec<Point> = linear.iter().map(|u| u.map(|u| 0.1 * u)).collect();
-        assert!(largest_difference(&step, &tenth) < 1e-14, "{policy:?}: the anchor is 1, steps are 0.1");
+        assert!(largest_difference(&step, &tenth) < 1e-14, "{policy:?}: the reference is 1, steps are 0.1");
         let y = random(step.len(), 4);
         let product = |a: &[Point], b: &[Point]| -> f64 {
             a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
@@ -147,19 +147,19 @@ fn a_later_round_is_affine_about_its_anchor_and_transposes_exactly() {
 }
 
 #[test]
-fn rounds_count_and_know_where_they_stand() {
+fn rounds_count_and_know_their_reference() {
     let first = lined([6, 6, 5], StiffnessPolicy::InverseSize, [0.0; 3]);
     assert_eq!((first.round(), first.policy()), (0, StiffnessPolicy::InverseSize));
-    assert!(first.anchor().iter().chain(first.reference_displacement()).all(|u| *u == [0.0; 3]));
+    assert!(first.reference_design().iter().chain(first.reference_displacement()).all(|u| *u == [0.0; 3]));
     let design = sinking(&first, -1.0)(1.0);
     let moved = first.moved(&design).unwrap();
     let policy = StiffnessPolicy::InverseVolume;
     let second =
         first.rebased(moved.mesh.clone(), moved.displacement.clone(), design.clone(), policy).unwrap();
     assert_eq!((second.round(), second.policy()), (1, policy));
-    assert_eq!((second.anchor(), second.reference().points()), (&design[..], moved.mesh.points()));
+    assert_eq!((second.reference_design(), second.reference().points()), (&design[..], moved.mesh.points()));
     assert_eq!(second.original().points(), first.original().points());
-    // At the anchor the mesh is the reference, to the bit.
+    // At the reference design the mesh is the reference, to the bit.
     let same = second.moved(&design).unwrap();
     assert_eq!((same.mesh.points(), same.displacement), (moved.mesh.points(), moved.displacement));
     assert_eq!(same.inversion.step, f64::INFINITY);
@@ -190,71 +190,78 @@ fn a_path_that_a_step_cannot_take_ends_on_its_displacement_with_every_element_wh
         assert!(motion.moved(&path(1.0)).is_err());
         let nodes = motion.map().design_nodes().to_vec();
         let mut reached = vec![0.0];
-        let mut tell = |event: &Event| {
-            if let Event::Stepped { reached: to, share, .. } = event {
-                assert!(*share <= Limits::default().inversion_share);
+        let mut on_event = |event: &StepEvent| {
+            if let StepEvent::Stepped { reached: to, share, .. } = event {
+                assert!(*share <= StepLimits::default().inversion_share);
                 reached.push(*to);
             }
             Continue(())
         };
-        let travelled = motion.travel(&path, &Limits::default(), &mut tell).unwrap();
+        let outcome = motion.step_along(&path, &StepLimits::default(), &mut on_event).unwrap();
         assert!(reached.windows(2).all(|pair| pair[0] < pair[1]));
-        assert_eq!((reached.len() - 1, travelled.reached), (travelled.steps, 1.0));
-        assert!(travelled.steps > 2 && qualities(&travelled.moved.mesh).iter().all(|q| *q > 0.0));
+        assert_eq!((reached.len() - 1, outcome.reached), (outcome.steps, 1.0));
+        assert!(outcome.steps > 2 && qualities(&outcome.moved.mesh).iter().all(|q| *q > 0.0));
         for node in nodes {
-            let off = largest_difference(&[travelled.moved.displacement[node.index()]], &path(1.0)[..1]);
+            let off = largest_difference(&[outcome.moved.displacement[node.index()]], &path(1.0)[..1]);
             assert!(off <= 1e-14, "{off}"); // rounding of a sum of a few steps of 6.4
         }
     }
 }
 
 #[test]
-fn rounds_and_remedies_have_the_same_bits_for_any_number_of_threads() {
+fn rounds_and_fallbacks_have_the_same_bits_for_any_number_of_threads() {
     let bits = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let motion = lined([8, 8, 8], StiffnessPolicy::Directional, [0.0; 3]);
             let path = sinking(&motion, -6.4);
-            let travelled = motion.travel(&path, &Limits::default(), &mut |_| Continue(())).unwrap();
-            assert!(travelled.rescues > 0);
-            travelled.moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
+            let outcome = motion.step_along(&path, &StepLimits::default(), &mut |_| Continue(())).unwrap();
+            assert!(outcome.fallbacks > 0);
+            outcome.moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
         })
     };
     assert_eq!(bits(1), bits(3));
 }
 
 #[test]
-fn the_first_remedy_is_a_policy_that_carries_the_step_further() {
+fn the_first_fallback_is_a_policy_that_carries_the_step_further() {
     let first = lined([8, 8, 8], StiffnessPolicy::Uniform, [0.0; 3]);
     let design = sinking(&first, -2.0)(1.0);
     let moved = first.moved(&design).unwrap();
     let second = first.rebased(moved.mesh, moved.displacement, design, StiffnessPolicy::Uniform).unwrap();
     let wanted = sinking(&first, -6.4)(1.0);
-    let (motion, Rescued { rescue, admitted, quality }, rung) =
-        second.rescued(&wanted, Rung::Ground, &Limits::default()).unwrap().unwrap();
-    assert!(matches!(rescue, Rescue::Policy { from: StiffnessPolicy::Uniform, .. }), "{rescue:?}");
-    assert_eq!((rung, quality[0], motion.anchor()), (Rung::Policies, quality[1], second.anchor()));
-    assert!(admitted[1] >= 1.1 * admitted[0], "{admitted:?}");
+    let (motion, FallbackReport { fallback, admissible, quality }, level) =
+        second.escalate(&wanted, FallbackLevel::None, &StepLimits::default()).unwrap().unwrap();
+    assert!(matches!(fallback, Fallback::Policy { from: StiffnessPolicy::Uniform, .. }), "{fallback:?}");
+    assert_eq!(
+        (level, quality[0], motion.reference_design()),
+        (FallbackLevel::Policies, quality[1], second.reference_design())
+    );
+    assert!(admissible[1] >= 1.1 * admissible[0], "{admissible:?}");
     let step = motion.step(&wanted).unwrap();
     // Half of the way to the inversion is what the limits admit.
     let half = 0.5 * motion.inversion(&step).step;
-    assert!(admitted[1] <= half.min(1.0) * (1.0 + 1e-12), "{admitted:?}, {half}");
+    assert!(admissible[1] <= half.min(1.0) * (1.0 + 1e-12), "{admissible:?}, {half}");
 }
 
 #[test]
-fn the_second_remedy_smooths_the_interior_the_third_guides_and_there_is_no_fourth() {
+fn the_second_fallback_smooths_the_interior_the_third_constrains_it_to_an_axis_and_there_is_no_fourth() {
     let first = lined([6, 6, 5], StiffnessPolicy::InverseVolume, [0.0; 3]);
     let mesh = first.original();
-    let worn = shaken(mesh, 0.32);
-    let displacement: Vec<Point> =
-        worn.points().iter().zip(mesh.points()).map(|(a, b)| std::array::from_fn(|d| a[d] - b[d])).collect();
-    let anchor = first.anchor().to_vec();
-    let second = first.rebased(worn, displacement, anchor, first.policy()).unwrap();
+    let degraded = shaken(mesh, 0.32);
+    let displacement: Vec<Point> = degraded
+        .points()
+        .iter()
+        .zip(mesh.points())
+        .map(|(a, b)| std::array::from_fn(|d| a[d] - b[d]))
+        .collect();
+    let design = first.reference_design().to_vec();
+    let second = first.rebased(degraded, displacement, design, first.policy()).unwrap();
     let wanted = sinking(&first, -6.4)(1.0);
-    let (third, Rescued { rescue, quality, .. }, rung) =
-        second.rescued(&wanted, Rung::Policies, &Limits::default()).unwrap().unwrap();
-    assert!(matches!(rescue, Rescue::Smoothing { nodes } if nodes > 0), "{rescue:?}");
-    assert!(rung == Rung::Smoothed && quality[1] >= quality[0], "{quality:?}");
+    let (third, FallbackReport { fallback, quality, .. }, level) =
+        second.escalate(&wanted, FallbackLevel::Policies, &StepLimits::default()).unwrap().unwrap();
+    assert!(matches!(fallback, Fallback::Smoothing { nodes } if nodes > 0), "{fallback:?}");
+    assert!(level == FallbackLevel::Smoothing && quality[1] >= quality[0], "{quality:?}");
     let shape = [&second, &third].map(|motion| motion.shape(motion.reference()));
     assert!(shape[0] < 0.3 && shape[1] >= 0.3, "to the target: {shape:?}");
     for (n, u) in mesh.topology().nodes().zip(third.reference_displacement()) {
@@ -262,11 +269,11 @@ fn the_second_remedy_smooths_the_interior_the_third_guides_and_there_is_no_fourt
         let place = largest_difference(&[add(mesh.point(n), *u)], &[third.reference().point(n)]);
         assert!(place < 1e-14, "the displacement is that from the original mesh");
     }
-    let (fourth, Rescued { rescue, .. }, rung) =
-        third.rescued(&wanted, rung, &Limits::default()).unwrap().unwrap();
-    assert!(matches!(rescue, Rescue::Guided { axis: 2 }), "{rescue:?}");
+    let (fourth, FallbackReport { fallback, .. }, level) =
+        third.escalate(&wanted, level, &StepLimits::default()).unwrap().unwrap();
+    assert!(matches!(fallback, Fallback::AxisConstraint { axis: 2 }), "{fallback:?}");
     assert_eq!(fourth.round(), third.round() + 1);
-    assert!(fourth.rescued(&wanted, rung, &Limits::default()).unwrap().is_none());
+    assert!(fourth.escalate(&wanted, level, &StepLimits::default()).unwrap().is_none());
 }
 
 #[test]
@@ -285,33 +292,36 @@ fn columns_that_twist_are_moved_anew_along_their_axis() {
     let up = |p: Point| (p[0] * 1e3 + p[1] * 1e3).round() % 2.0 == 0.0;
     let path = |t: f64| at(&mesh, &design_nodes, |p| [0.0, 0.0, if up(p) { 0.02 * t } else { -0.02 * t }]);
     let motion = Motion::new(mesh.clone(), setup).unwrap();
-    let mut guided = 0;
-    let mut tell = |event: &Event| {
-        guided += usize::from(matches!(
+    let mut constrained = 0;
+    let mut on_event = |event: &StepEvent| {
+        constrained += usize::from(matches!(
             event,
-            Event::Rescued { rescued: Rescued { rescue: Rescue::Guided { axis: 2 }, .. }, .. }
+            StepEvent::FellBack {
+                report: FallbackReport { fallback: Fallback::AxisConstraint { axis: 2 }, .. },
+                ..
+            }
         ));
         Continue(())
     };
-    let travelled = motion.travel(&path, &Limits::default(), &mut tell).unwrap();
-    assert_eq!((guided, travelled.reached), (1, 1.0));
-    assert_eq!(travelled.motion.map().guidance(), Guidance::Axis(2));
-    assert!(travelled.moved.displacement.iter().all(|u| u[0] == 0.0 && u[1] == 0.0));
-    assert!(qualities(&travelled.moved.mesh).iter().all(|q| *q > 0.0));
+    let outcome = motion.step_along(&path, &StepLimits::default(), &mut on_event).unwrap();
+    assert_eq!((constrained, outcome.reached), (1, 1.0));
+    assert_eq!(outcome.motion.map().kinematic_constraint(), KinematicConstraint::Axis(2));
+    assert!(outcome.moved.displacement.iter().all(|u| u[0] == 0.0 && u[1] == 0.0));
+    assert!(qualities(&outcome.moved.mesh).iter().all(|q| *q > 0.0));
 }
 
 #[test]
 fn a_path_through_the_floor_ends_before_it_with_a_whole_mesh() {
     let motion = lined([6, 6, 5], StiffnessPolicy::InverseSize, [0.0; 3]);
     let path = sinking(&motion, -6.0);
-    let travelled = motion.travel(&path, &Limits::default(), &mut |_| Continue(())).unwrap();
+    let outcome = motion.step_along(&path, &StepLimits::default(), &mut |_| Continue(())).unwrap();
     // The line meets the bottom at 5/6 of the path.
-    assert!((0.7..5.0 / 6.0).contains(&travelled.reached), "{}", travelled.reached);
-    assert!(qualities(&travelled.moved.mesh).iter().all(|q| *q > 0.0));
-    assert!(travelled.steps < Limits::default().rounds, "it ends by itself");
+    assert!((0.7..5.0 / 6.0).contains(&outcome.reached), "{}", outcome.reached);
+    assert!(qualities(&outcome.moved.mesh).iter().all(|q| *q > 0.0));
+    assert!(outcome.steps < StepLimits::default().rounds, "it ends by itself");
 
     let motion = lined([6, 6, 5], StiffnessPolicy::InverseSize, [0.0; 3]);
-    let few = Limits { rounds: 2, ..Limits::default() };
-    let travelled = motion.travel(&path, &few, &mut |_| Continue(())).unwrap();
-    assert!(travelled.steps == 2 && travelled.reached < 0.8, "{}", travelled.reached);
+    let few = StepLimits { rounds: 2, ..StepLimits::default() };
+    let outcome = motion.step_along(&path, &few, &mut |_| Continue(())).unwrap();
+    assert!(outcome.steps == 2 && outcome.reached < 0.8, "{}", outcome.reached);
 }

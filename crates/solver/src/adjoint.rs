@@ -36,7 +36,7 @@ pub fn solve(system: &mut PreparedSystem, derivative: &[c64]) -> Result<FieldSol
 /// is incomplete, and those nodes must be held. The mesh is the one that the state was solved on.
 ///
 /// # Errors
-/// [`SolverError::Rank`] where the problem is shared out.
+/// [`SolverError::Rank`] where the problem is distributed.
 pub fn node_gradient(
     model: &FieldModel,
     mesh: &Mesh,
@@ -93,10 +93,10 @@ fn gradient_of_order<const N: usize, const F: usize>(
         .map(|&e| {
             let (tet, law) = (Tet4::new(mesh.vertices(e)), model.coefficients_of(e));
             let (l, u) = (adjoint.element_field(model, e), state.element_field(model, e));
-            scaled(-2.0, &point::shape_derivative(tet_shape, &tet, law, &l, &u))
+            scale(-2.0, &point::shape_derivative(tet_shape, &tet, law, &l, &u))
         })
         .collect();
-    let mut gradient = gathered(topology, moving, &contributions);
+    let mut gradient = sum_by_node(topology, moving, &contributions);
     let mut add = |nodes: &[NodeId], terms: &[Point]| {
         for (node, term) in nodes.iter().zip(terms) {
             for d in 0..3 {
@@ -107,7 +107,7 @@ fn gradient_of_order<const N: usize, const F: usize>(
     let magnets =
         model.sources().shape_derivatives(tet_shape, mesh, moving, |e| adjoint.element_field(model, e));
     for (e, terms) in magnets {
-        add(&topology.tet(e), &scaled(2.0, &terms));
+        add(&topology.tet(e), &scale(2.0, &terms));
     }
     let all = model.surface();
     let surface: Vec<([NodeId; 3], SurfaceTerm)> = match triangles {
@@ -122,7 +122,7 @@ fn gradient_of_order<const N: usize, const F: usize>(
             let nodes = nodes_of(triangle);
             let field = |s: &FieldSolution| s.nodal_field(model, nodes).vector_potential;
             let vertices = triangle.map(|n| mesh.point(n));
-            scaled(-2.0, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)))
+            scale(-2.0, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)))
         })
         .collect();
     for ((triangle, _), terms) in surface.iter().zip(&contributions) {
@@ -133,7 +133,7 @@ fn gradient_of_order<const N: usize, const F: usize>(
 
 /// The real part of some terms, times a factor.
 #[inline]
-fn scaled<const M: usize>(factor: f64, terms: &[Complex3; M]) -> [Point; M] {
+fn scale<const M: usize>(factor: f64, terms: &[Complex3; M]) -> [Point; M] {
     terms.map(|term| term.map(|c| factor * c.re))
 }
 
@@ -141,7 +141,7 @@ fn scaled<const M: usize>(factor: f64, terms: &[Complex3; M]) -> [Point; M] {
 ///
 /// `elements` is ascending and has one contribution each. Every node gathers its own in ascending order of the elements:
 /// the bits do not depend on the threads.
-fn gathered(topology: &Topology, elements: &[ElementId], contributions: &[[Point; 4]]) -> Vec<Point> {
+fn sum_by_node(topology: &Topology, elements: &[ElementId], contributions: &[[Point; 4]]) -> Vec<Point> {
     const NOT_LISTED: u32 = u32::MAX;
     let mut position = vec![NOT_LISTED; topology.tets().len()];
     for (i, e) in (0..).zip(elements) {
@@ -210,7 +210,7 @@ mod tests {
         }
         for threads in [1, 2, 4] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            assert_eq!(pool.install(|| gathered(topology, &elements, &contributions)), serial);
+            assert_eq!(pool.install(|| sum_by_node(topology, &elements, &contributions)), serial);
         }
     }
 }

@@ -3,7 +3,7 @@
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, norm, sub};
 use fluxmorph_geometry::{Mesh, MeshError};
 
-use crate::constraint::axis_of;
+use crate::fixed_directions::axis_of;
 
 /// A condition on a named surface, plane or curved.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,22 +1,22 @@
 //! The matrix of the field problem in one finite-element space: equation numbers, pattern, assembly.
 //!
 //! All of it follows from topology, conditions and from where ψ is defined, and is made once; the values come from a
-//! [`WeakForm`] of any frequency above zero, or of statics. Of a mesh that is shared out, a rank has all equation numbers,
-//! but only the rows of its own nodes and the elements that touch them ([`Holding`]).
+//! [`WeakForm`] of any frequency above zero, or of statics. Of a distributed mesh, a rank has all equation numbers,
+//! but only the rows of its own nodes and the elements that touch them ([`LocalEntities`]).
 
 use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix, c64,
 };
-use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
 use crate::element::lagrange::Lagrange;
 use crate::error::SolverError;
-use crate::framed::Framed;
-use crate::holding::Holding;
 use crate::linear::aggregation;
+use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, prolongation};
+use crate::rotated::RotatedMatrix;
 use crate::space::{Order, Space};
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
@@ -30,7 +30,7 @@ pub(crate) struct Discretisation {
     pub(crate) pattern: BlockPattern<4>,
     groups: Groups,
     /// Elements and triangles of the groups, where these are not all.
-    pub(crate) holding: Option<Holding>,
+    pub(crate) local: Option<LocalEntities>,
     /// Elements and surface triangles with a node whose `A` is prescribed.
     lifted: (Vec<ElementId>, Vec<usize>),
 }
@@ -52,31 +52,31 @@ impl Discretisation {
         order: Order,
         weak_form: &WeakForm,
         boundaries: &[(String, Boundary)],
-        share: Option<&Share>,
+        ownership: Option<&Ownership>,
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
         let space = Space::new(topology, order);
         let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), boundaries)?;
         let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
-        let holding = share.map(|share| Holding::new(topology, weak_form.triangles(), share));
+        let local = ownership.map(|own| LocalEntities::new(topology, weak_form.triangles(), own));
         let coupling_of = |e: ElementId| {
             let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
             let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
             if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
         };
-        let rows = match share {
+        let rows = match ownership {
             None => unknowns.dofs.clone(),
-            Some(share) => {
-                let owned = |node: NodeId| share.owns(space.vertices_of(node)[0]);
+            Some(ownership) => {
+                let owned = |node: NodeId| ownership.owns(space.vertices_of(node)[0]);
                 DofMap::new(space.node_count(), |node, c| {
                     owned(node) && unknowns.dofs.equation(node, c).is_some()
                 })
             }
         };
         let (pattern, groups) =
-            pattern(&space, (&rows, &unknowns.dofs), holding.as_ref(), coupling_of, weak_form.triangles());
-        let lifted = lifted(mesh, &space, &unknowns, weak_form.triangles());
-        Ok(Self { space, unknowns, pattern, groups, holding, lifted })
+            pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form.triangles());
+        let lifted = find_lifted(mesh, &space, &unknowns, weak_form.triangles());
+        Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
 
     /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones conductors in full and
@@ -105,13 +105,13 @@ impl Discretisation {
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
     }
 
-    /// Assembles the matrix, or the rows of it that are held, on a mesh with this topology.
+    /// Assembles the matrix, or the rows of this rank, on a mesh with this topology.
     pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
         let values = &mut matrix.values;
-        let holding = self.holding.as_ref();
-        let element = |e: ElementId| holding.map_or(e, |held| held.elements[e.index()]);
-        let triangle = |t: ElementId| holding.map_or(t.index(), |held| held.triangles[t.index()]);
+        let local = self.local.as_ref();
+        let element = |e: ElementId| local.map_or(e, |local| local.elements[e.index()]);
+        let triangle = |t: ElementId| local.map_or(t.index(), |local| local.triangles[t.index()]);
         match &self.groups {
             Groups::Linear { tets, triangles } => {
                 self.add_group(tets, values, |e| weak_form.linear_tet(mesh, element(e)));
@@ -138,7 +138,7 @@ impl Discretisation {
     ) {
         if self.unknowns.has_frames() {
             self.pattern.assemble(group, values, |e| {
-                Framed::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
+                RotatedMatrix::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
             });
         } else {
             self.pattern.assemble(group, values, matrix);
@@ -193,40 +193,40 @@ fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
     weak_form.topology().elements().filter(|&e| weak_form.conducts(e)).collect()
 }
 
-/// The pattern of the rows against the columns, and the elements and triangles that are held bound to it.
+/// The pattern of the rows against the columns, and the elements and triangles of this rank bound to it.
 fn pattern(
     space: &Space,
     (rows, columns): (&DofMap<4>, &DofMap<4>),
-    holding: Option<&Holding>,
+    local: Option<&LocalEntities>,
     coupling_of: impl Fn(ElementId) -> Coupling,
     triangles: &[[NodeId; 3]],
 ) -> (BlockPattern<4>, Groups) {
     let count = space.node_count();
-    let couplings: Vec<Coupling> = match holding {
+    let couplings: Vec<Coupling> = match local {
         None => (0..space.element_count()).map(|e| coupling_of(ElementId::new(e))).collect(),
-        Some(held) => held.elements.iter().map(|&e| coupling_of(e)).collect(),
+        Some(local) => local.elements.iter().map(|&e| coupling_of(e)).collect(),
     };
-    let triangles: Vec<[NodeId; 3]> = match holding {
+    let triangles: Vec<[NodeId; 3]> = match local {
         None => triangles.to_vec(),
-        Some(held) => held.triangles.iter().map(|&t| triangles[t]).collect(),
+        Some(local) => local.triangles.iter().map(|&t| triangles[t]).collect(),
     };
     let surface_couplings = vec![Coupling::full(3); triangles.len()];
-    fn held<const N: usize>(tets: &[[NodeId; N]], holding: Option<&Holding>) -> Vec<[NodeId; N]> {
-        match holding {
+    fn local_tets<const N: usize>(tets: &[[NodeId; N]], local: Option<&LocalEntities>) -> Vec<[NodeId; N]> {
+        match local {
             None => tets.to_vec(),
-            Some(held) => held.elements.iter().map(|e| tets[e.index()]).collect(),
+            Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
         }
     }
     match (space.linear_tets(), space.quadratic_tets()) {
         (Some(tets), _) => {
-            let volumes = ElementGroup::new(count, held(tets, holding), couplings);
+            let volumes = ElementGroup::new(count, local_tets(tets, local), couplings);
             let faces = ElementGroup::new(count, triangles, surface_couplings);
             let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
             let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
             (pattern, groups)
         }
         (None, tets) => {
-            let volumes = ElementGroup::new(count, held(tets.unwrap_or_default(), holding), couplings);
+            let volumes = ElementGroup::new(count, local_tets(tets.unwrap_or_default(), local), couplings);
             let triangles = triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
             let faces = ElementGroup::new(count, triangles, surface_couplings);
             let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
@@ -237,7 +237,7 @@ fn pattern(
 }
 
 /// Elements and surface triangles with a node whose `A` is prescribed, ascending.
-fn lifted(
+fn find_lifted(
     mesh: &Mesh,
     space: &Space,
     unknowns: &Unknowns,

@@ -1,7 +1,7 @@
 //! What can go wrong in a field analysis.
 
 use fluxmorph_geometry::MeshError;
-use fluxmorph_geometry::ranks::RankError;
+use fluxmorph_geometry::parallel::RankError;
 
 use crate::coil::{PlaneFault, RegionFault};
 

@@ -8,7 +8,7 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
@@ -19,7 +19,7 @@ use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::linear::{
-    DistributedSettings, FieldKind, LinearSolverSettings, LocalSystem, PreparedSystem, SolverMemory,
+    DistributedSettings, FieldKind, LinearSolverCache, LinearSolverSettings, LocalSystem, PreparedSystem,
     SystemAnalysis, SystemPattern,
 };
 use crate::load::Sources;
@@ -51,8 +51,8 @@ pub struct FieldModelSetup {
     pub boundaries: Vec<(String, Boundary)>,
     /// Linear solver.
     pub linear_solver: LinearSolverSettings,
-    /// The ranks among which the problem is shared out, and how they solve; `None` for one process.
-    pub share: Option<(Share, DistributedSettings)>,
+    /// The ranks over which the problem is distributed, and how they solve; `None` for one process.
+    pub ownership: Option<(Ownership, DistributedSettings)>,
 }
 
 impl Default for FieldModelSetup {
@@ -68,7 +68,7 @@ impl Default for FieldModelSetup {
             coils: Vec::new(),
             boundaries: Vec::new(),
             linear_solver: LinearSolverSettings::default(),
-            share: None,
+            ownership: None,
         }
     }
 }
@@ -81,14 +81,14 @@ pub struct FieldModel {
     setup: Arc<FieldModelSetup>,
     angular_frequency: f64,
     weak_form: Arc<WeakForm>,
-    shared: Arc<Shared>,
-    /// Where the problem is shared out among ranks.
+    shared: Arc<SharedParts>,
+    /// Where the problem is distributed over ranks.
     distributed: Option<Arc<Distributed>>,
 }
 
 /// What all frequencies above zero have in common.
 #[derive(Debug)]
-struct Shared {
+struct SharedParts {
     fine: Discretisation,
     sources: Sources,
     /// Of one process.
@@ -117,15 +117,15 @@ impl FieldModel {
     /// [`SolverError`] names what is missing or out of range.
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
         let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
-        let share = setup.share.as_ref().map(|(share, _)| share);
-        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries, share)?;
+        let ownership = setup.ownership.as_ref().map(|(ownership, _)| ownership);
+        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries, ownership)?;
         let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             reference: &|| fine.assemble(&weak_form, mesh),
             prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
         };
-        let analysis = match share {
+        let analysis = match ownership {
             None => Some(SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?),
             Some(_) => None,
         };
@@ -137,21 +137,21 @@ impl FieldModel {
             .collect();
         let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
         check_sources(mesh, &setup)?;
-        let shared = Arc::new(Shared { fine, sources, analysis: analysis.map(Arc::new) });
+        let shared = Arc::new(SharedParts { fine, sources, analysis: analysis.map(Arc::new) });
         Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
     }
 
-    /// The model, with its part shared out where it has ranks.
+    /// The model, distributed where it has ranks.
     fn whole(
         setup: FieldModelSetup,
         (angular_frequency, weak_form): (f64, WeakForm),
-        shared: Arc<Shared>,
+        shared: Arc<SharedParts>,
     ) -> Self {
         let setup = Arc::new(setup);
         let weak_form = Arc::new(weak_form);
         let mut model = Self { setup, angular_frequency, weak_form, shared, distributed: None };
-        if let Some((share, settings)) = &model.setup.share {
-            model.distributed = Some(Arc::new(Distributed::new(&model, share, settings)));
+        if let Some((ownership, settings)) = &model.setup.ownership {
+            model.distributed = Some(Arc::new(Distributed::new(&model, ownership, settings)));
         }
         model
     }
@@ -195,22 +195,22 @@ impl FieldModel {
 
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
-        let Shared { fine, sources, .. } = &*self.shared;
+        let SharedParts { fine, sources, .. } = &*self.shared;
         let mut load = vec![c64::default(); fine.unknowns.dofs.count()];
         sources.add_load(&fine.space, &fine.unknowns, mesh, &mut load);
         fine.lift(&self.weak_form, mesh, &mut load);
         load
     }
 
-    /// Makes what the linear solver needs for a mesh; shared by the state and its adjoint.
+    /// Prepares what the linear solver needs for a mesh; shared by the state and its adjoint.
     ///
     /// # Errors
     /// As [`FieldModel::prepare_with`].
     pub fn prepare(&self, matrix: impl Into<AssembledMatrix>) -> Result<PreparedSystem, SolverError> {
-        self.prepare_with(matrix, &mut SolverMemory::default())
+        self.prepare_with(matrix, &mut LinearSolverCache::default())
     }
 
-    /// As [`FieldModel::prepare`], with what is remembered of an earlier mesh or of another frequency.
+    /// As [`FieldModel::prepare`], with what is cached of an earlier mesh or of another frequency.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] when the factorisation fails: the system is singular; [`SolverError::Rank`] where a rank does.
@@ -220,11 +220,11 @@ impl FieldModel {
     pub fn prepare_with(
         &self,
         matrix: impl Into<AssembledMatrix>,
-        memory: &mut SolverMemory,
+        cache: &mut LinearSolverCache,
     ) -> Result<PreparedSystem, SolverError> {
         match (matrix.into(), &self.distributed, &self.shared.analysis) {
             (AssembledMatrix::Local(matrix), _, Some(analysis)) => {
-                let system = LocalSystem::new(analysis, matrix, memory)?;
+                let system = LocalSystem::new(analysis, matrix, cache)?;
                 Ok(PreparedSystem::Local(Box::new(system)))
             }
             (AssembledMatrix::OnRanks(points), Some(distributed), _) => {
@@ -326,14 +326,14 @@ impl FieldModel {
 
     /// What the linear systems are solved with, in a word or two.
     pub fn method_name(&self) -> String {
-        match (&self.shared.analysis, &self.setup.share) {
+        match (&self.shared.analysis, &self.setup.ownership) {
             (Some(analysis), _) => analysis.method().name().to_owned(),
             (None, Some((_, settings))) => settings.method_for(self.unknown_count()).name().to_owned(),
             (None, None) => String::new(),
         }
     }
 
-    /// The same without the ranks among which it is shared out: for what needs no matrix.
+    /// The same without the ranks over which it is distributed: for what needs no matrix.
     pub fn of_one_process(&self) -> Self {
         Self { distributed: None, ..self.clone() }
     }

@@ -12,7 +12,7 @@ use fluxmorph_geometry::fem::CsrMatrix;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::tet4::dot;
 
-use crate::constraint::Frame;
+use crate::fixed_directions::Frame;
 use crate::space::Space;
 use crate::unknowns::{PSI, Unknowns};
 
@@ -146,7 +146,7 @@ mod tests {
         let p = prolongation(&coarse, &space, &fine, ScalarSpace::Linear);
         let x: Vec<c64> = (0..coarse.dofs.count()).map(|i| c64::new((0.7 * i as f64).sin(), 0.1)).collect();
         let mut y = vec![c64::default(); fine.dofs.count()];
-        Transfer::new(p).add_prolonged(&x, &mut y);
+        Transfer::new(p).add_prolongation(&x, &mut y);
         for node in (0..space.node_count()).map(NodeId::new) {
             let [a, b] = space.vertices_of(node).map(|end| coarse.gather(&x, end));
             let mean: [c64; 4] = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));

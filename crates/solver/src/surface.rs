@@ -8,11 +8,11 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
-use crate::constraint::axis_of;
 use crate::element::impedance::{self, ImpedanceTriangle};
 use crate::element::interface::InterfaceTriangle;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
+use crate::fixed_directions::axis_of;
 use crate::material::Material;
 
 /// A conductor that is not meshed but replaced by its impedance surface.

@@ -7,7 +7,7 @@
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
 //! On planes along the axes the unknowns are components of `A`; at the nodes of other conditioned surfaces they are
-//! components in the node's own frame (`constraint`), and [`Unknowns::gather`] and
+//! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
 use std::collections::{BTreeMap, HashMap};
@@ -18,8 +18,8 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
-use crate::constraint::{Constraint, Fix, Frame, axis_of, constraint};
 use crate::error::SolverError;
+use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
 use crate::space::Space;
 
 /// Component index of `ψ`.
@@ -74,7 +74,7 @@ impl Unknowns {
         let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
         let mut planes = BTreeMap::new();
         for (node, at) in at_nodes {
-            let Constraint { frame, fixed: bits } = constraint(&at.faces);
+            let FixedDirections { frame, fixed: bits } = fixed_directions(&at.faces);
             fixed[node.index()] = bits;
             psi_zero[node.index()] = at.psi_zero;
             let axes = at.faces.iter().filter_map(|(_, area)| axis_of(area.map(|c| c / norm(*area))));
@@ -229,7 +229,7 @@ fn check_agreement(
     if own.is_empty() {
         return Ok(());
     }
-    let Constraint { frame, fixed } = constraint(own);
+    let FixedDirections { frame, fixed } = fixed_directions(own);
     let conflict = (0..3)
         .filter(|k| fixed >> k & 1 == 1)
         .map(|k| dot(frame.axes[k], potential).abs())

@@ -8,7 +8,7 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::{Mesh, MeshError, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{
-    LinearSolver, LinearSolverSettings, Method, Reuse, SolverEvent, SolverMemory,
+    LinearSolver, LinearSolverCache, LinearSolverSettings, Method, Reuse, SolverEvent,
 };
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, FieldSolution, Material, SolverError};
 
@@ -367,10 +367,10 @@ fn material_data_out_of_range_are_refused_by_name() {
 #[test]
 fn an_earlier_factor_is_replaced_where_the_matrix_has_changed_beyond_use() {
     let (mesh, model) = model(fixed(Method::DirectSingle));
-    let mut memory = SolverMemory::default();
+    let mut memory = LinearSolverCache::default();
     let mut first = model.prepare_with(model.assemble(&mesh), &mut memory).expect("a factor");
     first.solve(&model.load(&mesh)).expect("a solution");
-    memory = first.into_memory();
+    memory = first.into_cache();
     // A diagonal that grows by up to ten digits from one end to the other: the earlier factor is far from it.
     let mut matrix = model.assemble(&mesh);
     let n = matrix.structure.row_count();
@@ -386,16 +386,16 @@ fn an_earlier_factor_is_replaced_where_the_matrix_has_changed_beyond_use() {
 #[test]
 fn an_earlier_factor_does_not_hide_a_matrix_that_is_no_number() {
     let (mesh, model) = model(fixed(Method::Direct));
-    let mut memory = SolverMemory::default();
+    let mut memory = LinearSolverCache::default();
     let mut first = model.prepare_with(model.assemble(&mesh), &mut memory).expect("a factor");
     first.solve(&model.load(&mesh)).expect("a solution");
-    memory = first.into_memory();
+    memory = first.into_cache();
     let damaged = with_diagonal(model.assemble(&mesh), c64::new(f64::NAN, 0.0));
     let mut system = model.prepare_with(damaged, &mut memory).expect("the earlier factor is at hand");
     let error = system.solve(&model.load(&mesh)).expect_err("no number");
     assert!(matches!(error, SolverError::Mesh(MeshError::Factorisation { .. })), "{error}");
     // What failed leaves nothing behind that the next design would start from.
-    memory = system.into_memory();
+    memory = system.into_cache();
     let mut next = model.prepare_with(model.assemble(&mesh), &mut memory).expect("a factor");
     assert!(next.solve(&model.load(&mesh)).expect("a sound matrix").1.residual <= 1e-9);
 }

@@ -28,7 +28,7 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
                 .to_owned(),
         );
     }
-    let worst = setup.problem.quality(&setup.problem.original).worst;
+    let worst = setup.problem.quality(setup.problem.original()).worst;
     if is_file && worst < POOR {
         all.push(format!(
             "the worst element has a quality of {worst:.4}; below {POOR} a mesh from a file is better made again"

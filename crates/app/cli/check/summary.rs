@@ -19,7 +19,7 @@ use crate::memory_limit;
 use crate::morph::{self, MotionSummary};
 use crate::output::OlderRun;
 use crate::setup::{Purpose, Setup, set_up_watched};
-use fluxmorph_optimizer::stage::Told;
+use fluxmorph_optimizer::problem::Progress;
 
 /// What `check` found.
 #[derive(Debug, Serialize)]
@@ -135,9 +135,9 @@ pub(super) fn summary<'a>(
     config: &'a Config,
     source: &Source,
     older: OlderRun,
-    told: Told<'_>,
+    progress: &mut dyn Progress,
 ) -> Result<Summary<'a>, Error> {
-    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, None, told)?;
+    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, None, progress)?;
     memory_limit::check_problem(of_evaluation(&setup.problem), source, older)?;
     let motions = morph::inspected(config, source)?;
     let mesh = &setup.full_mesh;
@@ -154,7 +154,7 @@ pub(super) fn summary<'a>(
             thickness_in_skin_depths: audited.audit.thickness_in_skin_depths,
         })
         .collect();
-    let reference = problem.original.topology();
+    let reference = problem.original().topology();
     let mut warnings = advice(config, &setup);
     warnings.splice(0..0, setup.warnings.iter().cloned());
     Ok(Summary {
@@ -171,16 +171,16 @@ pub(super) fn summary<'a>(
         order: config.analysis.order.into(),
         nodes: reference.node_count(),
         tets: reference.tets().len(),
-        unknowns: problem.states.iter().map(|model| model.unknown_count()).sum(),
-        elastic_equations: problem.shape.as_ref().map_or(0, |shape| shape.motion.map().equation_count()),
-        design_variables: problem.shape.as_ref().map_or(0, |shape| shape.surface.variable_count()),
+        unknowns: problem.states().iter().map(|model| model.unknown_count()).sum(),
+        elastic_equations: problem.shape().map_or(0, |shape| shape.motion().map().equation_count()),
+        design_variables: problem.shape().map_or(0, |shape| shape.surface().variable_count()),
         bounding_box_m: mesh.bounding_box(),
         regions: regions(config, mesh),
         surfaces: surfaces(mesh)?,
         quality: quality(&setup),
         skin,
         motions,
-        linear_solvers: problem.states.iter().map(FieldModel::method_name).collect(),
+        linear_solvers: problem.states().iter().map(FieldModel::method_name).collect(),
         coils: &config.coils,
         boundaries: &config.boundaries,
         objective: config.objective.as_ref(),
@@ -251,7 +251,7 @@ fn surfaces(mesh: &Mesh) -> Result<Vec<SurfaceSummary>, Error> {
 
 fn quality(setup: &Setup) -> QualitySummary {
     let problem = &setup.problem;
-    let quality = problem.quality(&problem.original);
+    let quality = problem.quality(problem.original());
     let [poor, fair, good] = quality.shares();
     QualitySummary {
         of: if problem.moving_elements().is_empty() { "mesh" } else { "remesh region" },

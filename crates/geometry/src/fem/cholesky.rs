@@ -55,7 +55,7 @@ impl CholeskyAnalysis {
         dofs: &DofMap<C>,
     ) -> Result<Arc<Self>, MeshError> {
         let order = ordering::nested_dissection_of_nodes(structure, dofs);
-        Self::with_order(structure, order.map(|order| ordering::postordered(structure, order)))
+        Self::with_order(structure, order.map(|order| ordering::postorder(structure, order)))
     }
 
     /// Analyses a structurally symmetric pattern in a given postordered elimination order, `order[new] = old`; by minimum
@@ -69,7 +69,7 @@ impl CholeskyAnalysis {
     ) -> Result<Arc<Self>, MeshError> {
         let n = structure.row_count();
         let symbolic_matrix = symbolic_matrix(structure);
-        let inverse = order.as_ref().map(|forward| ordering::inverted(forward));
+        let inverse = order.as_ref().map(|forward| ordering::inverse_permutation(forward));
         let ordering = match (&order, &inverse) {
             (Some(forward), Some(inverse)) => {
                 SymmetricOrdering::Custom(PermRef::new_checked(forward, inverse, n))

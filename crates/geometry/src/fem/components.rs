@@ -80,7 +80,7 @@ impl ComponentAnalysis {
                     let restricted = order.as_ref().map(|nodes| {
                         let own_equations = nodes.iter().filter_map(|&node| dofs.equation(node, c));
                         let forward = own_equations.map(|equation| local[equation]).collect();
-                        ordering::postordered(&own, forward)
+                        ordering::postorder(&own, forward)
                     });
                     let analysis = CholeskyAnalysis::with_order(&own, restricted)?;
                     (own, analysis)
@@ -178,7 +178,7 @@ impl ComponentPreconditioner {
     /// If a vector has another length than the system.
     pub fn apply(&self, r: &[f64], z: &mut [f64]) {
         let solved: Vec<Vec<f64>> =
-            self.groups.par_iter().map(|group| group.solved(&self.analysis.blocks, r)).collect();
+            self.groups.par_iter().map(|group| group.solve(&self.analysis.blocks, r)).collect();
         for (group, solved) in self.groups.iter().zip(solved) {
             let equations = group.members.iter().flat_map(|&b| &self.analysis.blocks[b].equations);
             for (&equation, value) in equations.zip(solved) {
@@ -214,7 +214,7 @@ impl GroupFactor {
     }
 
     /// The solutions of all members, one after the other.
-    fn solved(&self, blocks: &[Block], r: &[f64]) -> Vec<f64> {
+    fn solve(&self, blocks: &[Block], r: &[f64]) -> Vec<f64> {
         let scales = || self.scale.iter().cycle();
         let equations = self.members.iter().flat_map(|&b| &blocks[b].equations);
         let scaled = equations.zip(scales()).map(|(&equation, d)| d * r[equation as usize]);

@@ -7,21 +7,21 @@
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::{amd, cholesky::simplicial, qr};
+use fluxmorph_petsc::metis;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
 use crate::ids::NodeId;
-use crate::metis;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
     let dissection = dissection(structure)?;
-    Some(postordered(structure, dissection))
+    Some(postorder(structure, dissection))
 }
 
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
-    metis::dissected(structure, None)
+    metis::nested_dissection(&structure.row_starts, &structure.columns, None)
 }
 
 /// Nested dissection of the *nodes*, expanded to their unknowns; not postordered, `forward[new] = old`.
@@ -36,7 +36,7 @@ pub fn nested_dissection_of_nodes<const C: usize>(
     let (nodes, graph) = node_graph(structure, dofs);
     let unknowns = |node: NodeId| (0..C).filter_map(move |c| dofs.equation(node, c));
     let weights: Vec<i32> = nodes.iter().map(|&node| unknowns(node).count() as i32).collect();
-    let order = metis::dissected(&graph, Some(weights))?;
+    let order = metis::nested_dissection(&graph.row_starts, &graph.columns, Some(weights))?;
     Some(order.iter().flat_map(|&i| unknowns(nodes[i as usize])).map(|equation| equation as u32).collect())
 }
 
@@ -79,7 +79,7 @@ fn node_graph<const C: usize>(structure: &CsrStructure, dofs: &DofMap<C>) -> (Ve
 }
 
 /// The inverse permutation: `inverse[old] = new`.
-pub fn inverted(forward: &[u32]) -> Vec<u32> {
+pub fn inverse_permutation(forward: &[u32]) -> Vec<u32> {
     let mut inverse = vec![0u32; forward.len()];
     for (new, &old) in forward.iter().enumerate() {
         inverse[old as usize] = new as u32;
@@ -119,9 +119,9 @@ pub(super) fn upper_triangle(
 }
 
 /// An ordering with the same fill whose elimination tree is postordered.
-pub fn postordered(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
+pub fn postorder(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
     let n = forward.len();
-    let inverse = inverted(&forward);
+    let inverse = inverse_permutation(&forward);
     let (starts, rows) = upper_triangle(structure, &forward, &inverse);
     let upper = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
     let mut tree = vec![0i32; n];
@@ -181,7 +181,7 @@ mod tests {
         }
         let structure = CsrStructure { column_count: dofs.count(), row_starts, columns };
         let order = nested_dissection_of_nodes(&structure, &dofs).expect("METIS orders a ring");
-        let inverse = inverted(&order);
+        let inverse = inverse_permutation(&order);
         for node in (0..n).map(NodeId::new) {
             if let (Some(first), Some(second)) = (dofs.equation(node, 0), dofs.equation(node, 1)) {
                 assert_eq!(inverse[first] + 1, inverse[second]);

@@ -66,7 +66,7 @@ impl Coupling {
     }
 
     /// The pairs whose row bit and column bit are set.
-    fn restricted(self, rows: u16, columns: u16) -> Self {
+    fn restrict(self, rows: u16, columns: u16) -> Self {
         let mut bits = 0;
         for i in 0..4 {
             if rows >> i & 1 == 1 {
@@ -371,7 +371,7 @@ fn blocks_of<const C: usize>(
         let coupling = same
             .iter()
             .fold(Coupling::NONE, |set, &(_, c)| set.union(c))
-            .restricted(row_bits, columns.unknown_bits(node));
+            .restrict(row_bits, columns.unknown_bits(node));
         if coupling == Coupling::NONE {
             continue;
         }
@@ -401,7 +401,7 @@ mod tests {
         assert_eq!(set.row(0), 0b1001);
         assert_eq!(set.row(3), 0);
         assert_eq!(Coupling::full(4), Coupling(u16::MAX));
-        assert_eq!(set.restricted(0b0001, 0b1111), Coupling::NONE.with(0, 0).with(0, 3));
-        assert_eq!(set.restricted(0b1111, 0b0100), Coupling::NONE.with(2, 2));
+        assert_eq!(set.restrict(0b0001, 0b1111), Coupling::NONE.with(0, 0).with(0, 3));
+        assert_eq!(set.restrict(0b1111, 0b0100), Coupling::NONE.with(2, 2));
     }
 }

@@ -26,7 +26,7 @@ impl Default for BlockParameters {
 /// A block of one region `block`, its outer faces the surfaces `x_min` … `z_max`.
 ///
 /// # Errors
-/// [`MeshError::Parameter`] names `mesh.block.size` or `mesh.block.cells`.
+/// [`MeshError::Parameter`] names `block.size` or `block.cells`.
 pub fn block(parameters: &BlockParameters) -> Result<Mesh, MeshError> {
     let grid = grid(parameters)?;
     let topology = grid.topology(&["block"], |_| RegionId(0))?;
@@ -47,20 +47,20 @@ fn grid(parameters: &BlockParameters) -> Result<Grid, MeshError> {
     let BlockParameters { size, cells } = *parameters;
     if !size.iter().all(|s| *s > 0.0 && s.is_finite()) {
         return Err(MeshError::Parameter {
-            parameter: "mesh.block.size",
+            parameter: "block.size",
             value: format!("{size:?} m"),
             expected: "all three edge lengths must be positive and finite".into(),
         });
     }
     if cells.contains(&0) {
         return Err(MeshError::Parameter {
-            parameter: "mesh.block.cells",
+            parameter: "block.cells",
             value: format!("{cells:?}"),
             expected: "at least one cell is needed along every axis".into(),
         });
     }
-    check_size("mesh.block.cells", cells)?;
-    Grid::new("mesh.block.size", [0, 1, 2].map(|d| equal_parts([0.0, size[d]], cells[d])))
+    check_size("block.cells", cells)?;
+    Grid::new("block.size", [0, 1, 2].map(|d| equal_parts([0.0, size[d]], cells[d])))
 }
 
 #[cfg(test)]
@@ -85,10 +85,10 @@ mod tests {
             Err(MeshError::Parameter { parameter, .. }) => parameter,
             other => panic!("{other:?}"),
         };
-        assert_eq!(refused([1.0, 0.0, 1.0], [1; 3]), "mesh.block.size");
-        assert_eq!(refused([1.0, f64::NAN, 1.0], [1; 3]), "mesh.block.size");
-        assert_eq!(refused([1.0; 3], [1, 0, 1]), "mesh.block.cells");
-        assert_eq!(refused([1.0; 3], [usize::MAX; 3]), "mesh.block.cells");
-        assert_eq!(refused([1.0; 3], [300; 3]), "mesh.block.cells");
+        assert_eq!(refused([1.0, 0.0, 1.0], [1; 3]), "block.size");
+        assert_eq!(refused([1.0, f64::NAN, 1.0], [1; 3]), "block.size");
+        assert_eq!(refused([1.0; 3], [1, 0, 1]), "block.cells");
+        assert_eq!(refused([1.0; 3], [usize::MAX; 3]), "block.cells");
+        assert_eq!(refused([1.0; 3], [300; 3]), "block.cells");
     }
 }

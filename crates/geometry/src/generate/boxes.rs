@@ -78,7 +78,7 @@ pub struct BoxesParameters {
 /// named patches, whose triangles point outwards, and between two regions out of the later one.
 ///
 /// # Errors
-/// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.boxes.…`).
+/// [`MeshError::Parameter`] names the parameter (`boxes.…`).
 pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
     let grid = grid(parameters)?;
 
@@ -101,7 +101,7 @@ pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
         let triangles = patch_triangles(patch, &topology, &points, tolerance(parameters));
         if triangles.is_empty() {
             return Err(MeshError::Parameter {
-                parameter: "mesh.boxes.surfaces",
+                parameter: "boxes.surfaces",
                 value: format!("`{}` in {:?} m", patch.name, patch.corners),
                 expected: "no face between regions and no outer face lies there; a patch must hold some"
                     .into(),
@@ -127,11 +127,11 @@ fn grid(parameters: &BoxesParameters) -> Result<Grid, MeshError> {
     let axis_lines = |axis| {
         let ends = parameters.corners.map(|corner| corner[axis]);
         let growth = parameters.growth.powf(1.0 / parameters.refinement);
-        sizing::lines("mesh.boxes", ends, &limits(parameters, axis), growth)
+        sizing::lines("boxes", ends, &limits(parameters, axis), growth)
     };
     let lines = [axis_lines(0)?, axis_lines(1)?, axis_lines(2)?];
-    check_size("mesh.boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
-    Grid::new("mesh.boxes", lines)
+    check_size("boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
+    Grid::new("boxes", lines)
 }
 
 /// Lengths below this are rounding of decimal lengths [m].
@@ -145,11 +145,11 @@ fn check(p: &BoxesParameters) -> Result<(), MeshError> {
     let [lower, upper] = p.corners;
     if !(0..3).all(|d| lower[d] < upper[d] && lower[d].is_finite() && upper[d].is_finite()) {
         let expected = "the lower corner first, below the upper corner in x, y and z".to_owned();
-        return refuse("mesh.boxes.box", format!("{:?} m", p.corners), expected);
+        return refuse("boxes.box", format!("{:?} m", p.corners), expected);
     }
     if !(p.refinement > 0.0 && p.refinement.is_finite()) {
         let expected = "a positive number".to_owned();
-        return refuse("mesh.boxes.refinement", p.refinement.to_string(), expected);
+        return refuse("boxes.refinement", p.refinement.to_string(), expected);
     }
     let room = tolerance(p);
     let within = |corners: &Corners| {
@@ -159,18 +159,18 @@ fn check(p: &BoxesParameters) -> Result<(), MeshError> {
         let volume = (0..3).all(|d| region.corners[0][d] < region.corners[1][d]);
         if !(volume && within(&region.corners)) {
             return refuse(
-                "mesh.boxes.regions",
+                "boxes.regions",
                 format!("`{}` from {:?} to {:?} m", region.name, region.corners[0], region.corners[1]),
                 format!("a box with a volume within {lower:?} to {upper:?} m"),
             );
         }
         if region.cells.is_some_and(|cells| cells.contains(&0)) {
             let expected = "at least one observation cell along every axis".to_owned();
-            return refuse("mesh.boxes.regions", format!("`{}`: {:?}", region.name, region.cells), expected);
+            return refuse("boxes.regions", format!("`{}`: {:?}", region.name, region.cells), expected);
         }
     }
     if let Some(size) = p.sizes.iter().find(|size| size.axis > 2) {
-        return refuse("mesh.boxes.sizes", format!("axis {}", size.axis), "axis 0, 1 or 2".into());
+        return refuse("boxes.sizes", format!("axis {}", size.axis), "axis 0, 1 or 2".into());
     }
     Ok(())
 }
@@ -228,7 +228,7 @@ fn observation_cells<'a>(
                     cell.retain(|e| topology.region_of()[e.index()] == id_of[region.name.as_str()]);
                     if cell.is_empty() {
                         return Err(MeshError::Parameter {
-                            parameter: "mesh.boxes.regions",
+                            parameter: "boxes.regions",
                             value: format!("`{}` with cells = {counts:?}", region.name),
                             expected: "a later box covers one of its observation cells; move one of them"
                                 .into(),
@@ -339,7 +339,7 @@ mod tests {
         close(area(&mesh, "ground"), [0.0, 0.0, -400.0]);
         parameters.surfaces = vec![patch("nowhere", [[5.0; 3], [6.0; 3]])];
         let refused = boxes(&parameters).expect_err("no face lies there").to_string();
-        assert!(refused.contains("mesh.boxes.surfaces") && refused.contains("`nowhere`"), "{refused}");
+        assert!(refused.contains("boxes.surfaces") && refused.contains("`nowhere`"), "{refused}");
     }
 
     #[test]
@@ -386,15 +386,15 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         };
-        assert_eq!(refused(&|p| p.corners[1][2] = -10.0), "mesh.boxes.box");
-        assert_eq!(refused(&|p| p.corners[1][2] = f64::NAN), "mesh.boxes.box");
-        assert_eq!(refused(&|p| p.refinement = 0.0), "mesh.boxes.refinement");
-        assert_eq!(refused(&|p| p.growth = 1.0), "mesh.boxes");
-        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = 11.0), "mesh.boxes.regions");
-        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = -3.0), "mesh.boxes.regions");
-        assert_eq!(refused(&|p| p.regions[0].cells = Some([1, 0, 1])), "mesh.boxes.regions");
-        assert_eq!(refused(&|p| p.regions[0].size[0] = 1e-4), "mesh.boxes");
+        assert_eq!(refused(&|p| p.corners[1][2] = -10.0), "boxes.box");
+        assert_eq!(refused(&|p| p.corners[1][2] = f64::NAN), "boxes.box");
+        assert_eq!(refused(&|p| p.refinement = 0.0), "boxes.refinement");
+        assert_eq!(refused(&|p| p.growth = 1.0), "boxes");
+        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = 11.0), "boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].corners[1][0] = -3.0), "boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].cells = Some([1, 0, 1])), "boxes.regions");
+        assert_eq!(refused(&|p| p.regions[0].size[0] = 1e-4), "boxes");
         let far = AxisSize { axis: 3, limit: SizeLimit { interval: [0.0; 2], size: 1.0 } };
-        assert_eq!(refused(&|p| p.sizes = vec![far]), "mesh.boxes.sizes");
+        assert_eq!(refused(&|p| p.sizes = vec![far]), "boxes.sizes");
     }
 }

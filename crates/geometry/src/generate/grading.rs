@@ -156,7 +156,7 @@ pub fn skin(
 }
 
 /// Every interval between neighbouring lines in `parts` equal parts.
-pub fn subdivided(lines: &[f64], parts: usize) -> Vec<f64> {
+pub fn subdivide(lines: &[f64], parts: usize) -> Vec<f64> {
     let mut refined: Vec<f64> = lines
         .windows(2)
         .flat_map(|pair| {
@@ -170,7 +170,7 @@ pub fn subdivided(lines: &[f64], parts: usize) -> Vec<f64> {
 }
 
 /// Sorted lines without doubles: of lines closer than `tolerance` [m] the one given first stays.
-pub fn merged(lines: &[f64], tolerance: f64) -> Vec<f64> {
+pub fn merge(lines: &[f64], tolerance: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..lines.len()).collect();
     order.sort_by(|&a, &b| lines[a].total_cmp(&lines[b]));
     order
@@ -216,7 +216,7 @@ fn too_many(parameter: &'static str, size: f64) -> MeshError {
 mod tests {
     use super::*;
 
-    const NAME: &str = "mesh.test";
+    const NAME: &str = "test.size";
 
     #[test]
     fn uniform_lines_come_nearest_to_the_size_and_keep_the_ends() {
@@ -253,8 +253,8 @@ mod tests {
         assert_eq!(lines, [-4.0, -3.5, 0.0, 3.5, 4.0]);
         let lines = skin(NAME, [0.0, 8.0], Skin::AtEnd, &[0.5, 4.0]).expect("fits");
         assert_eq!(lines, [0.0, 4.0, 7.5, 8.0]);
-        assert_eq!(subdivided(&[0.0, 1.0, 3.0], 2), [0.0, 0.5, 1.0, 2.0, 3.0]);
-        assert_eq!(merged(&[2.0, 1.0, 1.0 + 1e-12], 1e-9), [1.0, 2.0]);
+        assert_eq!(subdivide(&[0.0, 1.0, 3.0], 2), [0.0, 0.5, 1.0, 2.0, 3.0]);
+        assert_eq!(merge(&[2.0, 1.0, 1.0 + 1e-12], 1e-9), [1.0, 2.0]);
     }
 
     #[test]

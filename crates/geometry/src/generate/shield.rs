@@ -111,7 +111,7 @@ const OBSERVATION: RegionId = RegionId(3);
 /// `observation` has one cell per block, `y` fast.
 ///
 /// # Errors
-/// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.shield.…`).
+/// [`MeshError::Parameter`] names the parameter (`shield.…`).
 pub fn shield(parameters: &ShieldParameters) -> Result<Mesh, MeshError> {
     let grid = grid(parameters)?;
     let mut topology = grid.topology(&REGIONS, |centre| region_at(parameters, centre))?;
@@ -140,7 +140,7 @@ impl ShieldParameters {
 fn grid(parameters: &ShieldParameters) -> Result<Grid, MeshError> {
     shield_checks::check(parameters)?;
     let [x, y] = [horizontal_lines(parameters, 0)?, horizontal_lines(parameters, 1)?];
-    Grid::new("mesh.shield.refinement", [x, y, vertical_lines(parameters)?])
+    Grid::new("shield.refinement", [x, y, vertical_lines(parameters)?])
 }
 
 fn region_at(p: &ShieldParameters, [x, y, z]: Point) -> RegionId {
@@ -196,7 +196,7 @@ impl Sizes {
 }
 
 /// Lines of every interval between neighbouring breakpoints, joined.
-fn joined(
+fn join(
     breakpoints: &[f64],
     mut interval: impl FnMut([f64; 2]) -> Result<Vec<f64>, MeshError>,
 ) -> Result<Vec<f64>, MeshError> {
@@ -215,7 +215,7 @@ fn between(breakpoints: &[f64], [low, high]: [f64; 2], tolerance: f64) -> Vec<f6
 
 /// Lines along x (`axis` 0) or y (1).
 fn horizontal_lines(p: &ShieldParameters, axis: usize) -> Result<Vec<f64>, MeshError> {
-    const IN_PLANE: &str = "mesh.shield.in_plane_size";
+    const IN_PLANE: &str = "shield.in_plane_size";
     let sizes = Sizes::of(p);
     let (edge, remesh, outer) = (p.plate[axis], p.remesh_upper[axis], p.outer[axis]);
     let tolerance = shield_checks::tolerance(p);
@@ -225,13 +225,13 @@ fn horizontal_lines(p: &ShieldParameters, axis: usize) -> Result<Vec<f64>, MeshE
 
     let mut breakpoints = grading::equal_parts([0.0, edge], (edge / p.pitch).round() as usize);
     breakpoints.extend([remesh, outer]);
-    breakpoints.extend(grading::skin("mesh.shield.side_skin", [0.0, edge], Skin::AtEnd, &p.side_skin)?);
+    breakpoints.extend(grading::skin("shield.side_skin", [0.0, edge], Skin::AtEnd, &p.side_skin)?);
     breakpoints.extend(grading::equal_parts(observed, box_.cells[axis]));
     breakpoints.extend([inner_coil, inner_coil + p.coil_width]);
-    let breakpoints = grading::merged(&breakpoints, tolerance);
+    let breakpoints = grading::merge(&breakpoints, tolerance);
 
     let skin_start = edge - p.side_skin.last().copied().unwrap_or(0.0) - tolerance;
-    let mut lines = joined(&between(&breakpoints, [0.0, edge], tolerance), |interval| {
+    let mut lines = join(&between(&breakpoints, [0.0, edge], tolerance), |interval| {
         if interval[0] >= skin_start {
             Ok(grading::equal_parts(interval, sizes.skin_parts))
         } else {
@@ -240,10 +240,10 @@ fn horizontal_lines(p: &ShieldParameters, axis: usize) -> Result<Vec<f64>, MeshE
     })?;
     let beside = between(&breakpoints, [edge, remesh], tolerance);
     let beside = if p.side_skin.is_empty() {
-        joined(&beside, |interval| grading::uniform(IN_PLANE, interval, sizes.in_plane))?
+        join(&beside, |interval| grading::uniform(IN_PLANE, interval, sizes.in_plane))?
     } else {
         let growth = Growth { first: sizes.side_air, ratio: sizes.growth, largest: sizes.in_plane };
-        grading::growing("mesh.shield.side_air", &beside, Fine::Start, growth)?
+        grading::growing("shield.side_air", &beside, Fine::Start, growth)?
     };
     lines.extend(&beside[1..]);
     let far = between(&breakpoints, [remesh, outer], tolerance);
@@ -253,7 +253,7 @@ fn horizontal_lines(p: &ShieldParameters, axis: usize) -> Result<Vec<f64>, MeshE
 
 /// Lines along z.
 fn vertical_lines(p: &ShieldParameters) -> Result<Vec<f64>, MeshError> {
-    const IN_PLANE: &str = "mesh.shield.in_plane_size";
+    const IN_PLANE: &str = "shield.in_plane_size";
     let sizes = Sizes::of(p);
     let tolerance = shield_checks::tolerance(p);
     let observed = p.observation.z;
@@ -262,21 +262,21 @@ fn vertical_lines(p: &ShieldParameters) -> Result<Vec<f64>, MeshError> {
     let mut breakpoints = plate.to_vec();
     breakpoints.extend(p.remesh_z);
     breakpoints.extend(p.outer_z);
-    breakpoints.extend(grading::skin("mesh.shield.skin", plate, Skin::AtBothEnds, &p.skin)?);
+    breakpoints.extend(grading::skin("shield.skin", plate, Skin::AtBothEnds, &p.skin)?);
     breakpoints.extend(observed);
     breakpoints.extend(p.coil_z);
-    let breakpoints = grading::merged(&breakpoints, tolerance);
+    let breakpoints = grading::merge(&breakpoints, tolerance);
     let near = [p.remesh_z[0].min(observed[0]), p.remesh_z[1].max(observed[1]).max(p.coil_z[1])];
 
     let below = between(&breakpoints, [p.outer_z[0], near[0]], tolerance);
     let mut lines = grading::growing(IN_PLANE, &below, Fine::End, sizes.far())?;
-    let middle = joined(&between(&breakpoints, near, tolerance), |interval| {
+    let middle = join(&between(&breakpoints, near, tolerance), |interval| {
         let centre = 0.5 * (interval[0] + interval[1]);
         if plate[0] < centre && centre < plate[1] {
             let parts = if p.skin.is_empty() { 1 } else { sizes.skin_parts };
             Ok(grading::equal_parts(interval, parts))
         } else if p.remesh_z[0] < centre && centre < p.remesh_z[1] {
-            grading::uniform("mesh.shield.air_layer", interval, sizes.air_layer)
+            grading::uniform("shield.air_layer", interval, sizes.air_layer)
         } else {
             grading::uniform(IN_PLANE, interval, sizes.in_plane)
         }

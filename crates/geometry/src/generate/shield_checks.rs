@@ -45,25 +45,25 @@ pub(super) fn check(p: &ShieldParameters) -> Result<(), MeshError> {
 }
 
 fn check_numbers(p: &ShieldParameters) -> Result<(), MeshError> {
-    check_positive("mesh.shield.plate", &p.plate)?;
-    check_positive("mesh.shield.pitch", &[p.pitch])?;
-    check_positive("mesh.shield.coil_half_window", &p.coil_half_window)?;
-    check_positive("mesh.shield.coil_width", &[p.coil_width])?;
-    check_positive("mesh.shield.remesh_upper", &p.remesh_upper)?;
-    check_positive("mesh.shield.outer", &p.outer)?;
-    check_positive("mesh.shield.in_plane_size", &[p.in_plane_size])?;
-    check_positive("mesh.shield.air_layer", &[p.air_layer])?;
-    check_positive("mesh.shield.side_air", &[p.side_air])?;
+    check_positive("shield.plate", &p.plate)?;
+    check_positive("shield.pitch", &[p.pitch])?;
+    check_positive("shield.coil_half_window", &p.coil_half_window)?;
+    check_positive("shield.coil_width", &[p.coil_width])?;
+    check_positive("shield.remesh_upper", &p.remesh_upper)?;
+    check_positive("shield.outer", &p.outer)?;
+    check_positive("shield.in_plane_size", &[p.in_plane_size])?;
+    check_positive("shield.air_layer", &[p.air_layer])?;
+    check_positive("shield.side_air", &[p.side_air])?;
     let gap = tolerance(p);
-    check_ascending("mesh.shield.coil_z", p.coil_z, gap)?;
-    check_ascending("mesh.shield.remesh_z", p.remesh_z, gap)?;
-    check_ascending("mesh.shield.outer_z", p.outer_z, gap)?;
-    check_ascending("mesh.shield.observation_x", p.observation.x, gap)?;
-    check_ascending("mesh.shield.observation_y", p.observation.y, gap)?;
-    check_ascending("mesh.shield.observation_z", p.observation.z, gap)?;
+    check_ascending("shield.coil_z", p.coil_z, gap)?;
+    check_ascending("shield.remesh_z", p.remesh_z, gap)?;
+    check_ascending("shield.outer_z", p.outer_z, gap)?;
+    check_ascending("shield.observation_x", p.observation.x, gap)?;
+    check_ascending("shield.observation_y", p.observation.y, gap)?;
+    check_ascending("shield.observation_z", p.observation.z, gap)?;
     if !(1.0..=100.0).contains(&p.growth) {
         return Err(refuse(
-            "mesh.shield.growth",
+            "shield.growth",
             p.growth,
             "a ratio between 1 and 100 is needed; 1.6 is usual",
         ));
@@ -72,7 +72,7 @@ fn check_numbers(p: &ShieldParameters) -> Result<(), MeshError> {
     if !(least..=most).contains(&p.refinement) {
         let expected =
             format!("a number from {least} to {most} is needed; 1 is the default mesh, 2 halves all sizes");
-        return Err(refuse("mesh.shield.refinement", p.refinement, &expected));
+        return Err(refuse("shield.refinement", p.refinement, &expected));
     }
     Ok(())
 }
@@ -83,7 +83,7 @@ fn check_pitch(p: &ShieldParameters) -> Result<(), MeshError> {
         // 1e-6 of a pitch is far beyond the rounding of decimal lengths and far below any intended remainder.
         if nodes.round() < 1.0 || nodes > NODES_LIMIT || (nodes - nodes.round()).abs() > 1e-6 {
             return Err(refuse(
-                "mesh.shield.pitch",
+                "shield.pitch",
                 p.pitch,
                 &format!(
                     "it must divide the plate's half length {extent} m into 1 to {NODES_LIMIT} whole parts"
@@ -101,7 +101,7 @@ fn check_skins(p: &ShieldParameters) -> Result<(), MeshError> {
     let deepest = |depths: &[f64]| depths.last().copied().unwrap_or(0.0);
     if !ascending(&p.skin) || deepest(&p.skin) > 0.5 * p.plate[2] + tolerance(p) {
         return Err(refuse(
-            "mesh.shield.skin",
+            "shield.skin",
             &p.skin,
             "depths under the plate's faces must be positive, ascending and at most half its thickness; leave lines out \
              or order them",
@@ -110,7 +110,7 @@ fn check_skins(p: &ShieldParameters) -> Result<(), MeshError> {
     let narrow = p.plate[0].min(p.plate[1]);
     if !ascending(&p.side_skin) || deepest(&p.side_skin) >= narrow - tolerance(p) {
         return Err(refuse(
-            "mesh.shield.side_skin",
+            "shield.side_skin",
             &p.side_skin,
             "depths under the plate's sides must be positive, ascending and less than its half lengths; leave lines out \
              or order them",
@@ -123,14 +123,14 @@ fn check_nesting(p: &ShieldParameters) -> Result<(), MeshError> {
     let gap = tolerance(p);
     if (0..2).any(|d| p.remesh_upper[d] <= p.plate[d] + gap) {
         return Err(refuse(
-            "mesh.shield.remesh_upper",
+            "shield.remesh_upper",
             p.remesh_upper,
             &format!("the remesh region must reach beyond the plate's half lengths {:?} m", &p.plate[..2]),
         ));
     }
     if p.remesh_z[0] >= -p.plate[2] - gap || p.remesh_z[1] <= gap {
         return Err(refuse(
-            "mesh.shield.remesh_z",
+            "shield.remesh_z",
             p.remesh_z,
             &format!(
                 "the remesh region must reach below and above the plate, which lies from {} m to 0",
@@ -140,7 +140,7 @@ fn check_nesting(p: &ShieldParameters) -> Result<(), MeshError> {
     }
     if p.coil_z[0] < 0.0 {
         return Err(refuse(
-            "mesh.shield.coil_z",
+            "shield.coil_z",
             p.coil_z,
             "the coil must lie above the plate, that is, above 0",
         ));
@@ -151,14 +151,14 @@ fn check_nesting(p: &ShieldParameters) -> Result<(), MeshError> {
     };
     if beyond(0) || beyond(1) {
         return Err(refuse(
-            "mesh.shield.outer",
+            "shield.outer",
             p.outer,
             "the whole box must reach beyond the remesh region and the coil; enlarge it",
         ));
     }
     if p.outer_z[0] >= p.remesh_z[0] - gap || p.outer_z[1] <= p.remesh_z[1].max(p.coil_z[1]) + gap {
         return Err(refuse(
-            "mesh.shield.outer_z",
+            "shield.outer_z",
             p.outer_z,
             "the whole box must reach below and above the remesh region and the coil; enlarge it",
         ));
@@ -170,27 +170,27 @@ fn check_observation(p: &ShieldParameters) -> Result<(), MeshError> {
     let (box_, gap) = (&p.observation, tolerance(p));
     if box_.cells.iter().any(|&n| n == 0 || n as f64 > NODES_LIMIT) {
         let expected = format!("1 to {NODES_LIMIT} cells are needed along x and along y");
-        return Err(refuse("mesh.shield.observation_cells", box_.cells, &expected));
+        return Err(refuse("shield.observation_cells", box_.cells, &expected));
     }
     let inside =
         "the observation area must lie inside the whole box and on the meshed side of the symmetry planes";
     if box_.x[0] < 0.0 || box_.x[1] >= p.outer[0] - gap {
-        return Err(refuse("mesh.shield.observation_x", box_.x, inside));
+        return Err(refuse("shield.observation_x", box_.x, inside));
     }
     if box_.y[0] < 0.0 || box_.y[1] >= p.outer[1] - gap {
-        return Err(refuse("mesh.shield.observation_y", box_.y, inside));
+        return Err(refuse("shield.observation_y", box_.y, inside));
     }
     if box_.z[0] <= p.outer_z[0] + gap || box_.z[1] >= p.outer_z[1] - gap {
-        return Err(refuse("mesh.shield.observation_z", box_.z, inside));
+        return Err(refuse("shield.observation_z", box_.z, inside));
     }
     let beside = box_.x[0] >= p.remesh_upper[0] - gap || box_.y[0] >= p.remesh_upper[1] - gap;
     let apart = box_.z[1] <= p.remesh_z[0] + gap || box_.z[0] >= p.remesh_z[1] - gap;
     if !beside && !apart {
         return Err(refuse(
-            "mesh.shield.observation_z",
+            "shield.observation_z",
             box_.z,
             &format!(
-                "it overlaps the remesh region, mesh.shield.remesh_z = {:?} m: observation cells must not move; separate \
+                "it overlaps the remesh region, remesh_z = {:?} m: observation cells must not move; separate \
                  the two along z",
                 p.remesh_z
             ),

@@ -57,7 +57,7 @@ pub fn lines(
     }
     let mut breakpoints = vec![start, end];
     breakpoints.extend(limits.iter().flat_map(|limit| limit.interval));
-    let breakpoints = grading::merged(&breakpoints, tolerance);
+    let breakpoints = grading::merge(&breakpoints, tolerance);
 
     let mut lines = vec![start];
     for pair in breakpoints.windows(2) {
@@ -156,7 +156,7 @@ mod tests {
 
     use super::*;
 
-    const NAME: &str = "mesh.test";
+    const NAME: &str = "test.size";
 
     fn limit(low: f64, high: f64, size: f64) -> SizeLimit {
         SizeLimit { interval: [low, high], size }

@@ -75,7 +75,7 @@ const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0,
 /// `outer`, oriented outwards; `sphere` and, of a hollow one, `cavity`, oriented out of the region `sphere`.
 ///
 /// # Errors
-/// [`MeshError::Parameter`] names the parameter as in the configuration (`mesh.sphere.…`).
+/// [`MeshError::Parameter`] names the parameter (`sphere.…`).
 pub fn sphere(parameters: &SphereParameters) -> Result<Mesh, MeshError> {
     let (n, radii) = shells(parameters)?;
     let numbering = Numbering { n };
@@ -238,12 +238,12 @@ fn direction(index: [usize; 3], m: usize) -> Point {
 
 /// Radii of all shells, from the centre to the outside [m]; the first `n + 1` are those of the core.
 fn radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
-    const SKIN: &str = "mesh.sphere.skin";
+    const SKIN: &str = "sphere.skin";
     let parts = (p.refinement.round() as usize).max(1);
     let wall = match (p.inner_radius, p.skin.last()) {
         (Some(inner), Some(_)) => {
             let lines = grading::skin(SKIN, [inner, p.radius], Skin::AtBothEnds, &p.skin)?;
-            grading::subdivided(&lines, parts)
+            grading::subdivide(&lines, parts)
         }
         (Some(inner), None) => {
             let layers = (p.wall_layers as f64 * p.refinement).round().max(1.0);
@@ -251,7 +251,7 @@ fn radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
         }
         (None, Some(_)) => {
             let lines = grading::skin(SKIN, [0.0, p.radius], Skin::AtEnd, &p.skin)?;
-            grading::subdivided(&lines[1..], parts)
+            grading::subdivide(&lines[1..], parts)
         }
         (None, None) => vec![p.radius],
     };
@@ -276,7 +276,7 @@ fn air_radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
     while reached.is_empty() || room - sum > 0.5 * layer {
         if reached.len() == LINES_LIMIT {
             return Err(MeshError::Parameter {
-                parameter: "mesh.sphere.air_layer",
+                parameter: "sphere.air_layer",
                 value: format!("{layer} m"),
                 expected: format!("at most {LINES_LIMIT} layers are made; use thicker ones"),
             });
@@ -297,30 +297,30 @@ fn check(p: &SphereParameters) -> Result<(), MeshError> {
     };
     let positive = |value: f64| value > 0.0 && value.is_finite();
     if !positive(p.radius) {
-        return refuse("mesh.sphere.radius", format!("{} m", p.radius), "a positive radius");
+        return refuse("sphere.radius", format!("{} m", p.radius), "a positive radius");
     }
     if let Some(inner) = p.inner_radius.filter(|&inner| !(positive(inner) && inner < p.radius)) {
         let expected = format!("a positive radius below that of the sphere, {} m", p.radius);
-        return refuse("mesh.sphere.inner_radius", format!("{inner} m"), &expected);
+        return refuse("sphere.inner_radius", format!("{inner} m"), &expected);
     }
     if !(p.outer_radius.is_finite() && p.outer_radius > p.radius) {
         let expected = format!("a radius beyond that of the sphere, {} m", p.radius);
-        return refuse("mesh.sphere.outer_radius", format!("{} m", p.outer_radius), &expected);
+        return refuse("sphere.outer_radius", format!("{} m", p.outer_radius), &expected);
     }
     if p.divisions == 0 {
-        return refuse("mesh.sphere.divisions", "0".into(), "at least one cell");
+        return refuse("sphere.divisions", "0".into(), "at least one cell");
     }
     if p.wall_layers == 0 {
-        return refuse("mesh.sphere.wall_layers", "0".into(), "at least one layer");
+        return refuse("sphere.wall_layers", "0".into(), "at least one layer");
     }
     if let Some(layer) = p.air_layer.filter(|&layer| !positive(layer)) {
-        return refuse("mesh.sphere.air_layer", format!("{layer} m"), "a positive thickness");
+        return refuse("sphere.air_layer", format!("{layer} m"), "a positive thickness");
     }
     if !(p.growth >= 1.0 && p.growth.is_finite()) {
-        return refuse("mesh.sphere.growth", p.growth.to_string(), "a finite ratio of at least 1");
+        return refuse("sphere.growth", p.growth.to_string(), "a finite ratio of at least 1");
     }
     if !positive(p.refinement) {
-        return refuse("mesh.sphere.refinement", p.refinement.to_string(), "a positive number");
+        return refuse("sphere.refinement", p.refinement.to_string(), "a positive number");
     }
     Ok(())
 }
@@ -334,7 +334,7 @@ fn check_size(n: usize, layers: usize) -> Result<(), MeshError> {
         return Ok(());
     }
     Err(MeshError::Parameter {
-        parameter: "mesh.sphere.divisions",
+        parameter: "sphere.divisions",
         value: format!("{n} with {layers} layers, {tets} tetrahedra"),
         expected: format!("at most {TETS_LIMIT} tetrahedra are made; use fewer divisions"),
     })
@@ -487,17 +487,17 @@ mod tests {
                 other => panic!("{other:?}"),
             }
         };
-        assert_eq!(refused(&|p| p.radius = f64::NAN), "mesh.sphere.radius");
-        assert_eq!(refused(&|p| p.inner_radius = Some(0.06)), "mesh.sphere.inner_radius");
-        assert_eq!(refused(&|p| p.outer_radius = 0.05), "mesh.sphere.outer_radius");
-        assert_eq!(refused(&|p| p.divisions = 0), "mesh.sphere.divisions");
-        assert_eq!(refused(&|p| p.divisions = 10_000), "mesh.sphere.divisions");
-        assert_eq!(refused(&|p| p.skin = vec![0.003]), "mesh.sphere.skin");
-        assert_eq!(refused(&|p| p.wall_layers = 0), "mesh.sphere.wall_layers");
-        assert_eq!(refused(&|p| p.air_layer = Some(0.0)), "mesh.sphere.air_layer");
+        assert_eq!(refused(&|p| p.radius = f64::NAN), "sphere.radius");
+        assert_eq!(refused(&|p| p.inner_radius = Some(0.06)), "sphere.inner_radius");
+        assert_eq!(refused(&|p| p.outer_radius = 0.05), "sphere.outer_radius");
+        assert_eq!(refused(&|p| p.divisions = 0), "sphere.divisions");
+        assert_eq!(refused(&|p| p.divisions = 10_000), "sphere.divisions");
+        assert_eq!(refused(&|p| p.skin = vec![0.003]), "sphere.skin");
+        assert_eq!(refused(&|p| p.wall_layers = 0), "sphere.wall_layers");
+        assert_eq!(refused(&|p| p.air_layer = Some(0.0)), "sphere.air_layer");
         let countless = |p: &mut SphereParameters| (p.air_layer, p.growth) = (Some(1e-12), 1.0);
-        assert_eq!(refused(&countless), "mesh.sphere.air_layer");
-        assert_eq!(refused(&|p| p.growth = 0.5), "mesh.sphere.growth");
-        assert_eq!(refused(&|p| p.refinement = f64::NAN), "mesh.sphere.refinement");
+        assert_eq!(refused(&countless), "sphere.air_layer");
+        assert_eq!(refused(&|p| p.growth = 0.5), "sphere.growth");
+        assert_eq!(refused(&|p| p.refinement = f64::NAN), "sphere.refinement");
     }
 }

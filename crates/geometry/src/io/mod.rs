@@ -13,6 +13,6 @@ pub use pvd::pvd_text;
 pub use regular::open_regular;
 pub use stl::stl_bytes;
 pub use vtu::{
-    ArrayData, Field, VtuArray, VtuContents, VtuPiece, joined, pvtu_pieces, pvtu_text, read_vtu, vtu_bytes,
-    vtu_bytes_at, vtu_contents, write_vtu,
+    ArrayData, Field, VtuArray, VtuContents, VtuPiece, join_pieces, pvtu_pieces, pvtu_text, read_vtu,
+    vtu_bytes, vtu_bytes_at, vtu_contents, write_vtu,
 };

@@ -19,7 +19,7 @@ pub fn pvd_text<'a>(files: impl IntoIterator<Item = (f64, &'a str)>) -> Result<S
         if !time.is_finite() {
             return Err(MeshError::NotFiniteArray { array: "timestep".into(), value: time, position });
         }
-        writeln!(text, "    <DataSet timestep=\"{time}\" group=\"\" part=\"0\" file=\"{}\"/>", escaped(path))
+        writeln!(text, "    <DataSet timestep=\"{time}\" group=\"\" part=\"0\" file=\"{}\"/>", escape(path))
             .expect("writing into a string cannot fail");
     }
     text.push_str("  </Collection>\n</VTKFile>\n");
@@ -27,7 +27,7 @@ pub fn pvd_text<'a>(files: impl IntoIterator<Item = (f64, &'a str)>) -> Result<S
 }
 
 /// Text as the value of an XML attribute in double quotes.
-fn escaped(text: &str) -> String {
+fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

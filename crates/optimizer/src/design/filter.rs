@@ -8,7 +8,7 @@
 //!
 //! Chosen before the Helmholtz filter `(M + r²/12 K) h = M p` (B. S. Lazarov, O. Sigmund, Int. J. Numer. Methods Engrg. 86
 //! (2011) 765–781), because
-//! * rows sum to one and no weight is negative on every triangulation: the heights keep the bounds of the variables. The
+//! * rows sum to one and no weight is negative on every triangulation: the normal_displacements keep the bounds of the variables. The
 //!   Helmholtz filter has this only with a lumped mass and without obtuse triangles;
 //! * the areas make it a quadrature of a convolution: another mesh changes the surface by its error of interpolation only;
 //! * nodes that are mirror images get mirrored rows, and the transpose is that of a sparse matrix.

@@ -3,7 +3,7 @@
 //! `Δx_b = D W p`: `D` holds the directions (one for all, or the surface's normals, see `normal`), `W` the weights of the
 //! variables at every node. A variable is a node of the surface, a point of a control grid (`grid`), or a node seen through
 //! a smoothing filter (`filter`); mirrored variables may be tied to one (`ties`), and the free rim held (`rim`). In every
-//! case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node that stays. So the heights
+//! case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node that stays. So the normal_displacements
 //! keep the bounds of the variables, and the transpose, which takes derivatives at the nodes to those with respect to `p`,
 //! is exact.
 
@@ -20,7 +20,7 @@ use fluxmorph_geometry::tet4::{Point, dot};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 pub use grid::dominant_axis;
-pub use transfer::{Apart, Triangulation};
+pub use transfer::{SurfaceMismatch, Triangulation};
 
 /// Weights of the variables at one node, ascending by variable.
 type Row = Vec<(usize, f64)>;
@@ -298,24 +298,24 @@ impl DesignSurface {
     }
 
     /// How far every node moves along its direction [m] for the variables `p` [m].
-    pub fn heights(&self, p: &[f64]) -> Vec<f64> {
+    pub fn normal_displacements(&self, p: &[f64]) -> Vec<f64> {
         self.rows.iter().map(|row| row.iter().map(|&(k, weight)| weight * p[k]).sum()).collect()
     }
 
     /// `Δx_b = D W p` [m], one displacement per node.
     pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
-        let heights = self.heights(p);
-        heights
+        let normal_displacements = self.normal_displacements(p);
+        normal_displacements
             .iter()
             .zip(&self.directions)
             .map(|(height, direction)| direction.map(|d| height * d))
             .collect()
     }
 
-    /// `Wᵀ g`: from derivatives with respect to the nodes' heights to those with respect to the variables.
-    pub fn height_gradient(&self, heights: &[f64]) -> Vec<f64> {
+    /// `Wᵀ g`: from derivatives with respect to the nodes' normal_displacements to those with respect to the variables.
+    pub fn normal_displacement_gradient(&self, normal_displacements: &[f64]) -> Vec<f64> {
         let mut gradient = vec![0.0; self.variable_count()];
-        for (row, g) in self.rows.iter().zip(heights) {
+        for (row, g) in self.rows.iter().zip(normal_displacements) {
             for &(k, weight) in row {
                 gradient[k] += weight * g;
             }
@@ -326,7 +326,7 @@ impl DesignSurface {
     /// `Wᵀ Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
     pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
         let along: Vec<f64> = self.directions.iter().zip(nodal).map(|(d, g)| dot(*d, *g)).collect();
-        self.height_gradient(&along)
+        self.normal_displacement_gradient(&along)
     }
 }
 

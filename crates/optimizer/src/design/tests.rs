@@ -81,7 +81,7 @@ fn a_bilinear_height_is_reproduced_at_every_node() {
     let surface = plate_surface(&mesh, Some([7, 13]));
     let height = |x: Point| 1e-3 * (1.0 + 3.0 * x[0] - 2.0 * x[1] + 7.0 * x[0] * x[1]);
     let p = values(&surface, height);
-    for (&node, h) in surface.nodes().iter().zip(surface.heights(&p)) {
+    for (&node, h) in surface.nodes().iter().zip(surface.normal_displacements(&p)) {
         assert!((h - height(mesh.point(node))).abs() < 1e-15);
     }
 }
@@ -195,16 +195,16 @@ fn the_filter_keeps_the_bounds_and_sums_to_one() {
 /// Greatest difference between the filtered surfaces of one field on meshes of `cells` and twice as many cells.
 fn mesh_dependence(cells: usize, radius: f64, field: impl Fn(Point) -> f64) -> f64 {
     let (coarse, fine) = (moved_block(cells, |x| x), moved_block(2 * cells, |x| x));
-    let [(nodes, heights), (fine_nodes, fine_heights)] = [&coarse, &fine].map(|mesh| {
+    let [(nodes, normal_displacements), (fine_nodes, fine_heights)] = [&coarse, &fine].map(|mesh| {
         let surface = made(mesh, &quarter(mesh, UP, Control::Filter(radius)));
-        (surface.nodes().to_vec(), surface.heights(&values(&surface, &field)))
+        (surface.nodes().to_vec(), surface.normal_displacements(&values(&surface, &field)))
     });
     let difference = |(node, h): (&NodeId, &f64)| {
         let at = |n: &NodeId| norm(sub(fine.point(*n), coarse.point(*node))) < 1e-9;
         let same = fine_nodes.iter().position(at).expect("every other node of the fine mesh");
         (h - fine_heights[same]).abs()
     };
-    nodes.iter().zip(&heights).map(difference).fold(0.0, f64::max)
+    nodes.iter().zip(&normal_displacements).map(difference).fold(0.0, f64::max)
 }
 
 #[test]
@@ -241,8 +241,8 @@ fn a_quarter_filters_like_the_whole() {
     let full =
         DesignSetup { control: Control::Filter(radius), ..DesignSetup::new(&outward(&whole, "z_max"), UP) };
     let full = made(&whole, &full);
-    let heights = full.heights(&values(&full, field));
-    for (&node, h) in surface.nodes().iter().zip(surface.heights(&values(&surface, field))) {
+    let normal_displacements = full.normal_displacements(&values(&full, field));
+    for (&node, h) in surface.nodes().iter().zip(surface.normal_displacements(&values(&surface, field))) {
         let x = part.point(node);
         // A corner's triangles are not laid symmetrically, so its area is no quarter of a node's inside.
         let corner = |c: f64| c < radius || c > 1.0 - radius;
@@ -251,7 +251,7 @@ fn a_quarter_filters_like_the_whole() {
         }
         let same =
             full.nodes().iter().position(|&n| norm(sub(whole.point(n), x)) < 1e-9).expect("the same nodes");
-        assert!((h - heights[same]).abs() < 1e-12, "{x:?}: {h} {}", heights[same]);
+        assert!((h - normal_displacements[same]).abs() < 1e-12, "{x:?}: {h} {}", normal_displacements[same]);
     }
 }
 
@@ -263,7 +263,7 @@ fn the_two_faces_of_a_sheet_do_not_mix() {
         DesignSetup { control: Control::Filter(0.5), ..DesignSetup::new(&triangles, Direction::Normal) };
     let surface = made(&mesh, &setup);
     let p = values(&surface, |x| if x[2] > 0.005 { 1.0 } else { 0.0 });
-    for (&node, h) in surface.nodes().iter().zip(surface.heights(&p)) {
+    for (&node, h) in surface.nodes().iter().zip(surface.normal_displacements(&p)) {
         let expected = if mesh.point(node)[2] > 0.005 { 1.0 } else { 0.0 };
         assert!((h - expected).abs() < 1e-14);
     }
@@ -329,8 +329,8 @@ fn a_fixed_rim_stays_except_on_symmetry_planes() {
     for (control, count) in [(Control::Nodes, 64), (Control::Filter(0.2), 81), (Control::Grid([3, 3]), 9)] {
         let surface = made(&mesh, &DesignSetup { rim: Rim::Fixed, ..quarter(&mesh, UP, control) });
         assert_eq!(surface.variable_count(), count, "{control:?}");
-        let heights = surface.heights(&vec![1.0; count]);
-        for (&node, h) in surface.nodes().iter().zip(heights) {
+        let normal_displacements = surface.normal_displacements(&vec![1.0; count]);
+        for (&node, h) in surface.nodes().iter().zip(normal_displacements) {
             let x = mesh.point(node);
             let expected = if x[0] == 1.0 || x[1] == 1.0 { 0.0 } else { 1.0 };
             assert!((h - expected).abs() < 1e-14, "{x:?}: {h}");

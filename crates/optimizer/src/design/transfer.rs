@@ -20,7 +20,7 @@ const NEAR: f64 = 0.25;
 #[error(
     "the fresh mesh's design surface has a node at {point:?} m, far from the run's; set output.verify_refinement = 0"
 )]
-pub struct Apart {
+pub struct SurfaceMismatch {
     /// Place of the node [m].
     pub point: Point,
 }
@@ -58,18 +58,18 @@ impl Triangulation {
     /// Displacements of the nodes of `fresh`, from those of the nodes of this one, both of shape `(n_nodes, 3)` [m].
     ///
     /// # Errors
-    /// [`Apart`] where a node has no piece of this surface near.
+    /// [`SurfaceMismatch`] where a node has no piece of this surface near.
     ///
     /// # Panics
     /// If there is not one displacement per node.
-    pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, Apart> {
+    pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
         assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
         let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
         let rim = Pieces::new(&self.places, self.rim().iter().map(|e| e.to_vec()).collect());
         let on_rim: BTreeSet<usize> = fresh.rim().into_iter().flatten().collect();
         let of = |(i, &place): (usize, &Point)| {
             let pieces = if on_rim.contains(&i) { &rim } else { &inner };
-            let weights = pieces.nearest(place).ok_or(Apart { point: place })?;
+            let weights = pieces.nearest(place).ok_or(SurfaceMismatch { point: place })?;
             Ok(weights.iter().fold([0.0; 3], |sum: Point, &(node, weight)| {
                 std::array::from_fn(|d| sum[d] + weight * displacement[node][d])
             }))
@@ -220,6 +220,6 @@ mod tests {
         let (old, other) = (plate([4, 4], |_, _| 0.0), plate([4, 4], |_, _| 0.1));
         let displacement = vec![[0.0; 3]; old.places.len()];
         let refused = old.transferred(&displacement, &other).expect_err("a tenth of a metre apart");
-        assert_eq!(refused, Apart { point: [0.0, 0.0, 0.1] });
+        assert_eq!(refused, SurfaceMismatch { point: [0.0, 0.0, 0.1] });
     }
 }

@@ -1,8 +1,7 @@
 //! Who watches an optimisation: the driver reports what happens, an observer shows it.
 
 use super::record::Evaluation;
-use crate::driver::RoundEvent;
-use crate::problem::Stage;
+use crate::problem::{RoundEvent, Stage};
 
 /// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
 /// through [`Observer::line`].

@@ -1,23 +1,24 @@
-//! What was computed before a run was broken off is told again, as long as the method asks for the same to the last bit.
+//! What was computed before a run was interrupted is replayed, as long as the method asks for the same to the last bit.
 
 use std::time::Instant;
 
 use fluxmorph_remesh::Motion;
 
-use super::{BestSoFar, Field, Run};
-use crate::nlopt::Sample;
-use crate::driver::{Best, Record, Stop, reference_hash};
+use super::incumbent::{BestField, Incumbent};
+use super::run::Run;
+use super::search::Stop;
+use super::{Best, Record, reference_hash};
 use crate::error::Error;
-use crate::problem::SolverCache;
-use crate::problem::Derivatives;
+use crate::nlopt::Sample;
+use crate::problem::{Derivatives, NoProgress, SolverCache};
 
 /// In what an evaluation was computed: with both it comes out as it was.
 #[derive(Debug)]
-pub(super) struct Setting {
+pub(super) struct ReplayState {
     /// The mesh motion of its round.
     pub(super) motion: Motion,
-    /// What the linear solvers remembered before it.
-    memory: SolverCache,
+    /// What the linear solvers kept before it.
+    cache: SolverCache,
 }
 
 /// Largest difference of a design to that of its record, relative to the largest variable, where the work of either is or was
@@ -28,8 +29,9 @@ const CLOSE: f64 = 1e-7;
 impl Run<'_> {
     /// Whether a record is that of a design on this mesh: to the last bit, or closely where ranks had a share in it.
     pub(super) fn is_of(&self, record: &Record, p: &[f64]) -> bool {
-        let follows = record.row.evaluation == self.evaluations
-            && record.row.round == self.shape().motion.round()
+        let motion = self.shape().motion();
+        let follows = record.row.evaluation == self.evaluations()
+            && record.row.round == motion.round()
             && record.design.len() == p.len();
         let pairs = || record.design.iter().zip(p);
         if self.is_shared_out {
@@ -38,17 +40,17 @@ impl Run<'_> {
         }
         follows
             && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
-            && record.reference == reference_hash(self.shape().motion.reference())
+            && record.reference == reference_hash(motion.reference())
     }
 
     /// Why a record is not the answer to what the method asks for.
     pub(super) fn difference(&self, record: &Record, p: &[f64]) -> Error {
         let Record { row, design, .. } = record;
-        let round = self.shape().motion.round();
+        let round = self.shape().motion().round();
         let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
         let cause = match differing {
-            _ if row.evaluation != self.evaluations => {
-                format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations)
+            _ if row.evaluation != self.evaluations() => {
+                format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations())
             }
             _ if row.round != round => format!("it was in round {}, now the mesh is in {round}", row.round),
             Some(k) => format!("variable {k} was {:e} m, now the method asks for {:e} m", design[k], p[k]),
@@ -57,47 +59,41 @@ impl Run<'_> {
         Error::Replay { evaluation: row.evaluation, cause }
     }
 
-    /// The answer to a design that was computed before the run was broken off.
-    pub(super) fn recall(&mut self, record: Record) -> Result<Sample, Stop> {
+    /// The answer to a design that was computed before the run was interrupted.
+    pub(super) fn replay(&mut self, record: Record) -> Result<Sample, Stop> {
         let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
         let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
         let sample = self.sample(&initial, &record);
-        let memory = std::mem::replace(&mut self.memory, SolverCache::with_methods(&record.methods));
-        let standing = self.standing(record.row.objective, &sample);
-        if standing.is_improved() != record.improved
-            || self.iterations_after(standing) != record.row.iteration
+        let cache = std::mem::replace(&mut self.cache, SolverCache::with_methods(&record.methods));
+        let comparison = self.compare(record.row.objective, &sample);
+        if comparison.is_improved() != record.improved
+            || self.iterations_after(comparison) != record.row.iteration
         {
-            let (evaluation, cause) = (record.row.evaluation, "its standing among the others is another one");
+            let (evaluation, cause) = (record.row.evaluation, "it compares otherwise with the others");
             return Err(Stop::Error(Box::new(Error::Replay { evaluation, cause: cause.to_owned() })));
         }
         // The time of a resumed run begins where it has something to compute.
         self.clock = Instant::now();
         self.observer.evaluation(&record.row);
-        let field =
-            |run: &Self| Field::Recalled(Box::new(Setting { motion: run.shape().motion.clone(), memory }));
-        self.keep(record, sample.clone(), standing, field);
+        let field = |run: &Self| {
+            BestField::Replayed(Box::new(ReplayState { motion: run.shape().motion().clone(), cache }))
+        };
+        self.keep(record, sample.clone(), comparison, field);
         Ok(sample)
     }
 
-    /// Whether there are evaluations of before that are still to be told.
-    pub(super) fn is_recalling(&mut self) -> bool {
-        if self.next.is_none() {
-            self.next = self.recorder.recall();
-        }
-        self.next.is_some()
-    }
-
-    /// The best design with its field: one that was recalled is computed in its own round, and comes out as it was.
-    pub(super) fn analysed(&mut self, best: BestSoFar) -> Result<Best, Error> {
-        let BestSoFar { evaluation, values, objective, violation, field, .. } = best;
+    /// The best design with its field: one that was replayed is computed in its own round, and comes out as it was.
+    pub(super) fn with_field(&mut self, best: Incumbent) -> Result<Best, Error> {
+        let Incumbent { evaluation, values, objective, violation, field, .. } = best;
         let analysis = match field {
-            Field::Computed(analysis) => *analysis,
-            Field::Recalled(setting) => {
+            BestField::Computed(analysis) => *analysis,
+            BestField::Replayed(state) => {
                 self.observer.phase("computing the field of the best design");
-                let Setting { motion, mut memory } = *setting;
-                let own = std::mem::replace(&mut self.shape_mut().motion, motion);
-                let analysis = self.problem.evaluate_with(&mut memory, &values, Derivatives::First);
-                self.shape_mut().motion = own;
+                let ReplayState { motion, mut cache } = *state;
+                let own = self.shape_mut().set_motion(motion);
+                let analysis =
+                    self.problem.evaluate(&values, Derivatives::First, &mut cache, &mut NoProgress);
+                self.shape_mut().set_motion(own);
                 analysis?
             }
         };

@@ -1,97 +1,48 @@
 //! One evaluation after another: limits, the mesh, objective and constraints, the row of the history, the best design.
 
-mod replay;
-
 use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fluxmorph_geometry::ElementId;
-use fluxmorph_remesh::{Moved, RemeshError};
+use fluxmorph_remesh::{FallbackLevel, FallbackReport, Moved, RemeshError};
 
-use super::{Evaluation, Observer, Optimised, Record, Recorder, Settings, Stop, StopReason, column, reference_hash};
-use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
-use crate::constraint::Bound;
+use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
+use super::search::{Refusal, Stop};
+use super::{Evaluation, Observer, Optimised, Record, Recorder, Settings, StopReason, column, reference_hash};
 use crate::error::Error;
-use crate::problem::SolverCache;
+use crate::nlopt::Sample;
 use crate::objective::Goal;
-use crate::problem::{Analysis, Measured, Problem, Shape, Timings, Derivatives};
-use crate::driver::RoundEvent;
-use crate::problem::Stage;
-use replay::Setting;
-
-/// What the first evaluation fixes for the rest of the run.
-#[derive(Clone, Debug)]
-struct Initial {
-    objective: f64,
-    quality: f64,
-    bounds: Vec<Bound>,
-}
-
-/// How a design stands beside the best before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Standing {
-    First,
-    Better,
-    /// In the place of the best one, whose mesh has changed.
-    Renewed,
-    Worse,
-}
-
-impl Standing {
-    fn is_improved(self) -> bool {
-        self != Self::Worse
-    }
-}
-
-/// What is known of the field of the best design.
-#[derive(Debug)]
-enum Field {
-    Computed(Box<Analysis>),
-    /// It was computed before the run was broken off.
-    Recalled(Box<Setting>),
-}
-
-/// The best design so far.
-#[derive(Debug)]
-pub(super) struct BestSoFar {
-    pub(super) evaluation: usize,
-    values: Vec<f64>,
-    pub(super) objective: f64,
-    pub(super) violation: f64,
-    /// What the method was told of it.
-    sample: Sample,
-    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
-    round: usize,
-    field: Field,
-}
+use crate::problem::{
+    Analysis, Derivatives, Measured, Problem, RoundEvent, Shape, SolverCache, Stage, Timings,
+};
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
     goal: Goal,
     settings: &'a Settings,
-    /// What the linear solvers remember of the designs before: which methods work.
-    memory: SolverCache,
+    /// What the linear solvers keep of the designs before: which methods work.
+    pub(super) cache: SolverCache,
     pub(super) observer: &'a mut dyn Observer,
     recorder: &'a mut dyn Recorder,
     interrupted: &'a dyn Fn() -> bool,
-    clock: Instant,
-    pub(super) evaluations: usize,
+    pub(super) clock: Instant,
+    evaluations: usize,
     iterations: usize,
     initial: Option<Initial>,
     last: Vec<f64>,
     /// The record that the next design should be answered with.
     next: Option<Record>,
-    pub(super) best: Option<BestSoFar>,
+    best: Option<Incumbent>,
     /// The best design has another mesh now: the next evaluation takes its place.
-    pub(super) best_is_stale: bool,
+    best_is_stale: bool,
     worst_residual: f64,
     timings: Timings,
-    pub(super) rounds: Vec<RoundEvent>,
+    rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
-    /// Whether ranks have a share in what is computed, or had one in what is recalled.
-    is_shared_out: bool,
+    /// Whether ranks have a share in what is computed, or had one in what is replayed.
+    pub(super) is_shared_out: bool,
 }
 
 impl<'a> Run<'a> {
@@ -102,14 +53,14 @@ impl<'a> Run<'a> {
         recorder: &'a mut dyn Recorder,
         interrupted: &'a dyn Fn() -> bool,
     ) -> Self {
-        let goal = problem.objective.as_ref().expect("an optimisation has an objective").goal;
-        let is_shared_out = problem.share.is_some() || !recorder.is_exact();
-        let last = problem.shape.as_ref().expect("an optimisation has a shape").initial.clone();
+        let goal = problem.objective().expect("an optimisation has an objective").goal;
+        let is_shared_out = problem.share().is_some() || !recorder.is_bitwise_reproducible();
+        let last = problem.shape().expect("an optimisation has a shape").initial().to_vec();
         Self {
             problem,
             goal,
             settings,
-            memory: SolverCache::default(),
+            cache: SolverCache::default(),
             observer,
             recorder,
             interrupted,
@@ -130,17 +81,66 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn shape(&self) -> &Shape {
-        self.problem.shape.as_ref().expect("an optimisation has a shape")
+        self.problem.shape().expect("an optimisation has a shape")
     }
 
     pub(super) fn shape_mut(&mut self) -> &mut Shape {
-        self.problem.shape.as_mut().expect("an optimisation has a shape")
+        self.problem.shape_mut().expect("an optimisation has a shape")
+    }
+
+    pub(super) fn constraint_count(&self) -> usize {
+        self.problem.constraints().len()
+    }
+
+    pub(super) fn evaluations(&self) -> usize {
+        self.evaluations
+    }
+
+    pub(super) fn has_best(&self) -> bool {
+        self.best.is_some()
+    }
+
+    pub(super) fn best_evaluation(&self) -> Option<usize> {
+        self.best.as_ref().map(|best| best.evaluation)
+    }
+
+    /// Violation and objective of the best design, where it stands on its own mesh.
+    pub(super) fn standing(&self) -> Option<(f64, f64)> {
+        let best = self.best.as_ref().filter(|_| !self.best_is_stale)?;
+        Some((best.violation, best.objective))
+    }
+
+    /// Whether the best design is better than it was `before`, at so many evaluations and with that standing, by more
+    /// than the share `least`.
+    pub(super) fn has_gained(&self, before: (usize, Option<(f64, f64)>), least: f64) -> bool {
+        self.best.as_ref().is_some_and(|best| match before {
+            (evaluations, None) => best.evaluation > evaluations,
+            (_, Some(standing)) => best.has_gained(standing, least),
+        })
+    }
+
+    pub(super) fn warn(&mut self, message: &str) {
+        self.observer.warning(message);
+    }
+
+    /// Keeps what happened to the mesh, and reports it.
+    pub(super) fn report(&mut self, event: RoundEvent) {
+        self.observer.round(&event);
+        self.rounds.push(event);
     }
 
     /// Takes the mesh near the first design.
-    pub(super) fn approach(&mut self) -> Result<Vec<RoundEvent>, Error> {
-        let first = self.shape().initial.clone();
-        self.problem.approach(&first, self.interrupted)
+    ///
+    /// # Errors
+    /// As [`Problem::continue_to`]; [`Error::InterruptedRun`] where a signal comes.
+    pub(super) fn continue_to_start(&mut self) -> Result<(), Error> {
+        let first = self.shape().initial().to_vec();
+        let events = self.problem.continue_to(&first, self.interrupted).map_err(|error| match error {
+            Error::Interrupted => Error::InterruptedRun,
+            other => other,
+        })?;
+        events.into_iter().for_each(|event| self.report(event));
+        Ok(())
     }
 
     /// Whether another round may begin.
@@ -151,55 +151,78 @@ impl<'a> Run<'a> {
     /// Makes the mesh of the best design the reference, and counts the round.
     pub(super) fn begin_round(&mut self) -> Result<(), RemeshError> {
         self.begun += 1;
-        self.stand_at_best()
+        self.rebase_at_best()
     }
 
     /// Makes the mesh of the best design the reference.
-    pub(super) fn stand_at_best(&mut self) -> Result<(), RemeshError> {
+    fn rebase_at_best(&mut self) -> Result<(), RemeshError> {
         let Some(best) = self.best.as_ref().filter(|_| !self.best_is_stale) else { return Ok(()) };
         let shape = self.shape();
         let motion = match &best.field {
-            Field::Computed(analysis) => {
+            BestField::Computed(analysis) => {
                 let Analysis { mesh, displacement, .. } = &**analysis;
                 shape.next_round(&best.values, mesh.clone(), displacement.clone())?
             }
-            Field::Recalled(setting) => {
-                let moved = setting.motion.moved(&shape.displacement(&best.values))?;
+            BestField::Replayed(state) => {
+                let moved = state.motion.moved(&shape.displacement(&best.values))?;
                 shape.next_round(&best.values, moved.mesh, moved.displacement)?
             }
         };
-        self.shape_mut().motion = motion;
+        self.shape_mut().set_motion(motion);
         Ok(())
     }
 
-    /// Keeps what happened to the mesh, and tells it.
-    pub(super) fn tell(&mut self, event: RoundEvent) {
-        self.observer.round(&event);
-        self.rounds.push(event);
+    /// Lets the mesh motion fall back beyond `level` on the mesh of the best design, towards a design that was refused;
+    /// `None` where no fallback is left.
+    pub(super) fn fall_back(
+        &mut self,
+        wanted: &[f64],
+        level: FallbackLevel,
+    ) -> Result<Option<(FallbackReport, FallbackLevel)>, RemeshError> {
+        if !self.has_rounds_left() {
+            return Ok(None);
+        }
+        self.rebase_at_best()?;
+        let shape = self.shape();
+        let escalated = shape.motion().escalate(&shape.displacement(wanted), level, &shape.limits)?;
+        Ok(escalated.map(|(motion, report, level)| {
+            self.best_is_stale = report.fallback.changes_mesh();
+            self.shape_mut().set_motion(motion);
+            (report, level)
+        }))
+    }
+
+    /// Why there is no fallback left, for a message.
+    pub(super) fn why_no_fallback(&self) -> String {
+        match self.shape().limits.rounds {
+            0 => "and no other reference mesh is allowed (rounds = 0)".to_owned(),
+            rounds if !self.has_rounds_left() => format!("and all {rounds} rounds are used"),
+            _ => "and no fallback of the mesh motion is left".to_owned(),
+        }
     }
 
     /// Where the next search starts: the best design so far.
     pub(super) fn centre(&self) -> Vec<f64> {
-        self.best.as_ref().map_or_else(|| self.shape().initial.clone(), |best| best.values.clone())
+        self.best.as_ref().map_or_else(|| self.shape().initial().to_vec(), |best| best.values.clone())
     }
 
     /// ±F/|F0| and the constraints of a design, with their gradients.
     ///
     /// What is known of the best design in this round is not computed again, nor what was computed before the run was
-    /// broken off.
+    /// interrupted.
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
-        let round = self.shape().motion.round();
+        let round = self.shape().motion().round();
         if let Some(best) = &self.best
             && best.round == round
             && best.values == p
         {
             return Ok(best.sample.clone());
         }
-        if self.is_recalling() && (self.interrupted)() {
+        if self.is_replaying() && (self.interrupted)() {
             return Err(Stop::Limit(StopReason::Interrupted));
         }
         match self.next.take() {
-            Some(record) if self.is_of(&record, p) => self.recall(record),
+            Some(record) if self.is_of(&record, p) => self.replay(record),
             Some(record) => {
                 // A design that the mesh refused has left no record.
                 let difference = self.difference(&record, p);
@@ -218,9 +241,9 @@ impl<'a> Run<'a> {
         self.observer.stage(Stage::Moving);
         let moved = self.mesh(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let Self { problem, memory, observer, .. } = self;
-        let told = &mut |stage| observer.stage(stage);
-        let mut analysis = problem.analyse_watched(memory, p, moved, Derivatives::First, told)?;
+        let Self { problem, cache, observer, .. } = self;
+        let progress = &mut |stage| observer.stage(stage);
+        let mut analysis = problem.analyse(moved, p, Derivatives::First, cache, progress)?;
         analysis.timings.remesh += remesh;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
@@ -228,11 +251,11 @@ impl<'a> Run<'a> {
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
         // Before anything of it is kept.
-        sample.check(p.len(), self.problem.constraints.len())?;
-        let standing = self.standing(objective, &sample);
-        record.improved = standing.is_improved();
-        record.row.iteration = self.iterations_after(standing);
-        let names = self.problem.constraints.iter().map(|constraint| column(&constraint.name));
+        sample.check(p.len(), self.constraint_count())?;
+        let comparison = self.compare(objective, &sample);
+        record.improved = comparison.is_improved();
+        record.row.iteration = self.iterations_after(comparison);
+        let names = self.problem.constraints().iter().map(|constraint| column(&constraint.name));
         record.row.constraints = names.zip(sample.constraints.iter().map(|(c, _)| *c)).collect();
         record.row.seconds = clock.elapsed().as_secs_f64();
         for event in &analysis.solver_events {
@@ -241,13 +264,13 @@ impl<'a> Run<'a> {
         self.observer.stage(Stage::Writing);
         self.recorder.record(&record, &analysis, self.problem)?;
         self.observer.evaluation(&record.row);
-        self.keep(record, sample.clone(), standing, |_| Field::Computed(Box::new(analysis)));
+        self.keep(record, sample.clone(), comparison, |_| BestField::Computed(Box::new(analysis)));
         Ok(sample)
     }
 
     /// The mesh of a design, unless it goes beyond what the round's reference can carry.
     fn mesh(&self, p: &[f64]) -> Result<Moved, Stop> {
-        let refused = |cause: String| Stop::Mesh { cause, wanted: p.to_vec() };
+        let refused = |cause: String| Stop::Mesh(Refusal { cause, wanted: p.to_vec() });
         let moved = self.problem.moved(p).map_err(|error| match error {
             RemeshError::Inverted { .. } => refused(error.to_string()),
             other => Stop::Error(Box::new(other.into())),
@@ -277,7 +300,12 @@ impl<'a> Run<'a> {
     }
 
     /// Scale of the objective and bounds of the constraints, which the first design fixes.
-    fn initial(&mut self, objective: f64, quality: f64, measured: &[f64]) -> Result<Initial, Error> {
+    pub(super) fn initial(
+        &mut self,
+        objective: f64,
+        quality: f64,
+        measured: &[f64],
+    ) -> Result<Initial, Error> {
         if let Some(initial) = &self.initial {
             return Ok(initial.clone());
         }
@@ -287,14 +315,14 @@ impl<'a> Run<'a> {
                         check coils, regions, frequencies and weights",
             });
         }
-        let constraints = self.problem.constraints.iter().zip(measured);
+        let constraints = self.problem.constraints().iter().zip(measured);
         let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
         let initial = Initial { objective, quality, bounds: bounds.collect::<Result<_, _>>()? };
         Ok(self.initial.insert(initial).clone())
     }
 
-    /// What the method is told of a design.
-    fn sample(&self, initial: &Initial, record: &Record) -> Sample {
+    /// What the method sees of a design.
+    pub(super) fn sample(&self, initial: &Initial, record: &Record) -> Sample {
         let scale = self.goal.sign() / initial.objective.abs();
         let constraints = initial.bounds.iter().zip(&record.constraints);
         Sample {
@@ -306,26 +334,24 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// How a design stands beside the best so far.
-    fn standing(&self, objective: f64, sample: &Sample) -> Standing {
-        let Some(best) = &self.best else { return Standing::First };
-        let sign = self.goal.sign();
-        let order = violation(sample).total_cmp(&best.violation);
-        match order.then((sign * objective).total_cmp(&(sign * best.objective))) {
-            _ if self.best_is_stale => Standing::Renewed,
-            std::cmp::Ordering::Less => Standing::Better,
-            _ => Standing::Worse,
+    /// How a design compares with the best so far.
+    pub(super) fn compare(&self, objective: f64, sample: &Sample) -> Comparison {
+        match &self.best {
+            None => Comparison::First,
+            Some(_) if self.best_is_stale => Comparison::Remeshed,
+            Some(best) => best.compare(self.goal, objective, sample),
         }
     }
 
-    fn iterations_after(&self, standing: Standing) -> usize {
-        self.iterations + usize::from(standing == Standing::Better)
+    pub(super) fn iterations_after(&self, comparison: Comparison) -> usize {
+        self.iterations + usize::from(comparison == Comparison::Better)
     }
 
-    /// The record of a design but for its standing.
+    /// The record of a design, but for how it compares with the best.
     fn record(&self, p: &[f64], initial: &Initial, analysis: &Analysis) -> Record {
         let shape = self.shape();
-        let thickness = shape.thickness.as_ref().map(|thickness| thickness.range(&shape.surface.heights(p)));
+        let displacements = || shape.surface().normal_displacements(p);
+        let thickness = shape.thickness().map(|thickness| thickness.range(&displacements()));
         let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
         let gradient = analysis.gradient.clone().expect("a gradient was asked for");
@@ -345,7 +371,7 @@ impl<'a> Run<'a> {
             step_to_inversion: analysis.inversion.element.map(|_| analysis.inversion.step),
             inversion_element: analysis.inversion.element.map(ElementId::index),
             inversion_region: analysis.inversion.element.map(region),
-            round: shape.motion.round(),
+            round: shape.motion().round(),
             constraints: BTreeMap::new(),
         };
         let constraint = |measured: &Measured| {
@@ -357,27 +383,27 @@ impl<'a> Run<'a> {
             design: p.to_vec(),
             gradient,
             constraints: analysis.constraints.iter().map(constraint).collect(),
-            reference: reference_hash(shape.motion.reference()),
-            methods: self.memory.methods(),
+            reference: reference_hash(shape.motion().reference()),
+            methods: self.cache.methods(),
             worst_residual: analysis.worst_residual,
             timings: analysis.timings,
         }
     }
 
     /// A signal or the time, where they end the run now.
-    pub(super) fn told_to_end(&mut self) -> Option<StopReason> {
+    pub(super) fn limit_reached(&mut self) -> Option<StopReason> {
         if (self.interrupted)() {
             return Some(StopReason::Interrupted);
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
-        // Without a first evaluation there would be nothing to keep, and what was computed before is told to its end.
+        // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end.
         let is_over =
-            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_recalling();
+            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
     }
 
     fn check_limits(&mut self) -> Result<(), Stop> {
-        let reason = match self.told_to_end() {
+        let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
             _ if self.evaluations >= self.settings.max_evaluations => Some(StopReason::MaxEvaluations),
             reason => reason,
@@ -385,23 +411,31 @@ impl<'a> Run<'a> {
         reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
     }
 
+    /// Whether there are evaluations of before that are still to be replayed.
+    fn is_replaying(&mut self) -> bool {
+        if self.next.is_none() {
+            self.next = self.recorder.replay();
+        }
+        self.next.is_some()
+    }
+
     /// Counts an evaluation, and remembers the best with its `field`, which is asked for only then.
-    fn keep(
+    pub(super) fn keep(
         &mut self,
         record: Record,
         sample: Sample,
-        standing: Standing,
-        field: impl FnOnce(&Self) -> Field,
+        comparison: Comparison,
+        field: impl FnOnce(&Self) -> BestField,
     ) {
-        self.iterations = self.iterations_after(standing);
+        self.iterations = self.iterations_after(comparison);
         self.evaluations += 1;
         self.worst_residual = self.worst_residual.max(record.worst_residual);
         self.timings += record.timings;
         self.best_is_stale = false;
         self.last.clone_from(&record.design);
-        if standing.is_improved() {
+        if comparison.is_improved() {
             let field = field(self);
-            self.best = Some(BestSoFar {
+            self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
                 values: record.design,
                 objective: record.row.objective,
@@ -413,33 +447,47 @@ impl<'a> Run<'a> {
         }
     }
 
+    /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.
+    ///
+    /// # Errors
+    /// The error itself, where there is no best design or it is another one.
+    pub(super) fn salvage(&mut self, error: Error) -> Result<StopReason, Error> {
+        let reason = match &error {
+            Error::Remesh(_) => StopReason::MeshLimit,
+            other if other.is_numerical() => StopReason::NumericalFailure,
+            _ => return Err(error),
+        };
+        if !self.has_best() {
+            return Err(error);
+        }
+        self.warn(&error.to_string());
+        Ok(reason)
+    }
+
+    /// The outcome, with the field of the best design.
     pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
-        let is_cut = stop_reason == StopReason::Interrupted && (self.is_recalling() || self.best.is_none());
+        let is_cut = stop_reason == StopReason::Interrupted && (self.is_replaying() || self.best.is_none());
         if is_cut {
             return Err(Error::InterruptedRun);
         }
-        if let Some(record) = self.next.take().or_else(|| self.recorder.recall()) {
+        if let Some(record) = self.next.take().or_else(|| self.recorder.replay()) {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
-        let best = self.analysed(best)?;
+        let best = self.with_field(best)?;
         if best.violation > 0.0 {
-            self.observer.warning(&format!(
+            self.warn(&format!(
                 "no design keeps all constraints: the best one is beyond a bound by {:.1e} of it; loosen the constraint, \
                  widen the design's bounds, or allow more evaluations",
                 best.violation
             ));
         }
-        let stop_reason = if stop_reason.is_converged() && best.violation > 0.0 {
-            StopReason::Infeasible
-        } else {
-            stop_reason
-        };
+        let is_infeasible = stop_reason.is_converged() && best.violation > 0.0;
         Ok(Optimised {
-            stop_reason,
+            stop_reason: if is_infeasible { StopReason::Infeasible } else { stop_reason },
             evaluations: self.evaluations,
             iterations: self.iterations,
             initial: initial.objective,
@@ -451,18 +499,6 @@ impl<'a> Run<'a> {
             rounds: self.rounds,
         })
     }
-}
-
-impl From<Error> for Stop {
-    fn from(error: Error) -> Self {
-        Self::Error(Box::new(error))
-    }
-}
-
-/// Largest excess of a constraint; zero where all are kept but for rounding.
-fn violation(sample: &Sample) -> f64 {
-    let worst = sample.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);
-    if worst <= CONSTRAINT_TOLERANCE { 0.0 } else { worst }
 }
 
 fn euclidean(values: &[f64]) -> f64 {

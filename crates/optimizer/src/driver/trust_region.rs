@@ -1,7 +1,7 @@
 //! The box a method may search in during a round: how far the mesh of the round can be trusted.
 //!
 //! The mesh carries a motion of all variables towards their upper bounds up to some share, within
-//! [`fluxmorph_remesh::Limits::inversion_share`] of the first inversion. That share of the longest of these ways is how far
+//! [`fluxmorph_remesh::StepLimits::inversion_share`] of the first inversion. That share of the longest of these ways is how far
 //! every variable may go up, though never beyond its bound; down likewise. A variable that lies on its bound already asks
 //! nothing of the mesh, and one that is near it may go there. Without rounds the box is that of the bounds, since no other
 //! reference can be had. Designs inside the box may still be refused one by one; then `scale` makes it smaller.
@@ -37,13 +37,13 @@ impl TrustRegion {
     pub(super) fn new(shape: &Shape, centre: &[f64], scale: f64) -> Result<Self, RemeshError> {
         let towards =
             |bounds: &[f64]| -> Vec<f64> { bounds.iter().zip(centre).map(|(b, c)| b - c).collect() };
-        let changes = [towards(&shape.lower), towards(&shape.upper)];
+        let changes = [towards(shape.lower()), towards(shape.upper())];
         let reach = |change: &[f64]| -> Result<f64, RemeshError> {
             if shape.limits.rounds == 0 {
                 return Ok(1.0);
             }
-            let step = shape.motion.map().linear(&shape.displacement(change))?;
-            let share = shape.limits.inversion_share * shape.motion.inversion(&step).step;
+            let step = shape.motion().map().linear(&shape.displacement(change))?;
+            let share = shape.limits.inversion_share * shape.motion().inversion(&step).step;
             Ok(share.clamp(LEAST_REACH, 1.0))
         };
         let longest = |change: &Vec<f64>| change.iter().fold(0.0_f64, |longest, d| longest.max(d.abs()));
@@ -72,8 +72,8 @@ impl TrustRegion {
             }
         };
         let variables = || self.centre.iter().enumerate();
-        let lower = variables().map(|(k, &centre)| to(centre, down * lowest, down, shape.lower[k]));
-        let upper = variables().map(|(k, &centre)| to(centre, up * highest, up, shape.upper[k]));
+        let lower = variables().map(|(k, &centre)| to(centre, down * lowest, down, shape.lower()[k]));
+        let upper = variables().map(|(k, &centre)| to(centre, up * highest, up, shape.upper()[k]));
         [lower.collect(), upper.collect()]
     }
 
@@ -83,12 +83,12 @@ impl TrustRegion {
         (0..p.len()).any(|k| {
             let near = ON_BOUND * span(shape, k);
             let on = |bound: f64, own: f64| (p[k] - bound).abs() <= near && (bound - own).abs() > near;
-            on(lower[k], shape.lower[k]) || on(upper[k], shape.upper[k])
+            on(lower[k], shape.lower()[k]) || on(upper[k], shape.upper()[k])
         })
     }
 }
 
 /// Distance between the bounds of a variable [m].
 fn span(shape: &Shape, k: usize) -> f64 {
-    shape.upper[k] - shape.lower[k]
+    shape.upper()[k] - shape.lower()[k]
 }

@@ -39,7 +39,7 @@ impl ThicknessBound {
     /// # Errors
     /// [`GeometricError::NoThickness`] where the shape has none.
     pub fn new(shape: &Shape, bound: Bound) -> Result<Self, GeometricError> {
-        let thickness = shape.thickness.as_ref().ok_or(GeometricError::NoThickness)?;
+        let thickness = shape.thickness().ok_or(GeometricError::NoThickness)?;
         let (Bound::Minimum(limit) | Bound::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0; a limit of zero is held as one of a micrometre.
         let count = thickness.at_nodes().count().max(2) as f64;
@@ -57,22 +57,22 @@ impl ThicknessBound {
     /// # Panics
     /// If the shape is not the one that the bound was made for.
     pub fn evaluate(&self, shape: &Shape, p: &[f64]) -> (f64, Vec<f64>) {
-        let thickness = shape.thickness.as_ref().expect("a bound is made for a shape with a thickness");
-        let heights = shape.surface.heights(p);
+        let thickness = shape.thickness().expect("a bound is made for a shape with a thickness");
+        let normal_displacements = shape.surface().normal_displacements(p);
         let (sign, limit) = match self.bound {
             Bound::Minimum(limit) => (-1.0, limit),
             Bound::Maximum(limit) => (1.0, limit),
         };
         let excess: Vec<(usize, f64)> =
-            thickness.at_nodes().map(|(node, t)| (node, sign * (t + heights[node] - limit))).collect();
+            thickness.at_nodes().map(|(node, t)| (node, sign * (t + normal_displacements[node] - limit))).collect();
         let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
         // Relative to the greatest: no exponential overflows.
         let terms: Vec<f64> = excess.iter().map(|&(_, g)| (self.sharpness * (g - greatest)).exp()).collect();
         let sum: f64 = terms.iter().sum();
-        let mut shares = vec![0.0; heights.len()];
+        let mut shares = vec![0.0; normal_displacements.len()];
         for (&(node, _), term) in excess.iter().zip(&terms) {
             shares[node] = sign * term / sum;
         }
-        (greatest + sum.ln() / self.sharpness, shape.surface.height_gradient(&shares))
+        (greatest + sum.ln() / self.sharpness, shape.surface().normal_displacement_gradient(&shares))
     }
 }

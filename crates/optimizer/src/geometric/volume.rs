@@ -93,7 +93,7 @@ impl Volume {
     /// [`RemeshError::NotConverged`].
     pub fn evaluate(&self, mesh: &Mesh, shape: &Shape) -> Result<(f64, Vec<f64>), RemeshError> {
         let nodal = self.node_derivative(mesh);
-        Ok((self.value(mesh), shape.surface.gradient(&shape.motion.map().gradient(&nodal)?)))
+        Ok((self.value(mesh), shape.surface().gradient(&shape.motion().map().gradient(&nodal)?)))
     }
 
     /// Derivative with respect to every node's position, shape `(n_nodes, 3)`.

@@ -65,10 +65,10 @@ impl WallThickness {
         self.initial.iter().enumerate().filter_map(|(i, t)| Some((i, (*t)?)))
     }
 
-    /// Least and greatest thickness [m] for the heights of the design nodes [m].
-    pub fn range(&self, heights: &[f64]) -> (f64, f64) {
+    /// Least and greatest thickness [m] for the normal_displacements of the design nodes [m].
+    pub fn range(&self, normal_displacements: &[f64]) -> (f64, f64) {
         self.at_nodes()
-            .map(|(i, t)| t + heights[i])
+            .map(|(i, t)| t + normal_displacements[i])
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
 }

@@ -76,7 +76,7 @@ impl AdjointAccumulator {
         work.report.include(&lambda);
         work.timings.adjoint += clock.lap();
         work.progress.stage(Stage::Differentiating);
-        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion.moving())?;
+        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion().moving())?;
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
         Ok(())

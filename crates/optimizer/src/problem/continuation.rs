@@ -3,11 +3,10 @@
 use std::ops::ControlFlow;
 
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Event, Limits, Motion, Moved, RemeshError, Travelled};
+use fluxmorph_remesh::{Motion, Moved, RemeshError, StepEvent, StepLimits, SteppingOutcome};
 
 use crate::error::Error;
-use super::{Problem, Shape};
-use crate::driver::RoundEvent;
+use super::{Problem, RoundEvent, Shape};
 
 impl Problem {
     /// Makes the mesh of a design the reference of the present round; nothing where it is already, or where the problem
@@ -42,10 +41,10 @@ impl Problem {
         let Some(shape) = self.shape.as_mut().filter(|shape| shape.limits.rounds > 0) else {
             return Ok(Vec::new());
         };
-        let Some((motion, events)) = shape.continued_to(&shape.motion, goal, interrupted)? else {
+        let Some((motion, events)) = shape.continued_to(shape.motion(), goal, interrupted)? else {
             return Ok(Vec::new());
         };
-        shape.motion = motion;
+        shape.set_motion(motion);
         Ok(events)
     }
 }
@@ -56,7 +55,7 @@ impl Shape {
     /// # Errors
     /// As [`Problem::continue_to`], and [`RemeshError::Inverted`] where there are no rounds.
     pub fn from_undeformed(&self, p: &[f64]) -> Result<Moved, Error> {
-        let (motion, goal) = (self.motion.restarted()?, self.displacement(p));
+        let (motion, goal) = (self.motion().restarted()?, self.displacement(p));
         let continued =
             if self.limits.rounds > 0 { self.continued_to(&motion, goal.clone(), &|| false)? } else { None };
         let motion = continued.map_or(motion, |(motion, _)| motion);
@@ -71,12 +70,12 @@ impl Shape {
         goal: Vec<Point>,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<(Motion, Vec<RoundEvent>)>, Error> {
-        let start = motion.anchor();
+        let start = motion.reference_design();
         if start == goal {
             return Ok(None);
         }
         // The rounds of the limits are the optimisation's.
-        let limits = Limits { rounds: Limits::default().rounds, ..self.limits };
+        let limits = StepLimits { rounds: StepLimits::default().rounds, ..self.limits };
         match motion.moved(&goal) {
             Ok(moved)
                 if 1.0 / moved.inversion.step <= limits.inversion_share
@@ -94,11 +93,11 @@ impl Shape {
             if t == 1.0 { goal.clone() } else { start.iter().zip(&goal).map(between).collect() }
         };
         let mut events = Vec::new();
-        let travelled = motion.clone().travel(&path, &limits, &mut |event: &Event| {
+        let travelled = motion.clone().step_along(&path, &limits, &mut |event: &StepEvent| {
             events.push(RoundEvent::of_continuation(event));
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let Travelled { motion, moved, reached, .. } = travelled;
+        let SteppingOutcome { motion, moved, reached, .. } = travelled;
         if reached < 1.0 {
             Error::unless(interrupted)?;
             return Err(Error::DesignUnreached { reached });

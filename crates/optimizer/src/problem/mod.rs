@@ -15,12 +15,13 @@ mod continuation;
 mod evaluate;
 pub mod finite;
 mod progress;
+mod round_event;
 mod shape;
 mod solver_cache;
 mod stopwatch;
 
 use fluxmorph_geometry::quality::QualityReport;
-use fluxmorph_geometry::ranks::Share;
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_remesh::{Moved, RemeshError, StepToInversion};
 use fluxmorph_solver::FieldModel;
@@ -32,6 +33,7 @@ use crate::objective::WeightedSum;
 pub use analysis::{Analysis, Measured, Timings};
 pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
+pub use round_event::{RoundEvent, RoundKind};
 pub use shape::Shape;
 pub use solver_cache::SolverCache;
 
@@ -43,7 +45,7 @@ pub struct Problem {
     objective: Option<WeightedSum>,
     constraints: Vec<Constraint>,
     shape: Option<Shape>,
-    share: Option<Share>,
+    share: Option<Ownership>,
 }
 
 impl Problem {
@@ -71,7 +73,7 @@ impl Problem {
 
     /// The same with its work shared out among ranks.
     #[must_use]
-    pub fn shared_out(self, share: Option<Share>) -> Self {
+    pub fn shared_out(self, share: Option<Ownership>) -> Self {
         Self { share, ..self }
     }
 
@@ -89,6 +91,12 @@ impl Problem {
     pub fn with_states(self, states: Vec<FieldModel>) -> Self {
         assert_eq!(states.len(), self.states.len(), "one state a frequency");
         Self { states, ..self }
+    }
+
+    /// Lets go of states, constraints and shape, which hold nearly all of the memory: the undeformed mesh is left, and
+    /// nothing can be evaluated any more.
+    pub fn release(&mut self) {
+        (self.states, self.constraints, self.shape) = (Vec::new(), Vec::new(), None);
     }
 
     /// The undeformed mesh.
@@ -122,7 +130,7 @@ impl Problem {
     }
 
     /// The ranks among which the work is shared out; `None` for one process.
-    pub fn share(&self) -> Option<&Share> {
+    pub fn share(&self) -> Option<&Ownership> {
         self.share.as_ref()
     }
 

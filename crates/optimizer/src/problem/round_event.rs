@@ -1,6 +1,6 @@
 //! What happens to the mesh between evaluations: rounds that begin, and remedies that are taken.
 
-use fluxmorph_remesh::{Event, Rescue, Rescued};
+use fluxmorph_remesh::{Fallback, FallbackReport, StepEvent};
 use serde::{Deserialize, Serialize};
 
 /// What happened.
@@ -44,10 +44,10 @@ pub struct RoundEvent {
 
 impl RoundEvent {
     /// A step of the way to the first design.
-    pub fn of_continuation(event: &Event) -> Self {
+    pub fn of_continuation(event: &StepEvent) -> Self {
         let (round, policy, quality) = match *event {
-            Event::Stepped { round, policy, quality, .. } => (round + 1, policy, [quality; 2]),
-            Event::Rescued { round, policy, rescued } => (round, policy, rescued.quality),
+            StepEvent::Stepped { round, policy, quality, .. } => (round + 1, policy, [quality; 2]),
+            StepEvent::FellBack { round, policy, report } => (round, policy, report.quality),
         };
         let event_of_step = Self {
             round,
@@ -60,24 +60,24 @@ impl RoundEvent {
             cause: "the design lies too far from the undeformed mesh for a single step".to_owned(),
         };
         match event {
-            Event::Stepped { .. } => event_of_step,
-            Event::Rescued { rescued, .. } => event_of_step.with(rescued),
+            StepEvent::Stepped { .. } => event_of_step,
+            StepEvent::FellBack { report, .. } => event_of_step.with(report),
         }
     }
 
     /// The same with what a remedy did.
     #[must_use]
-    pub fn with(self, rescued: &Rescued) -> Self {
-        let kind = match rescued.rescue {
-            Rescue::Policy { .. } => RoundKind::Policy,
-            Rescue::Smoothing { .. } => RoundKind::Smoothing,
-            Rescue::Guided { .. } => RoundKind::Guided,
+    pub fn with(self, report: &FallbackReport) -> Self {
+        let kind = match report.fallback {
+            Fallback::Policy { .. } => RoundKind::Policy,
+            Fallback::Smoothing { .. } => RoundKind::Smoothing,
+            Fallback::AxisConstraint { .. } => RoundKind::Guided,
         };
-        let stiffness = match rescued.rescue {
-            Rescue::Policy { to, .. } => to.name().to_owned(),
+        let stiffness = match report.fallback {
+            Fallback::Policy { to, .. } => to.name().to_owned(),
             _ => self.stiffness,
         };
-        Self { kind, stiffness, worst_quality: rescued.quality, admitted: Some(rescued.admitted), ..self }
+        Self { kind, stiffness, worst_quality: report.quality, admitted: Some(report.admissible), ..self }
     }
 
     /// One line for a reader.

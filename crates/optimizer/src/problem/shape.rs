@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Limits, Motion, RemeshError};
+use fluxmorph_remesh::{Motion, RemeshError, StepLimits};
 
 use super::finite;
 use crate::design::DesignSurface;
@@ -15,7 +15,7 @@ pub struct Shape {
     surface: DesignSurface,
     motion: Motion,
     /// How far a design may lie from the reference of its round, and how many rounds there may be.
-    pub limits: Limits,
+    pub limits: StepLimits,
     thickness: Option<WallThickness>,
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -28,7 +28,7 @@ impl Shape {
     ///
     /// # Panics
     /// If there is not one bound a variable, or the bounds cross.
-    pub fn new(surface: DesignSurface, motion: Motion, limits: Limits, bounds: [Vec<f64>; 2]) -> Self {
+    pub fn new(surface: DesignSurface, motion: Motion, limits: StepLimits, bounds: [Vec<f64>; 2]) -> Self {
         let [lower, upper] = bounds;
         let variables = surface.variable_count();
         assert_eq!([lower.len(), upper.len()], [variables; 2], "one bound a variable");

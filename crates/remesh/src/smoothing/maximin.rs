@@ -97,7 +97,7 @@ impl Active {
     /// Returns whether the equations could be solved; if not, the weights stay a convex combination.
     fn balance(&mut self, values: &[f64], product: impl Fn(usize, usize) -> f64) -> bool {
         while self.count > 1 {
-            let Some(wanted) = self.balanced(values, &product) else { return false };
+            let Some(wanted) = self.balanced_weights(values, &product) else { return false };
             let share = |s: usize| self.weights[s] / (self.weights[s] - wanted[s]);
             let ends = (0..self.count).filter(|&s| wanted[s] <= 0.0);
             let Some(slot) = ends.min_by(|&s, &t| share(s).total_cmp(&share(t))) else {
@@ -119,7 +119,7 @@ impl Active {
     }
 
     /// Weights with `Σ_j product(i, j) λ_j + a_i` equal for all members and `Σ λ = 1`: elimination with pivoting.
-    fn balanced(&self, values: &[f64], product: impl Fn(usize, usize) -> f64) -> Option<[f64; CAPACITY]> {
+    fn balanced_weights(&self, values: &[f64], product: impl Fn(usize, usize) -> f64) -> Option<[f64; CAPACITY]> {
         const SIZE: usize = CAPACITY + 1;
         let n = self.count;
         let mut rows = [[0.0; SIZE + 1]; SIZE];

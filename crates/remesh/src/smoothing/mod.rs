@@ -250,7 +250,7 @@ impl<'a> Body<'a> {
         };
         let star = around.iter().map(corner).collect::<Option<_>>().and_then(|c| Star::new(self.given[i], c));
         let found = star.and_then(|star| {
-            let u = star.improved(self.displacement[i], floor)?;
+            let u = star.improve(self.displacement[i], floor)?;
             Some((u, star.worth(u)))
         });
         let Some((u, worth)) = found else {

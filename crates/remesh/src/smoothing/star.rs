@@ -111,33 +111,33 @@ impl Star {
 
     /// Worth of the elements with the node displaced by `u` [m].
     pub(super) fn worth(&self, u: Point) -> Vec<Worth> {
-        self.corners.iter().map(|c| Worth::new(self.placed(c, u), &c.ideal)).collect()
+        self.corners.iter().map(|c| Worth::new(self.vertices_at(c, u), &c.ideal)).collect()
     }
 
     /// A better displacement than `u` [m], if there is one.
     ///
     /// Better is, from a tangle, a greater least volume, else a greater least measure; then all elements stay upright and
     /// none falls below the `floor`.
-    pub(super) fn improved(&self, u: Point, floor: Worth) -> Option<Point> {
-        let untangled = if is_upright(&self.worth(u)) { None } else { Some(self.untangled(u)?) };
+    pub(super) fn improve(&self, u: Point, floor: Worth) -> Option<Point> {
+        let untangled = if is_upright(&self.worth(u)) { None } else { Some(self.untangle(u)?) };
         let start = untangled.unwrap_or(u);
         if !is_upright(&self.worth(start)) {
             return untangled;
         }
-        self.ascended(start, floor).or(untangled)
+        self.ascend(start, floor).or(untangled)
     }
 
     /// Raises the least measure of upright elements.
-    fn ascended(&self, mut u: Point, floor: Worth) -> Option<Point> {
+    fn ascend(&self, mut u: Point, floor: Worth) -> Option<Point> {
         let mut least = Worth::least(self.worth(u)).measure;
-        let mut model = self.linearised(u, Ideal::measure_and_gradient);
+        let mut model = self.linearise(u, Ideal::measure_and_gradient);
         let (mut radius, mut moved) = (FIRST_RADIUS, None);
         for _ in 0..STEPS {
             let step = maximin::step(&model.0, &model.1, radius);
             if step.gain.is_nan() || step.gain <= NEGLIGIBLE * least {
                 break;
             }
-            let trial = self.stepped(u, step.step);
+            let trial = self.step(u, step.step);
             let after = self.worth(trial);
             let raised = Worth::least(after.iter().copied()).measure;
             let rise = raised - least;
@@ -146,7 +146,7 @@ impl Star {
                     radius = LARGEST_RADIUS.min(CHANGE * radius);
                 }
                 (u, least, moved) = (trial, raised, Some(trial));
-                model = self.linearised(u, Ideal::measure_and_gradient);
+                model = self.linearise(u, Ideal::measure_and_gradient);
             } else {
                 radius /= CHANGE;
                 if radius < SMALLEST_RADIUS {
@@ -158,20 +158,20 @@ impl Star {
     }
 
     /// The place of the greatest least volume, if it is better than `u`.
-    fn untangled(&self, u: Point) -> Option<Point> {
+    fn untangle(&self, u: Point) -> Option<Point> {
         // The least volume is concave over all space: its peak is found from anywhere, soonest from the middle.
         let mut peak = sub(self.centre, self.origin);
         for _ in 0..STEPS {
-            let (volumes, gradients) = self.linearised(peak, Ideal::volume_and_gradient);
+            let (volumes, gradients) = self.linearise(peak, Ideal::volume_and_gradient);
             let step = maximin::step(&volumes, &gradients, LARGEST_RADIUS);
             let largest = volumes.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
             if step.gain.is_nan() || step.gain <= ROUNDING * largest {
                 break;
             }
-            peak = self.stepped(peak, step.step);
+            peak = self.step(peak, step.step);
         }
         let least = |u: Point| {
-            let (volumes, _) = self.linearised(u, Ideal::volume_and_gradient);
+            let (volumes, _) = self.linearise(u, Ideal::volume_and_gradient);
             let largest = volumes.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
             (volumes.into_iter().fold(f64::INFINITY, f64::min), largest)
         };
@@ -180,26 +180,26 @@ impl Star {
     }
 
     /// `u + L y` [m].
-    fn stepped(&self, u: Point, y: Point) -> Point {
+    fn step(&self, u: Point, y: Point) -> Point {
         let l = &self.frame;
         std::array::from_fn(|i| u[i] + l[i][0] * y[0] + l[i][1] * y[1] + l[i][2] * y[2])
     }
 
     /// Values of a function of the elements and their derivatives `Lᵀ ∇` by `y`.
-    fn linearised(
+    fn linearise(
         &self,
         u: Point,
         function: impl Fn(&Ideal, [Point; 4], usize) -> (f64, Point),
     ) -> (Vec<f64>, Vec<Point>) {
         let l = &self.frame;
         let one = |c: &Corner| {
-            let (value, g) = function(&c.ideal, self.placed(c, u), c.local);
+            let (value, g) = function(&c.ideal, self.vertices_at(c, u), c.local);
             (value, std::array::from_fn(|j| l[0][j] * g[0] + l[1][j] * g[1] + l[2][j] * g[2]))
         };
         self.corners.iter().map(one).unzip()
     }
 
-    fn placed(&self, corner: &Corner, u: Point) -> [Point; 4] {
+    fn vertices_at(&self, corner: &Corner, u: Point) -> [Point; 4] {
         let mut vertices = corner.vertices;
         vertices[corner.local] = std::array::from_fn(|d| self.origin[d] + u[d]);
         vertices

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shield};
 use fluxmorph_geometry::tet4::{centroid, cross};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
-use fluxmorph_remesh::{Boundary, BoundaryKind, Guidance, RemeshSetup, StiffnessPolicy, Subregion};
+use fluxmorph_remesh::{
+    Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, StiffnessPolicy, Subregion,
+};
 
 pub type Point = [f64; 3];
 
@@ -127,7 +129,7 @@ pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, pois
     RemeshSetup {
         subregions: regions.iter().map(subregion).collect(),
         policy,
-        guidance: Guidance::Free,
+        kinematic_constraint: KinematicConstraint::Free,
         design_nodes: plate_bottom(mesh),
         boundaries: ["x_min", "y_min", "plate_side"].map(slide).to_vec(),
         ..RemeshSetup::default()

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use fluxmorph_geometry::quality::quality;
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_remesh::{Event, Limits, Motion, RemeshSetup, StiffnessPolicy, Travelled};
+use fluxmorph_remesh::{Motion, RemeshSetup, StepEvent, StepLimits, SteppingOutcome, StiffnessPolicy};
 
 use crate::support::Point;
 
@@ -28,10 +28,10 @@ pub struct Outcome {
     /// The whole motion in one linear step.
     pub single: SingleStep,
     /// The motion in rounds.
-    pub travelled: Travelled,
+    pub outcome: SteppingOutcome,
     /// Worst quality of the body after them.
     pub worst: f64,
-    pub events: Vec<Event>,
+    pub events: Vec<StepEvent>,
 }
 
 /// The whole motion in one linear step, inverted or not.
@@ -75,28 +75,28 @@ impl Case {
         SingleStep { worst, inverted, step: motion.inversion(&step).step }
     }
 
-    pub fn outcome(&self, policy: StiffnessPolicy, limits: &Limits) -> Outcome {
+    pub fn outcome(&self, policy: StiffnessPolicy, limits: &StepLimits) -> Outcome {
         let motion = self.motion(policy);
         let single = self.single_step(&motion);
         let start = motion.quality(&self.mesh).worst;
         let mut events = Vec::new();
-        let travelled = motion
-            .travel(&self.path, limits, &mut |event| {
+        let outcome = motion
+            .step_along(&self.path, limits, &mut |event| {
                 events.push(*event);
                 ControlFlow::Continue(())
             })
             .expect("a direct solve");
-        let worst = travelled.motion.quality(&travelled.moved.mesh).worst;
-        Outcome { policy, start, single, travelled, worst, events }
+        let worst = outcome.motion.quality(&outcome.moved.mesh).worst;
+        Outcome { policy, start, single, outcome, worst, events }
     }
 }
 
 impl Outcome {
     /// Share of the way to the first inversion that each round used.
     pub fn shares(&self) -> Vec<f64> {
-        let share = |event: &Event| match event {
-            Event::Stepped { share, .. } => Some(*share),
-            Event::Rescued { .. } => None,
+        let share = |event: &StepEvent| match event {
+            StepEvent::Stepped { share, .. } => Some(*share),
+            StepEvent::FellBack { .. } => None,
         };
         self.events.iter().filter_map(share).collect()
     }

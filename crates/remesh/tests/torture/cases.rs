@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shield};
 use fluxmorph_geometry::io::msh::read_msh_file;
 use fluxmorph_geometry::tet4::{add, cross, sub};
-use fluxmorph_remesh::{Boundary, BoundaryKind, Guidance, RemeshSetup, Subregion};
+use fluxmorph_remesh::{Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, Subregion};
 
 use crate::case::Case;
 use crate::support::{Point, nodes_where, plate_bottom, shield_setup, whole};
@@ -105,7 +105,7 @@ pub fn shield_parameters() -> ShieldParameters {
 const THICKNESS: [f64; 2] = [-5e-3, 20e-3];
 
 /// Control points at the 20 mm pitch alternate between the bounds, bilinear between them: 5 and 30 mm.
-pub fn alternating_control_points(p: &ShieldParameters, guidance: Guidance) -> Case {
+pub fn alternating_control_points(p: &ShieldParameters, kinematic_constraint: KinematicConstraint) -> Case {
     let pitch = p.pitch;
     let last = [0, 1].map(|d| (p.plate[d] / pitch).round() as usize - 1);
     let thickened = move |x: Point| {
@@ -114,11 +114,11 @@ pub fn alternating_control_points(p: &ShieldParameters, guidance: Guidance) -> C
         let at = |i: usize, j: usize| THICKNESS[(cell[0] + i + cell[1] + j) % 2];
         (1.0 - s) * ((1.0 - t) * at(0, 0) + t * at(0, 1)) + s * ((1.0 - t) * at(1, 0) + t * at(1, 1))
     };
-    shield_case("shield, control points 5/30 mm", p, guidance, thickened)
+    shield_case("shield, control points 5/30 mm", p, kinematic_constraint, thickened)
 }
 
 /// Every node of the surface alternates with its neighbours along both grid lines.
-pub fn alternating_nodes(p: &ShieldParameters, guidance: Guidance) -> Case {
+pub fn alternating_nodes(p: &ShieldParameters, kinematic_constraint: KinematicConstraint) -> Case {
     let mesh = shield(p).expect("valid parameters");
     let lines: [Vec<f64>; 2] = [0, 1].map(|d| {
         let mut lines: Vec<f64> = plate_bottom(&mesh).iter().map(|&n| mesh.point(n)[d]).collect();
@@ -130,25 +130,26 @@ pub fn alternating_nodes(p: &ShieldParameters, guidance: Guidance) -> Case {
         let line = |d: usize| lines[d].partition_point(|l| *l < x[d]);
         THICKNESS[(line(0) + line(1)) % 2]
     };
-    shield_case("shield, surface nodes 5/30 mm", p, guidance, thickened)
+    shield_case("shield, surface nodes 5/30 mm", p, kinematic_constraint, thickened)
 }
 
 fn shield_case(
     name: &str,
     p: &ShieldParameters,
-    guidance: Guidance,
+    kinematic_constraint: KinematicConstraint,
     thickened: impl Fn(Point) -> f64 + Sync + 'static,
 ) -> Case {
     let mesh = shield(p).expect("valid parameters");
     let policy = Default::default();
-    let poisson = match guidance {
-        Guidance::Free => 0.2,
-        Guidance::Axis(_) => 0.0,
+    let poisson = match kinematic_constraint {
+        KinematicConstraint::Free => 0.2,
+        KinematicConstraint::Axis(_) => 0.0,
     };
-    let setup = RemeshSetup { guidance, ..shield_setup(&mesh, &["plate", "remesh"], policy, poisson) };
-    let name = match guidance {
-        Guidance::Free => format!("{name}, free"),
-        Guidance::Axis(_) => format!("{name}, along z"),
+    let setup =
+        RemeshSetup { kinematic_constraint, ..shield_setup(&mesh, &["plate", "remesh"], policy, poisson) };
+    let name = match kinematic_constraint {
+        KinematicConstraint::Free => format!("{name}, free"),
+        KinematicConstraint::Axis(_) => format!("{name}, along z"),
     };
     Case::new(&name, mesh, setup, move |t, p| [0.0, 0.0, -t * thickened(p)])
 }

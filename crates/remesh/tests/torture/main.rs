@@ -13,23 +13,23 @@ mod support;
 
 use case::{Case, Outcome};
 use fluxmorph_geometry::quality::qualities;
-use fluxmorph_remesh::{Guidance, Limits, StiffnessPolicy};
+use fluxmorph_remesh::{KinematicConstraint, StepLimits, StiffnessPolicy};
 
 /// Outcomes of a case, with what holds for every one: the motion arrives, every element on the way is valid, and every
 /// round kept away from inversion.
 fn arrived(case: &Case, policies: &[StiffnessPolicy]) -> Vec<Outcome> {
-    let outcomes: Vec<_> = policies.iter().map(|&p| case.outcome(p, &Limits::default())).collect();
+    let outcomes: Vec<_> = policies.iter().map(|&p| case.outcome(p, &StepLimits::default())).collect();
     for outcome in &outcomes {
         println!("{}", page::row(case, outcome));
         let place = format!("{}, {}", case.name, outcome.policy.name());
-        assert_eq!(outcome.travelled.reached, 1.0, "{place}");
-        let qualities = qualities(&outcome.travelled.moved.mesh);
+        assert_eq!(outcome.outcome.reached, 1.0, "{place}");
+        let qualities = qualities(&outcome.outcome.moved.mesh);
         assert!(qualities.iter().all(|q| *q > 0.0), "{place}");
         for share in outcome.shares() {
-            assert!((0.0..=Limits::default().inversion_share).contains(&share), "{place}: {share}");
+            assert!((0.0..=StepLimits::default().inversion_share).contains(&share), "{place}: {share}");
         }
-        let (moved, goal) = (&outcome.travelled.moved, (case.path)(1.0));
-        for (node, u) in outcome.travelled.motion.map().design_nodes().iter().zip(&goal) {
+        let (moved, goal) = (&outcome.outcome.moved, (case.path)(1.0));
+        for (node, u) in outcome.outcome.motion.map().design_nodes().iter().zip(&goal) {
             let off = support::largest_difference(&[moved.displacement[node.index()]], &[*u]);
             assert!(off <= 1e-15, "{place}: {off}"); // rounding of sums of centimetres
         }
@@ -68,8 +68,9 @@ fn a_cylinder_is_shifted_by_80_percent_of_its_gap_and_turned_by_45_degrees() {
 #[test]
 fn control_points_of_the_shield_alternate_between_5_and_30_mm() {
     let parameters = cases::shield_parameters();
-    for guidance in [Guidance::Axis(2), Guidance::Free] {
-        let outcomes = arrived(&cases::alternating_control_points(&parameters, guidance), &GRADED);
+    for kinematic_constraint in [KinematicConstraint::Axis(2), KinematicConstraint::Free] {
+        let outcomes =
+            arrived(&cases::alternating_control_points(&parameters, kinematic_constraint), &GRADED);
         // Skin cells of 0.3 mm by 20 mm have a quality of 0.001 from the start: an eighth of it is left at the least.
         assert!(outcomes.iter().all(|o| o.single.inverted > 0 && o.worst > o.start / 8.0));
     }
@@ -78,18 +79,20 @@ fn control_points_of_the_shield_alternate_between_5_and_30_mm() {
 #[test]
 fn surface_nodes_of_the_shield_alternate_between_5_and_30_mm() {
     let parameters = cases::shield_parameters();
-    let outcomes =
-        arrived(&cases::alternating_nodes(&parameters, Guidance::Axis(2)), &[StiffnessPolicy::InverseVolume]);
+    let outcomes = arrived(
+        &cases::alternating_nodes(&parameters, KinematicConstraint::Axis(2)),
+        &[StiffnessPolicy::InverseVolume],
+    );
     assert!(outcomes[0].single.inverted > 1000);
 }
 
 #[test]
-#[ignore = "minutes: every policy and both guidances"]
+#[ignore = "minutes: every policy and both kinematic constraints"]
 fn every_policy_takes_the_shield_to_its_roughest_designs() {
     let parameters = cases::shield_parameters();
-    for guidance in [Guidance::Axis(2), Guidance::Free] {
-        arrived(&cases::alternating_control_points(&parameters, guidance), &ALL);
-        arrived(&cases::alternating_nodes(&parameters, guidance), &ALL);
+    for kinematic_constraint in [KinematicConstraint::Axis(2), KinematicConstraint::Free] {
+        arrived(&cases::alternating_control_points(&parameters, kinematic_constraint), &ALL);
+        arrived(&cases::alternating_nodes(&parameters, kinematic_constraint), &ALL);
     }
 }
 
@@ -98,7 +101,7 @@ fn every_policy_takes_the_shield_to_its_roughest_designs() {
 fn skin_layers_keep_70_percent_of_their_thickness() {
     for parameters in [skin::filled(), skin::cored()] {
         for policy in GRADED {
-            let kept = skin::kept(&parameters, policy, Guidance::Axis(2));
+            let kept = skin::kept(&parameters, policy, KinematicConstraint::Axis(2));
             println!("{}", page::skin_row("", &kept));
             for layer in &kept.layers[..3] {
                 assert!(layer.clear >= 0.70, "{policy:?}: {layer:?}");
@@ -106,6 +109,6 @@ fn skin_layers_keep_70_percent_of_their_thickness() {
         }
     }
     // The counterpart: one stiffness shares the loss out evenly, and half of every layer goes.
-    let kept = skin::kept(&skin::cored(), StiffnessPolicy::Uniform, Guidance::Axis(2));
+    let kept = skin::kept(&skin::cored(), StiffnessPolicy::Uniform, KinematicConstraint::Axis(2));
     assert!(kept.layers[..3].iter().all(|layer| layer.clear < 0.55));
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use fluxmorph_geometry::generate::ShieldParameters;
-use fluxmorph_remesh::{Guidance, StiffnessPolicy};
+use fluxmorph_remesh::{KinematicConstraint, StiffnessPolicy};
 
 use crate::case::{Case, Outcome};
 use crate::skin::{self, Kept};
@@ -17,7 +17,7 @@ const MARKS: [[&str; 2]; 2] = [
 
 /// One line of the table of motions.
 pub fn row(case: &Case, o: &Outcome) -> String {
-    let (single, t) = (&o.single, &o.travelled);
+    let (single, t) = (&o.single, &o.outcome);
     format!(
         "| {} | {} | {:.4} | {:.4} | {} | {:.3} | {} | {} | {} | {:.3} |",
         case.name,
@@ -28,7 +28,7 @@ pub fn row(case: &Case, o: &Outcome) -> String {
         single.step,
         short(o.worst),
         t.steps,
-        t.rescues,
+        t.fallbacks,
         t.reached
     )
 }
@@ -40,9 +40,9 @@ fn short(q: f64) -> String {
 
 /// One line of the table of layers.
 pub fn skin_row(plate: &str, kept: &Kept) -> String {
-    let motion = match kept.guidance {
-        Guidance::Free => "free",
-        Guidance::Axis(_) => "along z",
+    let motion = match kept.kinematic_constraint {
+        KinematicConstraint::Free => "free",
+        KinematicConstraint::Axis(_) => "along z",
     };
     let mut line = format!("| {plate} | {motion} | {} |", kept.policy.name());
     for layer in &kept.layers {
@@ -66,11 +66,11 @@ fn motions() -> String {
     let shield = cases::shield_parameters();
     let mut all: Vec<Case> = [0.45, -0.45, 0.8, -0.8].map(cases::block_line).into();
     all.extend([cases::growing_ball(), cases::rotor_about_own_axis(), cases::rotor_about_cross_axis()]);
-    for guidance in [Guidance::Axis(2), Guidance::Free] {
-        all.push(cases::alternating_control_points(&shield, guidance));
-        all.push(cases::alternating_nodes(&shield, guidance));
+    for kinematic_constraint in [KinematicConstraint::Axis(2), KinematicConstraint::Free] {
+        all.push(cases::alternating_control_points(&shield, kinematic_constraint));
+        all.push(cases::alternating_nodes(&shield, kinematic_constraint));
     }
-    let mut table = "| motion | stiffness | q before | one step: worst q | inverted | step to inversion | rounds: worst q | rounds | remedies | reached |\n|---|---|---|---|---|---|---|---|---|---|\n".to_owned();
+    let mut table = "| motion | stiffness | q before | one step: worst q | inverted | step to inversion | rounds: worst q | rounds | fallbacks | reached |\n|---|---|---|---|---|---|---|---|---|---|\n".to_owned();
     for case in all {
         for outcome in arrived(&case, &ALL) {
             table += &(row(&case, &outcome) + "\n");
@@ -83,9 +83,9 @@ fn layers() -> String {
     let plates: [(&str, ShieldParameters); 2] = [("filled", skin::filled()), ("cored", skin::cored())];
     let mut table = "| plate | motion | stiffness | 1st layer | 2nd | 3rd | 4th | 5th |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     for (name, parameters) in plates {
-        for guidance in [Guidance::Axis(2), Guidance::Free] {
+        for kinematic_constraint in [KinematicConstraint::Axis(2), KinematicConstraint::Free] {
             for policy in StiffnessPolicy::ALL {
-                table += &(skin_row(name, &skin::kept(&parameters, policy, guidance)) + "\n");
+                table += &(skin_row(name, &skin::kept(&parameters, policy, kinematic_constraint)) + "\n");
             }
         }
     }

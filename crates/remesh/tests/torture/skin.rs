@@ -3,7 +3,7 @@
 use fluxmorph_geometry::generate::ShieldParameters;
 use fluxmorph_geometry::tet4::{norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_remesh::{Guidance, Limits, StiffnessPolicy};
+use fluxmorph_remesh::{KinematicConstraint, StepLimits, StiffnessPolicy};
 
 use crate::cases::{alternating_control_points, shield_parameters};
 use crate::support::plate_columns;
@@ -11,7 +11,7 @@ use crate::support::plate_columns;
 /// The layers of the moved face from outside to inside, and how much of their thickness they keep.
 pub struct Kept {
     pub policy: StiffnessPolicy,
-    pub guidance: Guidance,
+    pub kinematic_constraint: KinematicConstraint,
     pub layers: Vec<Layer>,
 }
 
@@ -39,10 +39,14 @@ pub fn cored() -> ShieldParameters {
 }
 
 /// What is left when the control points alternate between 5 and 30 mm.
-pub fn kept(p: &ShieldParameters, policy: StiffnessPolicy, guidance: Guidance) -> Kept {
-    let case = alternating_control_points(p, guidance);
-    let outcome = case.outcome(policy, &Limits::default());
-    let moved = &outcome.travelled.moved.mesh;
+pub fn kept(
+    p: &ShieldParameters,
+    policy: StiffnessPolicy,
+    kinematic_constraint: KinematicConstraint,
+) -> Kept {
+    let case = alternating_control_points(p, kinematic_constraint);
+    let outcome = case.outcome(policy, &StepLimits::default());
+    let moved = &outcome.outcome.moved.mesh;
     let columns = plate_columns(&case.mesh);
     // On the side layers' innermost line a column is still as wide as the plate's other ones on one side.
     let inner = [0, 1].map(|d| p.plate[d] - p.side_skin.last().copied().unwrap_or(0.0) + 1e-9);
@@ -58,5 +62,5 @@ pub fn kept(p: &ShieldParameters, policy: StiffnessPolicy, guidance: Guidance) -
             mean: columns.iter().map(share).sum::<f64>() / columns.len() as f64,
         }
     };
-    Kept { policy, guidance, layers: (0..p.skin.len()).map(of_layer).collect() }
+    Kept { policy, kinematic_constraint, layers: (0..p.skin.len()).map(of_layer).collect() }
 }

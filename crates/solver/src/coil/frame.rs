@@ -46,17 +46,17 @@ impl Frame {
             value: format!("{value:?}"),
             expected: expected.to_owned(),
         };
-        let normal = normalised(axis)
+        let normal = normalise(axis)
             .ok_or_else(|| refuse("axis", axis, "a vector with a length, such as [0.0, 0.0, 1.0]"))?;
         let nearest = (1..3).fold(0, |best, d| if normal[d].abs() > normal[best].abs() { d } else { best });
         let wanted = direction.unwrap_or_else(|| unit((nearest + 1) % 3));
-        let first = normalised(wanted)
+        let first = normalise(wanted)
             .map(|w| {
                 let along = dot(w, normal);
                 sub(w, normal.map(|c| along * c))
             })
             .filter(|across| norm(*across) > PARALLEL)
-            .and_then(normalised)
+            .and_then(normalise)
             .ok_or_else(|| refuse("direction", wanted, "a vector with a length across the coil's axis"))?;
         Ok(Self { centre, directions: [first, cross(normal, first), normal] })
     }
@@ -92,7 +92,7 @@ fn unit(d: usize) -> Point {
 }
 
 /// The unit vector along `v`; `None` without a finite length above zero.
-fn normalised(v: Point) -> Option<Point> {
+fn normalise(v: Point) -> Option<Point> {
     let length = norm(v);
     (length > 0.0 && length.is_finite()).then(|| v.map(|c| c / length))
 }

@@ -47,8 +47,8 @@ impl SourceTerms {
                 }
             }
         }
-        let currents = merged(currents).into_iter().map(|(e, [j])| (e, j)).collect();
-        Ok(Self { moments: merged(all), currents })
+        let currents = merge(currents).into_iter().map(|(e, [j])| (e, j)).collect();
+        Ok(Self { moments: merge(all), currents })
     }
 
     /// Elements with a source, ascending: these must not move.
@@ -62,7 +62,7 @@ impl SourceTerms {
 }
 
 /// Adds up what falls on the same element; coils keep their order, so that the bits do not depend on anything else.
-fn merged<const N: usize>(mut all: Vec<(ElementId, [Complex3; N])>) -> Vec<(ElementId, [Complex3; N])> {
+fn merge<const N: usize>(mut all: Vec<(ElementId, [Complex3; N])>) -> Vec<(ElementId, [Complex3; N])> {
     all.sort_by_key(|(e, _)| *e);
     let mut sums: Vec<(ElementId, [Complex3; N])> = Vec::with_capacity(all.len());
     for (e, terms) in all {

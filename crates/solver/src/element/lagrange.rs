@@ -39,10 +39,10 @@ pub struct Lagrange<const N: usize, const M: usize> {
     tables: Vec<Vec<Tabulated<N>>>,
 }
 
-static LINEAR_TET: LazyLock<Lagrange<4, 4>> = LazyLock::new(|| Lagrange::new(1.0, linear()).tabulated());
+static LINEAR_TET: LazyLock<Lagrange<4, 4>> = LazyLock::new(|| Lagrange::new(1.0, linear()).tabulate());
 static LINEAR_TRIANGLE: LazyLock<Lagrange<3, 3>> = LazyLock::new(|| Lagrange::new(1.0, linear()));
 static QUADRATIC_TET: LazyLock<Lagrange<10, 4>> =
-    LazyLock::new(|| Lagrange::new(2.0, quadratic(&EDGES)).tabulated());
+    LazyLock::new(|| Lagrange::new(2.0, quadratic(&EDGES)).tabulate());
 static QUADRATIC_TRIANGLE: LazyLock<Lagrange<6, 3>> =
     LazyLock::new(|| Lagrange::new(2.0, quadratic(&TRIANGLE_EDGES)));
 
@@ -167,7 +167,7 @@ impl<const N: usize> Lagrange<N, 4> {
         &self.tables[rule as usize]
     }
 
-    fn tabulated(mut self) -> Self {
+    fn tabulate(mut self) -> Self {
         let along: [[usize; 2]; N] =
             std::array::from_fn(|a| a.checked_sub(4).map_or([a, a], |edge| EDGES[edge]));
         let at = |&(lambda, share): &Node| Tabulated {

@@ -137,7 +137,7 @@ pub fn shape_derivative<const N: usize>(
             tensor[d][d] += covariance;
         }
     }
-    stretched(tet, &tensor)
+    stretch(tet, &tensor)
 }
 
 /// What `⟨A_l·A_u⟩` of linear fields is more than the product of their means: `⟨λ_a λ_b⟩ = (1 + δ_ab)/20` against
@@ -157,7 +157,7 @@ fn linear_covariance<const N: usize>(l: &NodalField<N>, u: &NodalField<N>) -> c6
 }
 
 /// `V S ∇λ_k` for the four vertices: from an Eshelby tensor to the derivative with respect to the positions.
-pub fn stretched(tet: &Tet4, tensor: &[Complex3; 3]) -> [Complex3; 4] {
+pub fn stretch(tet: &Tet4, tensor: &[Complex3; 3]) -> [Complex3; 4] {
     tet.gradients.map(|g| {
         std::array::from_fn(|d| {
             tet.volume * (tensor[d][0] * g[0] + tensor[d][1] * g[1] + tensor[d][2] * g[2])
@@ -274,5 +274,5 @@ pub fn magnet_shape_derivative<const N: usize>(
         }
         tensor[d][d] += integrand;
     }
-    stretched(tet, &tensor)
+    stretch(tet, &tensor)
 }

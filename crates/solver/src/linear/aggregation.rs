@@ -55,7 +55,7 @@ pub(crate) fn prolongation(
         for own in column.iter_mut().filter(|own| **own != NONE) {
             *own = aggregate[*own as usize];
         }
-        graph = merged(&graph, &aggregate, fewer);
+        graph = merge(&graph, &aggregate, fewer);
         count = fewer;
         exists = vec![true; count];
     }
@@ -112,7 +112,7 @@ fn pairs(graph: &Graph, exists: &[bool]) -> (Vec<u32>, usize) {
 }
 
 /// The graph of the pairs.
-fn merged(graph: &Graph, pair: &[u32], count: usize) -> Graph {
+fn merge(graph: &Graph, pair: &[u32], count: usize) -> Graph {
     let mut merged: Graph = vec![Vec::new(); count];
     for (row, &own) in graph.iter().zip(pair).filter(|(_, own)| **own != NONE) {
         let others = row.iter().map(|&(other, weight)| (pair[other as usize], weight));

@@ -1,12 +1,13 @@
 //! A system whose rows lie on several ranks: rank 0 has right sides and solutions, an engine behind
-//! [`DistributedSolver`](fluxmorph_geometry::ranks::DistributedSolver) does the rest.
+//! [`DistributedSolver`](fluxmorph_geometry::parallel::DistributedSolver) does the rest.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::ranks::{
-    Krylov, Preconditioning, RankError, Shared, Solved, SolverOptions, SubSolver, numbers_of, solution_of,
+use fluxmorph_geometry::parallel::{
+    CommandChannel, Krylov, Preconditioning, RankError, Solved, SolverOptions, SubSolver, numbers_of,
+    solution_of,
 };
 
 use super::LinearSolverReport;
@@ -14,7 +15,7 @@ use super::method::LinearSolverSettings;
 use super::range::checked_norm;
 use crate::error::SolverError;
 
-/// The order to solve with the present matrix.
+/// The command to solve with the present matrix.
 pub(crate) const SOLVE: u32 = 1;
 
 /// How distributed systems are solved.
@@ -69,7 +70,7 @@ impl DistributedSettings {
         }
     }
 
-    /// What the engine is told for so many unknowns.
+    /// What the engine is to do for so many unknowns.
     pub fn options(
         &self,
         prefix: &'static str,
@@ -89,7 +90,7 @@ impl DistributedSettings {
 /// A matrix on several ranks, ready to be solved with.
 #[derive(Debug)]
 pub struct DistributedSystem {
-    shared: Arc<Shared>,
+    channel: Arc<CommandChannel>,
     required: f64,
     /// Which of the matrices that the ranks have taken it is, and how many they have.
     own: u64,
@@ -98,9 +99,13 @@ pub struct DistributedSystem {
 
 impl DistributedSystem {
     /// The system whose matrix every rank has just taken.
-    pub(crate) fn new(shared: Arc<Shared>, settings: &LinearSolverSettings, taken: &Arc<AtomicU64>) -> Self {
+    pub(crate) fn new(
+        channel: Arc<CommandChannel>,
+        settings: &LinearSolverSettings,
+        taken: &Arc<AtomicU64>,
+    ) -> Self {
         let own = taken.fetch_add(1, Ordering::SeqCst) + 1;
-        Self { shared, required: settings.required, own, taken: Arc::clone(taken) }
+        Self { channel, required: settings.required, own, taken: Arc::clone(taken) }
     }
 
     /// Solves `K x = b`.
@@ -115,9 +120,9 @@ impl DistributedSystem {
         }
         if self.taken.load(Ordering::SeqCst) != self.own {
             let cause = "the ranks have taken another matrix since this one was prepared".to_owned();
-            return Err(RankError { rank: 0, ranks: self.shared.team().size(), cause }.into());
+            return Err(RankError { rank: 0, ranks: self.channel.group().size(), cause }.into());
         }
-        let answer = self.shared.order(SOLVE, numbers_of(right_side).collect())?;
+        let answer = self.channel.execute(SOLVE, numbers_of(right_side).collect())?;
         let (x, Solved { iterations, residual }) = solution_of(&answer);
         if residual.is_nan() || residual > self.required {
             let cause = "more memory or ranks for a factor (analysis.petsc.solver = \"mumps\"), a larger \

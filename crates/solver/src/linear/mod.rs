@@ -1,19 +1,19 @@
 //! The linear systems `K x = b` with complex symmetric `K`: the one place where a solver is chosen.
 //!
 //! Every method is COCG ([`cocg`]) with a preconditioner, from a factor of `K` itself to an incomplete one ([`Method`] has
-//! the ladder); what is fixed is the true residual of the solution. State and adjoint share the matrix, hence everything
+//! the list); what is fixed is the true residual of the solution. State and adjoint share the matrix, hence everything
 //! [`PreparedSystem`] holds; what follows from the pattern alone is made once a run in [`SystemAnalysis`]; what one
-//! design leaves for the next (a factor, solutions to start from) is [`SolverMemory`], and whether an old factor still pays is
+//! design leaves for the next (a factor, solutions to start from) is [`LinearSolverCache`], and whether an old factor still pays is
 //! decided by counted work (`cost`), never by a clock, so that a run has the same bits on any machine. All of that is a
-//! [`system::LocalSystem`]; where a mesh is shared out over ranks, a [`distributed`] system has an engine of theirs solve.
+//! [`system::LocalSystem`]; where a mesh is distributed over ranks, a [`distributed`] system has an engine of theirs solve.
 
 pub(crate) mod aggregation;
 mod analysis;
+mod cache;
 pub mod cocg;
 mod cost;
 pub mod distributed;
 mod factor;
-mod memory;
 mod method;
 mod preconditioner;
 mod prepared;
@@ -29,8 +29,8 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::SolverError;
 pub use analysis::{SystemAnalysis, TWO_LEVELS_FROM};
+pub use cache::LinearSolverCache;
 pub use distributed::{DistributedMethod, DistributedSettings, DistributedSystem};
-pub use memory::SolverMemory;
 pub(crate) use method::FieldKind;
 pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};
 pub use prepared::PreparedSystem;

@@ -3,8 +3,8 @@
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use super::LinearSolverReport;
+use super::cache::LinearSolverCache;
 use super::distributed::DistributedSystem;
-use super::memory::SolverMemory;
 use super::method::Method;
 use super::system::{LocalSystem, SolverEvent};
 use crate::error::SolverError;
@@ -52,10 +52,10 @@ impl PreparedSystem {
     }
 
     /// What the next design may start from.
-    pub fn into_memory(self) -> SolverMemory {
+    pub fn into_cache(self) -> LinearSolverCache {
         match self {
-            Self::Local(system) => system.into_memory(),
-            Self::Distributed(_) => SolverMemory::default(),
+            Self::Local(system) => system.into_cache(),
+            Self::Distributed(_) => LinearSolverCache::default(),
         }
     }
 

@@ -5,7 +5,7 @@
 //! | cause | what happens |
 //! |---|---|
 //! | the right side has an entry that is not finite, or the square of its norm is out of range | an error, nothing is solved |
-//! | a diagonal entry is zero, negative or not finite; a pivot is zero, lost or not finite; no memory | the next method of the ladder |
+//! | a diagonal entry is zero, negative or not finite; a pivot is zero, lost or not finite; no memory | the next more robust method |
 //! | the iteration breaks down, diverges to no number, or stops short of the residual | with an earlier factor: a factor of this matrix; with its own: the next method |
 //! | no method is left | an error with the last cause |
 //!
@@ -17,8 +17,8 @@ use std::sync::Arc;
 use fluxmorph_geometry::fem::{CsrMatrix, c64, norm};
 
 use super::analysis::SystemAnalysis;
+use super::cache::{CachedPreconditioner, LinearSolverCache};
 use super::cost::Ledger;
-use super::memory::{Held, SolverMemory};
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 use super::range::checked_norm;
@@ -87,27 +87,29 @@ enum Attempt {
 }
 
 impl LocalSystem {
-    /// Prepares the method for a matrix with the analysed pattern, and takes from `memory` what pays.
+    /// Prepares the method for a matrix with the analysed pattern, and takes from `cache` what pays.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] when the factorisation fails: the system is singular (see its message).
     pub(crate) fn new(
         analysis: &Arc<SystemAnalysis>,
         matrix: CsrMatrix<c64>,
-        memory: &mut SolverMemory,
+        cache: &mut LinearSolverCache,
     ) -> Result<Self, SolverError> {
-        let SolverMemory { held, method, solutions: before } = std::mem::take(memory);
+        let LinearSolverCache { preconditioner: cached, method, solutions: before } = std::mem::take(cache);
         let reuse = analysis.settings.reuse == Reuse::WhileItPays;
-        let pays = |held: &Held| {
-            let may = reuse && held.preconditioner.method.is_complete();
-            may && Arc::ptr_eq(&held.analysis, analysis) && held.ledger.pays()
+        let pays = |cached: &CachedPreconditioner| {
+            let may = reuse && cached.preconditioner.method.is_complete();
+            may && Arc::ptr_eq(&cached.analysis, analysis) && cached.ledger.pays()
         };
         let mut events = Vec::new();
-        let (preconditioner, origin, ledger) = match held.filter(pays) {
-            Some(Held { preconditioner, ledger, .. }) => (preconditioner, Origin::Earlier, ledger),
+        let (preconditioner, origin, ledger) = match cached.filter(pays) {
+            Some(CachedPreconditioner { preconditioner, ledger, .. }) => {
+                (preconditioner, Origin::Earlier, ledger)
+            }
             None => {
                 let first = method.unwrap_or(analysis.method());
-                let (own, ledger) = factored(analysis, &matrix, first, &mut events)?;
+                let (own, ledger) = factor(analysis, &matrix, first, &mut events)?;
                 (own, Origin::Own, ledger)
             }
         };
@@ -145,17 +147,21 @@ impl LocalSystem {
     }
 
     /// What the next design may start from.
-    pub fn into_memory(mut self) -> SolverMemory {
+    pub fn into_cache(mut self) -> LinearSolverCache {
         let method = self.preconditioner.as_ref().map(|p| p.method).filter(|&m| m != self.analysis.method());
         if self.analysis.settings.reuse == Reuse::Never {
-            return SolverMemory { method, ..SolverMemory::default() };
+            return LinearSolverCache { method, ..LinearSolverCache::default() };
         }
         let (iterations, solutions) = self.served;
         self.ledger.enter(iterations, solutions);
-        let held = |preconditioner| Held { analysis: self.analysis, preconditioner, ledger: self.ledger };
+        let cached = |preconditioner| CachedPreconditioner {
+            analysis: self.analysis,
+            preconditioner,
+            ledger: self.ledger,
+        };
         // The others are made for one matrix, and cheap beside their iterations.
         let kept = self.preconditioner.filter(|preconditioner| preconditioner.method.is_complete());
-        SolverMemory { held: kept.map(held), method, solutions: self.solutions }
+        LinearSolverCache { preconditioner: kept.map(cached), method, solutions: self.solutions }
     }
 
     /// Solves `K x = b`.
@@ -276,7 +282,7 @@ impl LocalSystem {
     /// Takes a factor of this matrix.
     fn refresh(&mut self, method: Method) -> Result<(), SolverError> {
         self.preconditioner = None;
-        let (own, ledger) = factored(&self.analysis, &self.matrix, method, &mut self.events)?;
+        let (own, ledger) = factor(&self.analysis, &self.matrix, method, &mut self.events)?;
         self.preconditioner = Some(own);
         self.ledger = ledger;
         self.served = (0, 0);
@@ -316,7 +322,7 @@ impl LocalSystem {
 }
 
 /// The preconditioner of a method, or of the first more robust one that can be made.
-fn factored(
+fn factor(
     analysis: &SystemAnalysis,
     matrix: &CsrMatrix<c64>,
     method: Method,

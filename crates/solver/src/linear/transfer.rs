@@ -19,7 +19,7 @@ pub(crate) struct Transfer {
 impl Transfer {
     /// The transfer of a prolongation.
     pub(crate) fn new(prolongation: CsrMatrix<f64>) -> Self {
-        let restriction = transposed(&prolongation);
+        let restriction = transpose(&prolongation);
         Self { prolongation, restriction }
     }
 
@@ -35,14 +35,14 @@ impl Transfer {
     }
 
     /// `Pᵀ r`.
-    pub(crate) fn restricted(&self, r: &[c64]) -> Vec<c64> {
+    pub(crate) fn restrict(&self, r: &[c64]) -> Vec<c64> {
         let mut coarse = vec![c64::default(); self.coarse_count()];
         self.restriction.mul(r, &mut coarse);
         coarse
     }
 
     /// `z += P x`.
-    pub(crate) fn add_prolonged(&self, x: &[c64], z: &mut [c64]) {
+    pub(crate) fn add_prolongation(&self, x: &[c64], z: &mut [c64]) {
         let CsrMatrix { structure, values } = &self.prolongation;
         z.par_chunks_mut(ROWS).enumerate().for_each(|(task, rows)| {
             for (i, z) in rows.iter_mut().enumerate() {
@@ -126,7 +126,7 @@ impl Transfer {
     }
 }
 
-fn transposed(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {
+fn transpose(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {
     let structure = &matrix.structure;
     let mut row_starts = vec![0u32; structure.column_count + 1];
     for &c in &structure.columns {
@@ -175,8 +175,8 @@ mod tests {
         assert_eq!(coarse.entry(0, 1), Some(c64::new(-0.5, 0.0)));
         assert_eq!(coarse.entry(1, 0), coarse.entry(0, 1));
         let mut z = vec![c64::default(); 4];
-        transfer.add_prolonged(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
+        transfer.add_prolongation(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
         assert_eq!(z[1], c64::new(0.5, 0.0));
-        assert_eq!(transfer.restricted(&z)[1], c64::new(0.0, 2.5));
+        assert_eq!(transfer.restrict(&z)[1], c64::new(0.0, 2.5));
     }
 }

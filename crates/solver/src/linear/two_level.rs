@@ -123,10 +123,10 @@ impl TwoLevel {
     /// `z += Q r`.
     fn correct(&self, r: &[c64], z: &mut [c64]) {
         let transfer = &self.analysis.transfer;
-        let restricted = transfer.restricted(r);
+        let restricted = transfer.restrict(r);
         let mut coarse = vec![c64::default(); restricted.len()];
         self.coarse.apply(&restricted, &mut coarse);
-        transfer.add_prolonged(&coarse, z);
+        transfer.add_prolongation(&coarse, z);
     }
 }
 

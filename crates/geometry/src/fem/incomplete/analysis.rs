@@ -64,7 +64,7 @@ impl IncompleteAnalysis {
     fn with_parts(structure: &Arc<CsrStructure>, parts: Parts) -> Arc<Self> {
         let n = structure.row_count();
         let Parts { order, slabs, separators } = parts;
-        let inverse = ordering::inverted(&order);
+        let inverse = ordering::inverse_permutation(&order);
         let lower: Vec<Vec<u32>> = order
             .par_iter()
             .enumerate()

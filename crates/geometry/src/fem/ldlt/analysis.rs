@@ -46,8 +46,8 @@ impl LdltAnalysis {
             None => ordering::minimum_degree(structure)
                 .ok_or_else(|| failed("out of memory for the minimum degree order".to_owned()))?,
         };
-        let order = ordering::postordered(structure, order);
-        let inverse = ordering::inverted(&order);
+        let order = ordering::postorder(structure, order);
+        let inverse = ordering::inverse_permutation(&order);
         let (starts, rows) = ordering::upper_triangle(structure, &order, &inverse);
         let upper = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
         let mut tree = vec![0i32; n];

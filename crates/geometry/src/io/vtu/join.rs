@@ -13,7 +13,7 @@ use crate::ids::NodeId;
 /// # Errors
 /// [`MeshError::Vtu`] names the piece that has no such numbers, impossible ones, or other arrays than the first; or a node
 /// or element that is in no piece, or an element that is in several.
-pub fn joined(pieces: Vec<(String, VtuContents)>) -> Result<VtuContents, MeshError> {
+pub fn join_pieces(pieces: Vec<(String, VtuContents)>) -> Result<VtuContents, MeshError> {
     let mut parts = Vec::with_capacity(pieces.len());
     for (name, mut contents) in pieces {
         // Some of the ranks of a small mesh have nothing to write.

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use crate::error::MeshError;
 use crate::ids::NodeId;
 use crate::tet4::Point;
-pub use join::joined;
+pub use join::join_pieces;
 pub use piece::{VtuPiece, pvtu_text};
 pub use reader::{pvtu_pieces, read_vtu, vtu_contents};
 pub use writer::{vtu_bytes, vtu_bytes_at, write_vtu};

@@ -231,7 +231,7 @@ fn encode(arrays: &[Array<'_>]) -> Result<Vec<String>, MeshError> {
         arrays.iter().flat_map(|array| array.values.blocks().map(|block| (&array.values, block))).collect();
     let compressed: Vec<Vec<u8>> = blocks
         .par_iter()
-        .map_init(Deflater::new, |deflater, (values, block)| deflater.compressed(values, block.clone()))
+        .map_init(Deflater::new, |deflater, (values, block)| deflater.compress(values, block.clone()))
         .collect::<Result<_, _>>()?;
     let mut rest = compressed.as_slice();
     let of: Vec<&[Vec<u8>]> = arrays
@@ -290,7 +290,7 @@ impl Deflater {
         Self { zlib: Compress::new(Compression::fast(), true), bytes: Vec::with_capacity(BLOCK_BYTES) }
     }
 
-    fn compressed(&mut self, values: &Values<'_>, numbers: Range<usize>) -> Result<Vec<u8>, MeshError> {
+    fn compress(&mut self, values: &Values<'_>, numbers: Range<usize>) -> Result<Vec<u8>, MeshError> {
         values.fill(numbers, &mut self.bytes);
         self.zlib.reset();
         // Stored as it is, a block grows by a few bytes every 16 KiB or more, and six around it.

@@ -48,9 +48,9 @@ impl Frame {
     pub(crate) const COORDINATES: Self = Self { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
 }
 
-/// The outcome at one node.
+/// What is fixed at one node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Constraint {
+pub(crate) struct FixedDirections {
     /// Directions of the components.
     pub(crate) frame: Frame,
     /// Bit `k`: component `k` is fixed.
@@ -58,7 +58,7 @@ pub(crate) struct Constraint {
 }
 
 /// The fixed directions at a node at which faces with these area vectors meet.
-pub(crate) fn constraint(faces: &[(Fix, Point)]) -> Constraint {
+pub(crate) fn fixed_directions(faces: &[(Fix, Point)]) -> FixedDirections {
     let mut surfaces = smooth_surfaces(faces);
     // Planes along the axes first: they are exact.
     surfaces.sort_by_key(|(_, normal)| axis_of(*normal).is_none());
@@ -141,14 +141,14 @@ fn extend(basis: &mut Vec<Point>, vector: Point) {
 }
 
 /// The frame whose first directions are the fixed ones; the coordinate axes where these span the same.
-fn complete(basis: &[Point]) -> Constraint {
+fn complete(basis: &[Point]) -> FixedDirections {
     if basis.len() == 3 {
-        return Constraint { frame: Frame::COORDINATES, fixed: 0b111 };
+        return FixedDirections { frame: Frame::COORDINATES, fixed: 0b111 };
     }
     let axes: Option<Vec<usize>> = basis.iter().map(|&b| axis_of(b)).collect();
     if let Some(axes) = axes {
         let fixed = axes.iter().fold(0, |bits, axis| bits | 1 << axis);
-        return Constraint { frame: Frame::COORDINATES, fixed };
+        return FixedDirections { frame: Frame::COORDINATES, fixed };
     }
     let frame = match *basis {
         [only] => {
@@ -161,8 +161,8 @@ fn complete(basis: &[Point]) -> Constraint {
     let fixed = (1 << basis.len()) - 1;
     // Two directions across an axis fix the two others, however they lie in the plane.
     match (basis.len(), axis_of(frame.axes[2])) {
-        (2, Some(axis)) => Constraint { frame: Frame::COORDINATES, fixed: 0b111 & !(1 << axis) },
-        _ => Constraint { frame, fixed },
+        (2, Some(axis)) => FixedDirections { frame: Frame::COORDINATES, fixed: 0b111 & !(1 << axis) },
+        _ => FixedDirections { frame, fixed },
     }
 }
 
@@ -174,9 +174,9 @@ mod tests {
     fn planes_along_the_axes_fix_coordinates() {
         let x = [-2.0, 0.0, 0.0];
         let y = [0.0, 3.0, 0.0];
-        let of = |faces: &[(Fix, Point)]| constraint(faces);
-        assert_eq!(of(&[(Fix::Tangential, x)]), Constraint { frame: Frame::COORDINATES, fixed: 0b110 });
-        assert_eq!(of(&[(Fix::Normal, x)]), Constraint { frame: Frame::COORDINATES, fixed: 0b001 });
+        let of = |faces: &[(Fix, Point)]| fixed_directions(faces);
+        assert_eq!(of(&[(Fix::Tangential, x)]), FixedDirections { frame: Frame::COORDINATES, fixed: 0b110 });
+        assert_eq!(of(&[(Fix::Normal, x)]), FixedDirections { frame: Frame::COORDINATES, fixed: 0b001 });
         assert_eq!(of(&[(Fix::Tangential, x), (Fix::Normal, y)]).fixed, 0b110);
         assert_eq!(of(&[(Fix::Tangential, x), (Fix::Tangential, y)]).fixed, 0b111);
         assert_eq!(of(&[(Fix::Normal, x), (Fix::Normal, y)]).fixed, 0b011);
@@ -186,11 +186,11 @@ mod tests {
     fn a_curved_surface_leaves_its_mean_normal() {
         let n = unit([1.0, 2.0, 2.0]);
         let tilted = [[1.1, 2.0, 2.0], [0.9, 2.0, 2.0]].map(|v: Point| (Fix::Tangential, v));
-        let c = constraint(&tilted);
+        let c = fixed_directions(&tilted);
         assert_eq!(c.fixed, 0b011);
         assert!((dot(c.frame.axes[2], n).abs() - 1.0).abs() < 1e-12);
         // Its normal component alone:
-        let c = constraint(&[(Fix::Normal, n)]);
+        let c = fixed_directions(&[(Fix::Normal, n)]);
         assert_eq!(c.fixed, 0b001);
         assert!((dot(c.frame.axes[0], n).abs() - 1.0).abs() < 1e-12);
     }
@@ -200,10 +200,10 @@ mod tests {
         // The faces of a sphere beside the plane x = 0 lie on one side of it: their mean normal leans to +x.
         let sphere = [0.1, 0.6, 0.8];
         let plane = [-1.0, 0.0, 0.0];
-        let c = constraint(&[(Fix::Tangential, sphere), (Fix::Normal, plane)]);
+        let c = fixed_directions(&[(Fix::Tangential, sphere), (Fix::Normal, plane)]);
         assert_eq!(c.fixed, 0b011, "x and the tangent in the plane");
         assert!((dot(c.frame.axes[2], [0.0, 0.6, 0.8]).abs() - 1.0).abs() < 1e-12);
-        let c = constraint(&[(Fix::Tangential, sphere), (Fix::Tangential, plane)]);
+        let c = fixed_directions(&[(Fix::Tangential, sphere), (Fix::Tangential, plane)]);
         assert_eq!(c.fixed, 0b111);
     }
 
@@ -214,7 +214,7 @@ mod tests {
             vec![(Fix::Tangential, [0.3, -0.4, 0.7])],
             vec![(Fix::Normal, [0.3, -0.4, 0.7]), (Fix::Normal, [0.9, 0.4, 0.1])],
         ] {
-            let axes = constraint(&faces).frame.axes;
+            let axes = fixed_directions(&faces).frame.axes;
             for i in 0..3 {
                 for j in 0..3 {
                     let expected = f64::from(u8::from(i == j));

@@ -5,11 +5,11 @@
 
 use std::sync::{Arc, Barrier, Mutex, PoisonError};
 
+use super::communicator::{Communicator, DistributedSolver, Rows, Solved, SolverOptions};
+use super::layout::RowLayout;
+use super::{complex_of, numbers_of};
 use crate::fem::csr::CsrStructure;
 use crate::fem::{CsrMatrix, Ldlt, LdltAnalysis, c64, norm, ordering};
-use crate::ranks::communicator::{Communicator, DistributedSolver, Rows, Solved, SolverOptions};
-use crate::ranks::layout::RowLayout;
-use crate::ranks::{complex_of, numbers_of};
 
 /// What the ranks meet at.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ pub fn run<T: Send>(size: usize, work: impl Fn(Box<dyn Communicator>) -> T + Syn
 
 impl ThreadRank {
     /// Puts the own numbers where all see them, and lets `read` look at everyone's.
-    fn exchanged<T>(&self, own: &[f64], read: impl FnOnce(&[Vec<f64>]) -> T) -> T {
+    fn exchange<T>(&self, own: &[f64], read: impl FnOnce(&[Vec<f64>]) -> T) -> T {
         let slots = || self.exchange.slots.lock().unwrap_or_else(PoisonError::into_inner);
         slots()[self.rank] = own.to_vec();
         self.exchange.barrier.wait();
@@ -66,12 +66,12 @@ impl Communicator for ThreadRank {
     }
 
     fn broadcast(&self, numbers: &mut [f64]) {
-        let first = self.exchanged(numbers, |all| all[0].clone());
+        let first = self.exchange(numbers, |all| all[0].clone());
         numbers.copy_from_slice(&first);
     }
 
     fn gather(&self, own: &[f64]) -> Vec<Vec<f64>> {
-        self.exchanged(own, |all| if self.rank == 0 { all.to_vec() } else { Vec::new() })
+        self.exchange(own, |all| if self.rank == 0 { all.to_vec() } else { Vec::new() })
     }
 
     fn sum(&self, numbers: &mut [f64]) {
@@ -90,25 +90,26 @@ impl Communicator for ThreadRank {
                 std::iter::once(columns.len() as f64).chain(columns.iter().map(|&c| f64::from(c)))
             })
             .collect();
-        let made = match self.gather(&pattern) {
+        let gathered = match self.gather(&pattern) {
             all if all.is_empty() => None,
-            all => Some(Whole::new(&rows.layout, &all)),
+            all => Some(GatheredMatrix::new(&rows.layout, &all)),
         };
-        let said = made.as_ref().map(|made| made.as_ref().map(|_| Vec::new()).map_err(Clone::clone));
-        let whole = made.and_then(Result::ok);
+        let outcome = gathered.as_ref().map(|whole| whole.as_ref().map(|_| Vec::new()).map_err(Clone::clone));
+        let whole = gathered.and_then(Result::ok);
         let solver = GatheredSolver { ranks: self.clone(), layout: rows.layout, whole };
-        solver.told(said)?;
+        solver.broadcast_outcome(outcome)?;
         Ok(Box::new(solver))
     }
 
-    fn abort(&self, exit_code: i32) -> ! {
-        std::process::exit(exit_code)
+    fn abort(&self, cause: Option<&str>) -> ! {
+        eprintln!("rank {} of {}: {}", self.rank, self.size, cause.unwrap_or("aborted"));
+        std::process::abort()
     }
 }
 
 /// The whole matrix at rank 0.
 #[derive(Debug)]
-struct Whole {
+struct GatheredMatrix {
     analysis: Arc<LdltAnalysis>,
     matrix: CsrMatrix<c64>,
     /// Place in the gathered values of every entry.
@@ -116,7 +117,7 @@ struct Whole {
     factor: Option<Ldlt<c64>>,
 }
 
-impl Whole {
+impl GatheredMatrix {
     fn new(layout: &RowLayout, parts: &[Vec<f64>]) -> Result<Self, String> {
         // Rows of all ranks in the order of the ranks, and where their values begin among all.
         let mut rows: Vec<(usize, Vec<u32>)> = Vec::new();
@@ -166,9 +167,9 @@ impl Whole {
         for (r, b) in residual.iter_mut().zip(right_side) {
             *r -= b;
         }
-        let mut said: Vec<f64> = numbers_of(&x).collect();
-        said.push(norm(&residual) / norm(right_side));
-        Ok(said)
+        let mut answer: Vec<f64> = numbers_of(&x).collect();
+        answer.push(norm(&residual) / norm(right_side));
+        Ok(answer)
     }
 }
 
@@ -177,19 +178,19 @@ impl Whole {
 struct GatheredSolver {
     ranks: ThreadRank,
     layout: Arc<RowLayout>,
-    whole: Option<Whole>,
+    whole: Option<GatheredMatrix>,
 }
 
 impl GatheredSolver {
     /// What rank 0 found, at every rank.
-    fn told(&self, outcome: Option<Result<Vec<f64>, String>>) -> Result<Vec<f64>, String> {
-        let said = outcome.unwrap_or(Ok(Vec::new()));
-        let mut length = [said.as_ref().map_or(-1.0, |numbers| numbers.len() as f64)];
+    fn broadcast_outcome(&self, outcome: Option<Result<Vec<f64>, String>>) -> Result<Vec<f64>, String> {
+        let outcome = outcome.unwrap_or(Ok(Vec::new()));
+        let mut length = [outcome.as_ref().map_or(-1.0, |numbers| numbers.len() as f64)];
         self.ranks.broadcast(&mut length);
         if length[0] < 0.0 {
-            return Err(said.err().unwrap_or_else(|| "rank 0 failed".to_owned()));
+            return Err(outcome.err().unwrap_or_else(|| "rank 0 failed".to_owned()));
         }
-        let mut numbers = said.unwrap_or_default();
+        let mut numbers = outcome.unwrap_or_default();
         numbers.resize(length[0] as usize, 0.0);
         self.ranks.broadcast(&mut numbers);
         Ok(numbers)
@@ -201,16 +202,16 @@ impl DistributedSolver for GatheredSolver {
         let own: Vec<f64> = numbers_of(values).collect();
         let parts = self.ranks.gather(&own);
         let outcome = self.whole.as_mut().map(|whole| whole.set(&parts).map(|()| Vec::new()));
-        self.told(outcome).map(|_| ())
+        self.broadcast_outcome(outcome).map(|_| ())
     }
 
     fn solve(&mut self, right_side: &[c64], solution: &mut [c64]) -> Result<Solved, String> {
         let own: Vec<f64> = numbers_of(right_side).collect();
         let parts = self.ranks.gather(&own);
-        let outcome = self.whole.as_ref().map(|whole| whole.solve(&self.layout.joined(&parts)));
-        let mut numbers = self.told(outcome)?;
+        let outcome = self.whole.as_ref().map(|whole| whole.solve(&self.layout.join(&parts)));
+        let mut numbers = self.broadcast_outcome(outcome)?;
         let residual = numbers.pop().unwrap_or(f64::NAN);
-        solution.copy_from_slice(&self.layout.own_of(&numbers));
+        solution.copy_from_slice(&self.layout.restrict(&numbers));
         Ok(Solved { iterations: 1, residual })
     }
 }
@@ -220,98 +221,98 @@ mod tests {
     use std::sync::atomic::AtomicUsize;
 
     use super::*;
-    use crate::ranks::team::{Member, Order, Part, Shared, Team};
+    use crate::parallel::rank_group::{Command, CommandChannel, CommandHandler, RankGroup, Role};
 
-    /// Adds the ranks' shares of the numbers, and fails where it is told to.
+    /// Adds the ranks' shares of the numbers, and fails where the command says so.
     struct Adding;
 
-    impl Part for Adding {
-        fn work(&mut self, order: &Order, ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
-            if order.kind == 100 + ranks.rank() as u32 {
+    impl CommandHandler for Adding {
+        fn handle(&mut self, command: &Command, ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
+            if command.kind == 100 + ranks.rank() as u32 {
                 return Err("the disk is full".to_owned());
             }
-            let share = ranks.rank()..order.numbers.len();
-            let mut sum = [share.step_by(ranks.size()).map(|i| order.numbers[i]).sum()];
+            let share = ranks.rank()..command.numbers.len();
+            let mut sum = [share.step_by(ranks.size()).map(|i| command.numbers[i]).sum()];
             ranks.sum(&mut sum);
             Ok(sum.to_vec())
         }
     }
 
-    /// Has a team of so many ranks share one part out, and the leader do something with it.
-    fn led<T: Send>(size: usize, lead: impl Fn(Shared) -> T + Sync) -> T {
-        let led = run(size, |ranks| {
-            let team = Team::new(ranks, Arc::default());
-            let shared = team.share(Box::new(Adding));
-            if team.member() == Member::Leader {
-                let result = lead(shared);
-                team.end();
+    /// What the leader of a group of so many ranks, with one handler, does with its channel.
+    fn lead<T: Send>(size: usize, work: impl Fn(CommandChannel) -> T + Sync) -> T {
+        let results = run(size, |ranks| {
+            let group = RankGroup::new(ranks, Arc::default());
+            let channel = group.register(Box::new(Adding));
+            if group.role() == Role::Leader {
+                let result = work(channel);
+                group.shut_down();
                 return Some(result);
             }
-            team.follow(Ok(()));
+            group.serve(Ok(()));
             None
         });
-        led.into_iter().flatten().next().expect("rank 0 leads")
+        results.into_iter().flatten().next().expect("rank 0 leads")
     }
 
     #[test]
-    fn every_rank_does_its_share_of_an_order() {
+    fn every_rank_does_its_share_of_a_command() {
         for size in [1, 2, 5] {
             let numbers: Vec<f64> = (0..17).map(f64::from).collect();
-            let sums = led(size, |shared| [0, 1].map(|kind| shared.order(kind, numbers.clone())));
+            let sums = lead(size, |channel| [0, 1].map(|kind| channel.execute(kind, numbers.clone())));
             assert_eq!(sums, [Ok(vec![136.0]), Ok(vec![136.0])]);
         }
     }
 
     #[test]
-    fn a_rank_that_is_not_ready_is_named_with_the_first_order() {
-        let said = run(3, |ranks| {
-            let team = Team::new(ranks, Arc::default());
-            let shared = team.share(Box::new(Adding));
-            if team.member() == Member::Leader {
-                let outcome = shared.order(0, vec![1.0]);
-                team.end();
+    fn a_rank_that_is_not_ready_is_named_with_the_first_command() {
+        let outcomes = run(3, |ranks| {
+            let group = RankGroup::new(ranks, Arc::default());
+            let channel = group.register(Box::new(Adding));
+            if group.role() == Role::Leader {
+                let outcome = channel.execute(0, vec![1.0]);
+                group.shut_down();
                 return Some(outcome);
             }
-            let ready = if team.rank() == 2 { Err("no such file".to_owned()) } else { Ok(()) };
-            team.follow(ready);
+            let ready = if group.rank() == 2 { Err("no such file".to_owned()) } else { Ok(()) };
+            group.serve(ready);
             None
         });
-        let error = said[0].clone().expect("rank 0 leads").expect_err("rank 2 is not ready");
+        let error = outcomes[0].clone().expect("rank 0 leads").expect_err("rank 2 is not ready");
         assert_eq!(error.to_string(), "rank 2 of 3: no such file");
     }
 
     #[test]
     fn a_rank_with_another_problem_is_named() {
-        let said = run(2, |ranks| {
-            let team = Team::new(ranks, Arc::default());
-            let shared = team.share(Box::new(Adding));
-            team.identify(7 + team.rank() as u64);
-            if team.member() == Member::Leader {
-                let outcome = shared.order(0, vec![1.0]);
-                team.end();
+        let outcomes = run(2, |ranks| {
+            let group = RankGroup::new(ranks, Arc::default());
+            let channel = group.register(Box::new(Adding));
+            group.set_identity(7 + group.rank() as u64);
+            if group.role() == Role::Leader {
+                let outcome = channel.execute(0, vec![1.0]);
+                group.shut_down();
                 return Some(outcome);
             }
-            team.follow(Ok(()));
+            group.serve(Ok(()));
             None
         });
-        let error = said[0].clone().expect("rank 0 leads").expect_err("rank 1 differs").to_string();
+        let error = outcomes[0].clone().expect("rank 0 leads").expect_err("rank 1 differs").to_string();
         assert!(error.starts_with("rank 1 of 2: it has set up another problem"), "{error}");
     }
 
     #[test]
-    fn a_signal_at_one_rank_is_known_to_the_leader_with_the_next_order() {
+    fn a_signal_at_one_rank_is_known_to_the_leader_with_the_next_command() {
         let seen = run(3, |ranks| {
             let signal = Arc::new(AtomicUsize::new(if ranks.rank() == 1 { 15 } else { 0 }));
-            let team = Team::new(ranks, signal);
-            let shared = team.share(Box::new(Adding));
-            if team.member() == Member::Leader {
-                let before = team.signal();
-                shared.order(0, vec![1.0]).expect("an order is followed");
-                team.end();
-                return [before, team.signal()];
+            let group = RankGroup::new(ranks, signal);
+            let channel = group.register(Box::new(Adding));
+            if group.role() == Role::Leader {
+                let before = group.signal();
+                channel.execute(0, vec![1.0]).expect("a command is executed");
+                group.shut_down();
+                return [before, group.signal()];
             }
-            team.follow(Ok(()));
-            [team.signal(); 2]
+            group.serve(Ok(()));
+            [group.signal(); 2]
         });
         assert_eq!(seen, [[0, 15], [15, 15], [15, 15]]);
     }

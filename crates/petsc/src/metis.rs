@@ -1,41 +1,44 @@
-//! The calls into METIS, which are the only ones: nested dissection of a graph, and its partition into equal parts.
+//! METIS: nested dissection of a graph, and its partition into parts of equal weight.
 //!
-//! Lives here: the arrays that METIS wants, the lock and the seed that make its answers repeatable, the calls. Does not
-//! live here: which graph is meant ([`crate::fem::ordering`] orders matrices, [`crate::partition`] shares out meshes).
-//! Without the feature `metis` every answer is `None`, and the callers have something else.
+//! A graph is given as the rows of a symmetric pattern: `starts`, shape `(n + 1,)`, and `columns`, the neighbours of every
+//! vertex, ascending. Lives here: the arrays that METIS wants, the lock and the seed that make its answers repeatable, the
+//! calls. Without the feature `metis` every answer is `None`, and the callers have something else.
 
-use crate::fem::csr::CsrStructure;
-
-/// METIS's nested dissection, vertices counting by their weights or all the same; a permutation, `forward[new] = old`.
+/// Nested dissection, vertices counting by their weights or all the same; a permutation, `forward[new] = old`. A vertex
+/// may be listed among its own neighbours.
 ///
-/// `None` where METIS refuses (empty graph, too large for its indices).
-pub(crate) fn dissected(structure: &CsrStructure, weights: Option<Vec<i32>>) -> Option<Vec<u32>> {
-    foreign::dissected(structure, weights)
+/// `None` where METIS refuses (no edge, too large for its indices).
+///
+/// # Panics
+/// Unless there is one weight a vertex, and one column for each entry that `starts` announces.
+pub fn nested_dissection(starts: &[u32], columns: &[u32], weights: Option<Vec<i32>>) -> Option<Vec<u32>> {
+    foreign::nested_dissection(starts, columns, weights)
 }
 
 /// The part of every vertex, of `parts` parts of about the same weight (at most 2 % above the mean, where the weights
 /// allow it) between which the cut edges weigh little.
 ///
-/// One weight a vertex, and one a stored entry of `structure`, which has no diagonal and is symmetric with its weights.
+/// One weight a vertex, and one an entry of `columns`, in which no vertex is its own neighbour; the weights are symmetric.
 /// `None` where METIS refuses.
-pub(crate) fn partitioned(
-    structure: &CsrStructure,
+///
+/// # Panics
+/// For no part, and where there is another number of weights.
+pub fn partition(
+    (starts, columns): (&[u32], &[u32]),
     parts: usize,
     weights: Vec<i32>,
     edge_weights: Vec<i32>,
 ) -> Option<Vec<u32>> {
-    foreign::partitioned(structure, parts, weights, edge_weights)
+    foreign::partition((starts, columns), parts, weights, edge_weights)
 }
 
 #[cfg(not(feature = "metis"))]
 mod foreign {
-    use crate::fem::csr::CsrStructure;
-
-    pub(super) fn dissected(_: &CsrStructure, _: Option<Vec<i32>>) -> Option<Vec<u32>> {
+    pub(super) fn nested_dissection(_: &[u32], _: &[u32], _: Option<Vec<i32>>) -> Option<Vec<u32>> {
         None
     }
 
-    pub(super) fn partitioned(_: &CsrStructure, _: usize, _: Vec<i32>, _: Vec<i32>) -> Option<Vec<u32>> {
+    pub(super) fn partition(_: (&[u32], &[u32]), _: usize, _: Vec<i32>, _: Vec<i32>) -> Option<Vec<u32>> {
         None
     }
 }
@@ -47,15 +50,13 @@ mod foreign {
 
     use metis_sys as metis;
 
-    use crate::fem::csr::CsrStructure;
-
     /// METIS draws from a random generator of the process: one caller at a time gets the same numbers every time.
     static METIS: Mutex<()> = Mutex::new(());
 
     /// How much a part may weigh more than the mean, in thousandths.
     const EXCESS: i32 = 20;
 
-    fn alone() -> MutexGuard<'static, ()> {
+    fn lock() -> MutexGuard<'static, ()> {
         METIS.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -68,13 +69,14 @@ mod foreign {
 
     impl Graph {
         /// `None` for a graph without edges, or one too large for 32-bit indices.
-        fn new(structure: &CsrStructure) -> Option<Self> {
-            let n = structure.row_count();
+        fn new(row_starts: &[u32], columns: &[u32]) -> Option<Self> {
+            let n = row_starts.len().checked_sub(1)?;
             let mut starts = vec![0i32];
-            let mut neighbours = Vec::with_capacity(structure.columns.len());
+            let mut neighbours = Vec::with_capacity(columns.len());
             for row in 0..n {
-                let others = structure.columns[structure.row(row)].iter().filter(|&&c| c as usize != row);
-                for &c in others {
+                let range = row_starts[row] as usize..row_starts[row + 1] as usize;
+                for &c in columns[range].iter().filter(|&&c| c as usize != row) {
+                    assert!((c as usize) < n, "a neighbour is a vertex");
                     neighbours.push(i32::try_from(c).ok()?);
                 }
                 starts.push(i32::try_from(neighbours.len()).ok()?);
@@ -91,18 +93,21 @@ mod foreign {
         options
     }
 
-    pub(super) fn dissected(structure: &CsrStructure, weights: Option<Vec<i32>>) -> Option<Vec<u32>> {
-        let n = structure.row_count();
-        let Graph { mut count, mut starts, mut neighbours } = Graph::new(structure)?;
+    pub(super) fn nested_dissection(
+        starts: &[u32],
+        columns: &[u32],
+        mut weights: Option<Vec<i32>>,
+    ) -> Option<Vec<u32>> {
+        let Graph { mut count, mut starts, mut neighbours } = Graph::new(starts, columns)?;
+        let n = starts.len() - 1;
         let mut forward = vec![0i32; n];
         let mut inverse = vec![0i32; n];
         let mut options = options();
-        let mut weights = weights;
         assert!(weights.as_ref().is_none_or(|weights| weights.len() == n), "one weight a vertex");
-        let guard = alone();
+        let guard = lock();
         // SAFETY: all arrays outlive the call and have the lengths METIS_NodeND documents: n + 1 row starts, as many
-        // neighbours as the last of them says, n entries in each permutation, METIS_NOPTIONS options; a null pointer or
-        // n vertex weights, as asserted above.
+        // neighbours as the last of them says, each one of n vertices, n entries in each permutation, METIS_NOPTIONS options; a
+        // null pointer or n vertex weights, as asserted above.
         #[allow(unsafe_code)]
         let status = unsafe {
             metis::METIS_NodeND(
@@ -119,14 +124,14 @@ mod foreign {
         (status == metis::rstatus_et_METIS_OK).then(|| forward.into_iter().map(|i| i as u32).collect())
     }
 
-    pub(super) fn partitioned(
-        structure: &CsrStructure,
+    pub(super) fn partition(
+        (starts, columns): (&[u32], &[u32]),
         parts: usize,
         mut weights: Vec<i32>,
         mut edge_weights: Vec<i32>,
     ) -> Option<Vec<u32>> {
-        let n = structure.row_count();
-        let Graph { mut count, mut starts, mut neighbours } = Graph::new(structure)?;
+        let Graph { mut count, mut starts, mut neighbours } = Graph::new(starts, columns)?;
+        let n = starts.len() - 1;
         assert!(parts > 0, "at least one part");
         assert_eq!(weights.len(), n, "one weight a vertex");
         assert_eq!(edge_weights.len(), neighbours.len(), "one weight an edge, and no diagonal");
@@ -135,10 +140,10 @@ mod foreign {
         let mut part = vec![0i32; n];
         let mut options = options();
         options[metis::moptions_et_METIS_OPTION_UFACTOR as usize] = EXCESS;
-        let guard = alone();
+        let guard = lock();
         // SAFETY: all arrays outlive the call and have the lengths METIS_PartGraphKway documents: n + 1 row starts, as many
-        // neighbours and edge weights as the last of them says, n vertex weights for the one constraint, n entries in the
-        // answer, METIS_NOPTIONS options; where null pointers stand it takes its defaults.
+        // neighbours (each one of n vertices) and edge weights as the last of them says, n vertex weights for the one
+        // constraint, n entries in the answer, METIS_NOPTIONS options; where null pointers stand it takes its defaults.
         #[allow(unsafe_code)]
         let status = unsafe {
             metis::METIS_PartGraphKway(

@@ -1,24 +1,24 @@
-//! An element matrix turned into the nodes' own directions: `R_aᵀ K_ab R_b`, with the axes of a node's frame as the
-//! columns of `R`; `ψ` is untouched.
+//! An element matrix in node-local (rotated) coordinates: `R_aᵀ K_ab R_b`, with the axes of a node's frame as the columns of
+//! `R`; `ψ` is untouched.
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 
-use crate::constraint::Frame;
+use crate::fixed_directions::Frame;
 
-/// An element matrix seen from the frames of its nodes; `None` stands for the coordinate axes.
-pub(crate) struct Framed<'a, L, const N: usize> {
+/// An element matrix in the local frames of its nodes; `None` stands for the coordinate axes.
+pub(crate) struct RotatedMatrix<'a, L, const N: usize> {
     matrix: L,
     frames: [Option<&'a Frame>; N],
 }
 
-impl<'a, L, const N: usize> Framed<'a, L, N> {
+impl<'a, L, const N: usize> RotatedMatrix<'a, L, N> {
     #[inline]
     pub(crate) fn new(matrix: L, frames: [Option<&'a Frame>; N]) -> Self {
         Self { matrix, frames }
     }
 }
 
-impl<L: LocalMatrix<c64, N, 4>, const N: usize> LocalMatrix<c64, N, 4> for Framed<'_, L, N> {
+impl<L: LocalMatrix<c64, N, 4>, const N: usize> LocalMatrix<c64, N, 4> for RotatedMatrix<'_, L, N> {
     #[inline]
     fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
         let mut block = self.matrix.block(a, b);

@@ -14,7 +14,7 @@ pub struct RowLayout {
     /// Row of every equation.
     row_of: Vec<u32>,
     /// Equations of this rank, in the order of its rows.
-    own: Vec<u32>,
+    owned: Vec<u32>,
     rank: usize,
 }
 
@@ -51,8 +51,8 @@ impl RowLayout {
                 row
             })
             .collect();
-        let own = (0..dofs.count() as u32).filter(|&e| owner[e as usize] as usize == rank).collect();
-        Self { starts, row_of, own, rank }
+        let owned = (0..dofs.count() as u32).filter(|&e| owner[e as usize] as usize == rank).collect();
+        Self { starts, row_of, owned, rank }
     }
 
     /// Number of equations of all ranks.
@@ -77,21 +77,21 @@ impl RowLayout {
     }
 
     /// Equations of this rank, in the order of its rows.
-    pub fn own(&self) -> &[u32] {
-        &self.own
+    pub fn owned(&self) -> &[u32] {
+        &self.owned
     }
 
-    /// The own rows of a vector of all equations, given as pairs of real numbers.
-    pub fn own_of(&self, numbers: &[f64]) -> Vec<c64> {
+    /// The owned rows of a vector of all equations, given as pairs of real numbers.
+    pub fn restrict(&self, numbers: &[f64]) -> Vec<c64> {
         let at = |&e: &u32| c64::new(numbers[2 * e as usize], numbers[2 * e as usize + 1]);
-        self.own.iter().map(at).collect()
+        self.owned.iter().map(at).collect()
     }
 
     /// A vector of all equations from the rows of every rank, by rank, all as pairs of real numbers.
     ///
     /// # Panics
     /// If a rank has another number of rows.
-    pub fn joined(&self, parts: &[Vec<f64>]) -> Vec<c64> {
+    pub fn join(&self, parts: &[Vec<f64>]) -> Vec<c64> {
         for (part, count) in parts.iter().zip(self.counts()) {
             assert_eq!(part.len(), 2 * count, "a rank has two numbers a row");
         }
@@ -108,10 +108,10 @@ impl RowLayout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ranks::numbers_of;
+    use crate::parallel::numbers_of;
 
     #[test]
-    fn what_is_shared_out_by_rows_is_joined_again() {
+    fn what_is_distributed_by_rows_is_joined_again() {
         let dofs = DofMap::<3>::new(40, |node, c| (node.index() + c) % 4 != 0);
         // Rank 2 owns nothing.
         let owner = |node: NodeId| [0, 3, 1][node.index() % 3];
@@ -119,11 +119,12 @@ mod tests {
         let values: Vec<c64> = (0..dofs.count()).map(|e| c64::new(e as f64, -(e as f64))).collect();
         let numbers: Vec<f64> = numbers_of(&values).collect();
         let parts: Vec<Vec<f64>> =
-            layouts.iter().map(|layout| numbers_of(&layout.own_of(&numbers)).collect()).collect();
+            layouts.iter().map(|layout| numbers_of(&layout.restrict(&numbers)).collect()).collect();
         assert!(parts[2].is_empty() && layouts[2].rows().is_empty());
         for layout in &layouts {
-            assert_eq!(layout.joined(&parts), values);
-            let rows: Vec<usize> = layout.own().iter().map(|&e| layout.row_of(e as usize) as usize).collect();
+            assert_eq!(layout.join(&parts), values);
+            let rows: Vec<usize> =
+                layout.owned().iter().map(|&e| layout.row_of(e as usize) as usize).collect();
             assert_eq!(rows, layout.rows().collect::<Vec<_>>());
         }
     }

@@ -1,8 +1,8 @@
-//! A given motion of the design nodes, taken in as many rounds as the mesh asks for.
+//! Load stepping: a given motion of the design nodes, taken in as many steps as the mesh asks for.
 //!
-//! The motion is a path `t → Δx_b(t)`, `0 ≤ t ≤ 1`. Each round goes as far along it as [`Limits`] let a single linear
+//! The motion is a path `t → Δx_b(t)`, `0 ≤ t ≤ 1`. Each round goes as far along it as [`StepLimits`] let a single linear
 //! step go: not too near to the first inversion, and not below a quality. Then the mesh reached is the next reference, its
-//! interior smoothed if elements are worn. Where even a short step is refused, the remedies of [`crate::rescue`] are
+//! interior smoothed if elements are degraded. Where even a short step is refused, the fallbacks of [`crate::fallback`] are
 //! tried. Nothing here is chosen by a field or an objective.
 
 use std::ops::ControlFlow;
@@ -10,23 +10,23 @@ use std::ops::ControlFlow;
 use fluxmorph_geometry::tet4::Point;
 
 use crate::error::RemeshError;
+use crate::fallback::{FallbackLevel, FallbackReport};
 use crate::motion::{Motion, Moved};
 use crate::policy::StiffnessPolicy;
-use crate::rescue::{Rescued, Rung};
 
-/// Hears of every step; a break ends the way there.
-pub type Tell<'a> = &'a mut dyn FnMut(&Event) -> ControlFlow<()>;
+/// Is called with every step; a break ends the motion there.
+pub type OnStepEvent<'a> = &'a mut dyn FnMut(&StepEvent) -> ControlFlow<()>;
 
 /// Shortest part of the path that is still called progress.
-const SHORTEST_STRIDE: f64 = 1e-3;
+const SHORTEST_STEP: f64 = 1e-3;
 
-/// Aimed at this share of the longest stride that the limits should allow: the share of the way to an inversion is not
-/// quite proportional to the stride.
+/// Aimed at this share of the longest step that the limits should allow: the share of the way to an inversion is not quite
+/// proportional to the step.
 const AIM: f64 = 0.95;
 
 /// How far a single linear step may go.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
+pub struct StepLimits {
     /// Largest share of the way to the first inversion, below 1.
     pub inversion_share: f64,
     /// Least quality (Eq. 4) of an element of the elastic body.
@@ -38,7 +38,7 @@ pub struct Limits {
     pub rounds: usize,
 }
 
-impl Default for Limits {
+impl Default for StepLimits {
     /// Half of the way to an inversion, any valid quality, elements below 0.3 of their shape smoothed (as the paper's poor
     /// elements are those below a quality of 0.3), a hundred rounds.
     fn default() -> Self {
@@ -46,9 +46,9 @@ impl Default for Limits {
     }
 }
 
-/// What happens on the way.
+/// What happens along the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
+pub enum StepEvent {
     /// A round has taken its step.
     Stepped {
         /// Rounds begun before it.
@@ -62,28 +62,28 @@ pub enum Event {
         /// How stiffness follows element size in it.
         policy: StiffnessPolicy,
     },
-    /// A remedy was taken.
-    Rescued {
-        /// Rounds begun, that after the remedy included.
+    /// A fallback was taken.
+    FellBack {
+        /// Rounds begun, that after the fallback included.
         round: usize,
         /// How stiffness follows element size from now on.
         policy: StiffnessPolicy,
         /// What was done.
-        rescued: Rescued,
+        report: FallbackReport,
     },
 }
 
 /// What a search for the longest step found.
-enum Stride {
+enum LongestStep {
     /// A step to this part of the path.
-    Taken(f64, Moved),
+    Accepted(f64, Moved),
     /// Even the shortest step was refused, towards these displacements.
     Refused(Vec<Point>),
 }
 
 /// Where a motion came to.
 #[derive(Debug)]
-pub struct Travelled {
+pub struct SteppingOutcome {
     /// The last round; its reference is where its step began, or the mesh reached itself where that was smoothed.
     pub motion: Motion,
     /// The mesh reached.
@@ -92,91 +92,101 @@ pub struct Travelled {
     pub reached: f64,
     /// Steps taken.
     pub steps: usize,
-    /// Remedies taken.
-    pub rescues: usize,
+    /// Fallbacks taken.
+    pub fallbacks: usize,
 }
 
-impl Travelled {
-    /// A remedy gave another mesh, or another map, for the place reached.
-    fn go_on(&mut self, motion: Motion, rescued: Rescued, tell: Tell<'_>) -> ControlFlow<()> {
-        self.moved = motion.unmoved();
+impl SteppingOutcome {
+    /// Goes on with a fallback's motion: another mesh, or another map, for the design reached.
+    fn fall_back(
+        &mut self,
+        motion: Motion,
+        report: FallbackReport,
+        on_event: OnStepEvent<'_>,
+    ) -> ControlFlow<()> {
+        self.moved = motion.at_reference();
         let (round, policy) = (motion.round(), motion.policy());
         self.motion = motion;
-        self.rescues += 1;
-        tell(&Event::Rescued { round, policy, rescued })
+        self.fallbacks += 1;
+        on_event(&StepEvent::FellBack { round, policy, report })
     }
 }
 
 impl Motion {
-    /// Moves the mesh along a path of design displacements from the original mesh [m], which begins at the anchor; `tell`
-    /// hears of every step and may end the way there.
+    /// Moves the mesh along a path of design displacements from the original mesh [m], which begins at the design of
+    /// the reference; `on_event` is called with every step and may end the motion there.
     ///
-    /// A path that cannot be followed to its end is no error: see [`Travelled::reached`].
+    /// A path that cannot be taken to its end is no error: see [`SteppingOutcome::reached`].
     ///
     /// # Errors
     /// As [`Motion::step`] and [`Motion::rebased`].
     ///
     /// # Panics
     /// If the path has not one displacement per design node.
-    pub fn travel(
+    pub fn step_along(
         self,
         path: &dyn Fn(f64) -> Vec<Point>,
-        limits: &Limits,
-        tell: Tell<'_>,
-    ) -> Result<Travelled, RemeshError> {
-        let mut travelled =
-            Travelled { moved: self.unmoved(), motion: self, reached: 0.0, steps: 0, rescues: 0 };
-        let mut rung = Rung::Ground;
-        while travelled.reached < 1.0 && travelled.steps < limits.rounds {
-            let motion = &travelled.motion;
-            match motion.stride(path, travelled.reached, limits)? {
-                Stride::Taken(reached, moved) => {
+        limits: &StepLimits,
+        on_event: OnStepEvent<'_>,
+    ) -> Result<SteppingOutcome, RemeshError> {
+        let mut outcome = SteppingOutcome {
+            moved: self.at_reference(),
+            motion: self,
+            reached: 0.0,
+            steps: 0,
+            fallbacks: 0,
+        };
+        let mut level = FallbackLevel::None;
+        while outcome.reached < 1.0 && outcome.steps < limits.rounds {
+            let motion = &outcome.motion;
+            match motion.longest_step(path, outcome.reached, limits)? {
+                LongestStep::Accepted(reached, moved) => {
                     let share = 1.0 / moved.inversion.step;
                     let quality = motion.quality(&moved.mesh).worst;
                     let (round, policy) = (motion.round(), motion.policy());
-                    let told = tell(&Event::Stepped { round, reached, share, quality, policy });
-                    let anchor = path(reached);
-                    let refreshed = motion.refreshed(&moved, &anchor, &path(1.0), limits)?;
-                    (travelled.reached, travelled.moved) = (reached, moved);
-                    travelled.steps += 1;
-                    rung = Rung::Ground;
-                    if told.is_break() {
+                    let flow = on_event(&StepEvent::Stepped { round, reached, share, quality, policy });
+                    let design = path(reached);
+                    let smoothed = motion.smooth_degraded(&moved, &design, &path(1.0), limits)?;
+                    (outcome.reached, outcome.moved) = (reached, moved);
+                    outcome.steps += 1;
+                    level = FallbackLevel::None;
+                    if flow.is_break() {
                         break;
                     }
-                    if let Some((motion, rescued)) = refreshed {
-                        if travelled.go_on(motion, rescued, tell).is_break() {
+                    if let Some((motion, report)) = smoothed {
+                        if outcome.fall_back(motion, report, on_event).is_break() {
                             break;
                         }
-                    } else if reached < 1.0 && travelled.steps < limits.rounds {
-                        let Moved { mesh, displacement, .. } = travelled.moved.clone();
-                        let policy = travelled.motion.policy();
-                        travelled.motion = travelled.motion.rebased(mesh, displacement, anchor, policy)?;
+                    } else if reached < 1.0 && outcome.steps < limits.rounds {
+                        let Moved { mesh, displacement, .. } = outcome.moved.clone();
+                        let policy = outcome.motion.policy();
+                        outcome.motion = outcome.motion.rebased(mesh, displacement, design, policy)?;
                     }
                 }
-                Stride::Refused(refused) => {
-                    let Some((motion, rescued, next)) = motion.rescued(&refused, rung, limits)? else {
+                LongestStep::Refused(refused) => {
+                    let Some((motion, report, next)) = motion.escalate(&refused, level, limits)? else {
                         break;
                     };
-                    if travelled.go_on(motion, rescued, tell).is_break() {
+                    if outcome.fall_back(motion, report, on_event).is_break() {
                         break;
                     }
-                    rung = next;
+                    level = next;
                 }
             }
         }
-        Ok(travelled)
+        Ok(outcome)
     }
 
     /// The longest step along the path that keeps the limits.
-    fn stride(
+    fn longest_step(
         &self,
         path: &dyn Fn(f64) -> Vec<Point>,
         from: f64,
-        limits: &Limits,
-    ) -> Result<Stride, RemeshError> {
-        let mut stride = 1.0 - from;
+        limits: &StepLimits,
+    ) -> Result<LongestStep, RemeshError> {
+        let mut length = 1.0 - from;
         loop {
-            let to = if stride >= 1.0 - from { 1.0 } else { from + stride };
+            let to = if length >= 1.0 - from { 1.0 } else { from + length };
             let design = path(to);
             let step = self.step(&design)?;
             let inversion = self.inversion(&step);
@@ -184,19 +194,19 @@ impl Motion {
             let shorter = if share > limits.inversion_share {
                 AIM * limits.inversion_share / share
             } else {
-                match self.taken(&step, inversion) {
+                match self.apply(&step, inversion) {
                     Ok(moved) if self.quality(&moved.mesh).worst >= limits.least_quality => {
-                        return Ok(Stride::Taken(to, moved));
+                        return Ok(LongestStep::Accepted(to, moved));
                     }
                     // Inverted, though the exact root lies further: elements so flat that rounding decides.
                     Ok(_) | Err(RemeshError::Inverted { .. }) => 0.5,
                     Err(error) => return Err(error),
                 }
             };
-            if stride * shorter < SHORTEST_STRIDE {
-                return Ok(Stride::Refused(design));
+            if length * shorter < SHORTEST_STEP {
+                return Ok(LongestStep::Refused(design));
             }
-            stride *= shorter;
+            length *= shorter;
         }
     }
 }

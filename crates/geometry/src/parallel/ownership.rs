@@ -1,30 +1,30 @@
-//! What one rank has of a mesh that is shared out.
+//! Which nodes and elements of a distributed mesh a rank owns.
 
 use std::sync::Arc;
 
+use super::partition::Partition;
+use super::rank_group::RankGroup;
 use crate::ids::{ElementId, NodeId};
-use crate::partition::Partition;
-use crate::ranks::team::Team;
 
-/// The team, and which nodes and elements belong to whom.
+/// The ranks, and which nodes and elements belong to whom.
 #[derive(Clone, Debug)]
-pub struct Share {
+pub struct Ownership {
     /// The ranks.
-    pub team: Team,
+    pub group: RankGroup,
     /// Owners of nodes and elements.
     pub partition: Arc<Partition>,
 }
 
-impl Share {
+impl Ownership {
     /// Whether this rank owns a node.
     #[inline]
     pub fn owns(&self, node: NodeId) -> bool {
-        self.partition.owner_of(node) == self.team.rank()
+        self.partition.owner_of(node) == self.group.rank()
     }
 
     /// Those of some elements that this rank owns, in their order.
-    pub fn own_among(&self, elements: &[ElementId]) -> Vec<ElementId> {
-        let rank = self.team.rank();
+    pub fn owned_among(&self, elements: &[ElementId]) -> Vec<ElementId> {
+        let rank = self.group.rank();
         elements.iter().copied().filter(|&e| self.partition.element_owner(e) == rank).collect()
     }
 }

@@ -1,15 +1,15 @@
-//! A distributed matrix as a part holds it: rows of this rank, and the solver of all.
+//! A distributed matrix as a rank holds it: its rows, and the solver of all.
 
+use super::communicator::{Communicator, DistributedSolver, Rows, Solved, SolverOptions};
+use super::{complex_of, numbers_of};
 use crate::fem::c64;
-use crate::ranks::communicator::{Communicator, DistributedSolver, Rows, Solved, SolverOptions};
-use crate::ranks::{complex_of, numbers_of};
 
 /// The own rows of a distributed system, solved with right sides that come from rank 0 and solutions that go there.
 #[derive(Debug)]
 pub struct DistributedMatrix {
     rows: Rows,
     options: SolverOptions,
-    /// Made with the first values: the engine may not be there before.
+    /// Created with the first values: the engine may not be there before.
     solver: Option<Box<dyn DistributedSolver>>,
 }
 
@@ -38,7 +38,7 @@ impl DistributedMatrix {
     pub fn solve(&mut self, right_side: &[f64], ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
         let layout = &self.rows.layout;
         let solver = self.solver.as_mut().ok_or("there is no matrix yet")?;
-        let own = layout.own_of(right_side);
+        let own = layout.restrict(right_side);
         let mut solution = vec![c64::default(); own.len()];
         let Solved { iterations, residual } = solver.solve(&own, &mut solution)?;
         let own: Vec<f64> = numbers_of(&solution).collect();
@@ -46,7 +46,7 @@ impl DistributedMatrix {
         if ranks.rank() != 0 {
             return Ok(Vec::new());
         }
-        let mut answer: Vec<f64> = numbers_of(&layout.joined(&parts)).collect();
+        let mut answer: Vec<f64> = numbers_of(&layout.join(&parts)).collect();
         answer.extend([iterations as f64, residual]);
         Ok(answer)
     }

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use super::layout::RowLayout;
 use crate::fem::c64;
 use crate::fem::csr::CsrStructure;
-use crate::ranks::layout::RowLayout;
 
 /// The ranks of a parallel program, as one of them sees them. All operations but `rank` and `size` are collective: every
 /// rank calls them, in the same order.
@@ -31,14 +31,15 @@ pub trait Communicator: std::fmt::Debug + Send + Sync {
     /// What the engine says, on every rank.
     fn solver(&self, rows: Rows, options: &SolverOptions) -> Result<Box<dyn DistributedSolver>, String>;
 
-    /// Ends the processes of all ranks at once: for a rank that can follow no further order. Not collective.
-    fn abort(&self, exit_code: i32) -> !;
+    /// Ends the processes of all ranks at once, for a rank that can execute no further command, and says why if there is a
+    /// `cause`. Not collective.
+    fn abort(&self, cause: Option<&str>) -> !;
 }
 
 /// The rows of a distributed matrix that a rank owns.
 #[derive(Clone, Debug)]
 pub struct Rows {
-    /// Their pattern: rows in the order of [`RowLayout::own`], columns by equation.
+    /// Their pattern: rows in the order of [`RowLayout::owned`], columns by equation.
     pub structure: Arc<CsrStructure>,
     /// Who owns which equation.
     pub layout: Arc<RowLayout>,

@@ -15,13 +15,13 @@ mod sets;
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId};
 use crate::mesh::Mesh;
-use crate::metis;
 use crate::tet4::{EDGES, dot, sub};
 use crate::topology::Topology;
+use fluxmorph_petsc::metis;
 use graph::{Graph, Strength};
 pub use report::{ConductorShare, PartitionReport, RankShare};
 
-/// Vertices a rank from which METIS is asked: on smaller graphs it leaves parts empty, and says so on the terminal.
+/// Vertices a rank from which METIS is asked: on smaller graphs it leaves parts empty, and prints a warning.
 const FEWEST_VERTICES: usize = 16;
 
 /// Most that an edge weighs by its length [1]: the sum over all edges must stay within 32 bits for METIS.
@@ -37,7 +37,7 @@ pub struct Partition {
 }
 
 impl Partition {
-    /// Shares a mesh out over `ranks` ranks, each of which gets about the same weight, and at least one node.
+    /// Distributes a mesh over `ranks` ranks, each of which gets about the same weight, and at least one node.
     ///
     /// `weights` are the unknowns of every node [1], shape `(n_nodes,)`; a node without any counts as one unknown, since
     /// the elements around it are computed all the same. `kept` are the elements of all conductors: a connected set of
@@ -113,7 +113,7 @@ impl Partition {
         if ranks == 1 {
             return Ok(Self::of_owners(topology, ranks, vec![0; nodes]));
         }
-        let weights: Vec<u64> = weights.iter().map(|&w| counted(w)).collect();
+        let weights: Vec<u64> = weights.iter().map(|&w| node_weight(w)).collect();
         let graph = Graph::new(topology, ranks, &weights, kept, strength);
         let part = cut(&graph, ranks).unwrap_or_else(|| ranges(&graph.weights, ranks));
         let mut owners: Vec<u32> = graph.vertex_of.iter().map(|&v| part[v as usize]).collect();
@@ -184,7 +184,7 @@ impl Partition {
 }
 
 /// What a node with so many unknowns weighs.
-fn counted(unknowns: u32) -> u64 {
+fn node_weight(unknowns: u32) -> u64 {
     u64::from(unknowns.max(1))
 }
 
@@ -196,7 +196,8 @@ fn cut(graph: &Graph, ranks: usize) -> Option<Vec<u32>> {
     }
     let weights = graph.weights.iter().map(|&w| i32::try_from(w).ok()).collect::<Option<_>>()?;
     let edge_weights = graph.edge_weights.iter().map(|&w| i32::try_from(w).ok()).collect::<Option<_>>()?;
-    metis::partitioned(&graph.structure, ranks, weights, edge_weights)
+    let structure = &graph.structure;
+    metis::partition((&structure.row_starts, &structure.columns), ranks, weights, edge_weights)
 }
 
 /// Ranges of the vertices in their order, of about the same weight: a vertex goes where its middle lies.

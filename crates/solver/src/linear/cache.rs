@@ -1,4 +1,4 @@
-//! What one design leaves for the next: a preconditioner with the book of what it costs, and solutions to start from.
+//! What one design leaves for the next: a preconditioner with the ledger of its costs, and initial guesses.
 
 use std::sync::Arc;
 
@@ -9,39 +9,39 @@ use super::cost::Ledger;
 use super::method::Method;
 use super::preconditioner::Preconditioner;
 
-/// Memory of a field model's linear solver from one mesh to the next.
+/// What the linear solver of a field model keeps from one mesh to the next.
 ///
 /// A run's bits depend on it, hence on the sequence of its designs, but not on threads or clocks.
 #[derive(Debug, Default)]
-pub struct SolverMemory {
-    pub(super) held: Option<Held>,
-    /// The method that worked last, where it is not the first of the ladder.
+pub struct LinearSolverCache {
+    pub(super) preconditioner: Option<CachedPreconditioner>,
+    /// The method that worked last, where it is not the first choice.
     pub(super) method: Option<Method>,
     /// The solutions of the last design, in the order in which they were asked for.
     pub(super) solutions: Vec<Vec<c64>>,
 }
 
-/// A preconditioner that was made for another matrix of the same pattern.
+/// The preconditioner of another matrix of the same pattern.
 #[derive(Clone, Debug)]
-pub(super) struct Held {
+pub(super) struct CachedPreconditioner {
     pub(super) analysis: Arc<SystemAnalysis>,
     pub(super) preconditioner: Arc<Preconditioner>,
     pub(super) ledger: Ledger,
 }
 
-impl SolverMemory {
-    /// A memory of nothing but the method to begin with; `None` is the first one of the ladder.
+impl LinearSolverCache {
+    /// A cache of nothing but the method to begin with; `None` is the first choice.
     pub fn with_method(method: Option<Method>) -> Self {
         Self { method, ..Self::default() }
     }
 
-    /// The method that worked last, where it is not the first of the ladder.
+    /// The method that worked last, where it is not the first choice.
     pub fn method(&self) -> Option<Method> {
         self.method
     }
 
     /// What may serve the same design at another frequency: the preconditioner, as far as the patterns are the same.
-    pub fn lent(&self) -> Self {
-        Self { held: self.held.clone(), method: self.method, solutions: Vec::new() }
+    pub fn without_initial_guess(&self) -> Self {
+        Self { preconditioner: self.preconditioner.clone(), method: self.method, solutions: Vec::new() }
     }
 }

@@ -114,7 +114,7 @@ fn a_large_conductor_is_cut_where_it_is_thin() {
 }
 
 #[test]
-fn the_same_mesh_is_shared_out_alike_for_any_number_of_threads() {
+fn the_same_mesh_is_distributed_alike_for_any_number_of_threads() {
     let mesh = thin();
     let kept = plate(mesh.topology());
     let with_threads = |threads| {
@@ -141,7 +141,7 @@ fn without_metis_ranks_own_ranges_of_nodes_of_the_same_weight() {
 }
 
 #[test]
-fn a_mesh_too_small_for_metis_is_shared_out_to_the_last_node() {
+fn a_mesh_too_small_for_metis_is_distributed_to_the_last_node() {
     let tets = vec![[0, 1, 2, 3], [4, 1, 3, 2], [5, 4, 3, 1]].into_iter().map(|t| t.map(NodeId)).collect();
     let regions = vec![crate::RegionId(0); 3];
     let topology = Topology::new(6, tets, vec!["all".into()], regions).expect("three tets");

@@ -1,7 +1,7 @@
 //! Figures of a partition: how even it is, what it cuts, and which conductors are whole.
 
 use super::sets::ConnectedSets;
-use super::{Partition, counted};
+use super::{Partition, node_weight};
 use crate::ids::{ElementId, NodeId};
 use crate::topology::Topology;
 
@@ -18,7 +18,7 @@ pub struct RankShare {
     pub touching: usize,
 }
 
-/// How a conductor, a connected set of the kept elements, is shared out.
+/// How a conductor, a connected set of the kept elements, is distributed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ConductorShare {
     /// Its first node.
@@ -58,7 +58,7 @@ impl PartitionReport {
             let nodes = partition.nodes_of(rank);
             RankShare {
                 nodes: nodes.len(),
-                weight: nodes.iter().map(|n| counted(weights[n.index()])).sum(),
+                weight: nodes.iter().map(|n| node_weight(weights[n.index()])).sum(),
                 elements: partition.elements_of(rank).len(),
                 touching: partition.touching(topology, rank).len(),
             }

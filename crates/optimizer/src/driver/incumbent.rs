@@ -1,0 +1,80 @@
+//! The best design so far, and how another one compares with it.
+
+use std::cmp::Ordering;
+
+use crate::constraint::Bound;
+use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
+use crate::objective::Goal;
+use crate::problem::Analysis;
+
+use super::replay::ReplayState;
+
+/// What the first evaluation fixes for the rest of the run.
+#[derive(Clone, Debug)]
+pub(super) struct Initial {
+    pub(super) objective: f64,
+    pub(super) quality: f64,
+    pub(super) bounds: Vec<Bound>,
+}
+
+/// How a design compares with the best before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Comparison {
+    First,
+    Better,
+    /// It takes the place of the best one, whose mesh has changed.
+    Remeshed,
+    Worse,
+}
+
+impl Comparison {
+    pub(super) fn is_improved(self) -> bool {
+        self != Self::Worse
+    }
+}
+
+/// What is known of the field of the best design.
+#[derive(Debug)]
+pub(super) enum BestField {
+    Computed(Box<Analysis>),
+    /// It was computed before the run was interrupted.
+    Replayed(Box<ReplayState>),
+}
+
+/// The best design so far.
+#[derive(Debug)]
+pub(super) struct Incumbent {
+    pub(super) evaluation: usize,
+    pub(super) values: Vec<f64>,
+    pub(super) objective: f64,
+    pub(super) violation: f64,
+    /// What the method has seen of it.
+    pub(super) sample: Sample,
+    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
+    pub(super) round: usize,
+    pub(super) field: BestField,
+}
+
+impl Incumbent {
+    /// How a design with this objective and sample compares.
+    pub(super) fn compare(&self, goal: Goal, objective: f64, sample: &Sample) -> Comparison {
+        let sign = goal.sign();
+        let order = violation(sample).total_cmp(&self.violation);
+        match order.then((sign * objective).total_cmp(&(sign * self.objective))) {
+            Ordering::Less => Comparison::Better,
+            _ => Comparison::Worse,
+        }
+    }
+
+    /// Whether it has gained more than the share `least` on violation and objective of the best design before.
+    pub(super) fn has_gained(&self, (violation, objective): (f64, f64), least: f64) -> bool {
+        self.violation < (1.0 - least) * violation
+            || (self.objective - objective).abs() > least * objective.abs()
+    }
+}
+
+/// Largest excess of a constraint; zero where all are kept but for rounding.
+pub(super) fn violation(sample: &Sample) -> f64 {
+    let worst = sample.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);
+    if worst <= CONSTRAINT_TOLERANCE { 0.0 } else { worst }
+}

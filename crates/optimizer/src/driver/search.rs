@@ -1,0 +1,289 @@
+//! From one search of the method to the next: trust region, tolerance, and what follows from how a search ended.
+//!
+//! [`Search::decide`] only looks; the other methods act, each in one way.
+
+use fluxmorph_remesh::FallbackLevel;
+
+use super::trust_region::TrustRegion;
+use super::run::Run;
+use super::{Settings, StopReason};
+use crate::error::Error;
+use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
+use crate::problem::{RoundEvent, RoundKind};
+
+/// How much of the trust region is left after a design in it was refused and nothing was gained.
+const SHRINK: f64 = 0.5;
+
+/// How often the trust region may shrink before the mesh motion falls back: to an eighth.
+const MAX_SHRINKS: usize = 3;
+
+/// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
+const LEAST_GAIN: f64 = 1e-6;
+
+/// Factor on `ftol_rel` after the first search, and where a method ends after its first steps: it begins with a cautious
+/// step, whose small gain is no convergence.
+const RESTART_TOLERANCE: f64 = 0.1;
+
+/// Evaluations within which a method has done no more than its cautious first step.
+const CAUTIOUS: usize = 3;
+
+/// How often an end after the cautious first step is not believed.
+const MAX_TIGHTENINGS: usize = 3;
+
+/// What ends the method from inside an evaluation.
+#[derive(Debug)]
+pub(super) enum Stop {
+    Limit(StopReason),
+    /// The round's mesh cannot carry a design.
+    Mesh(Refusal),
+    Error(Box<Error>),
+}
+
+impl From<Error> for Stop {
+    fn from(error: Error) -> Self {
+        Self::Error(Box::new(error))
+    }
+}
+
+/// A design that the round's mesh cannot carry.
+#[derive(Clone, Debug)]
+pub(super) struct Refusal {
+    pub(super) cause: String,
+    /// Its variables [m].
+    pub(super) wanted: Vec<f64>,
+}
+
+/// How one search of the method ended.
+pub(super) struct Ended {
+    outcome: Outcome<Stop>,
+    /// Whether it improved on the best design before it.
+    gained: bool,
+    evaluations: usize,
+}
+
+/// What follows from a search.
+pub(super) enum NextStep {
+    Stop(StopReason),
+    TightenTolerance,
+    /// Around the best design, on the same reference mesh.
+    MoveTrustRegion,
+    /// The best mesh becomes the reference of a new round.
+    NewReference {
+        cause: String,
+    },
+    ShrinkTrustRegion {
+        refused: Refusal,
+        gained: bool,
+    },
+    /// To another stiffness policy, smoothing, or motion along one axis.
+    FallBack(Refusal),
+}
+
+/// Where the search for the best design stands between two starts of the method.
+pub(super) struct Search<'a> {
+    settings: &'a Settings,
+    trust: TrustRegion,
+    ftol_rel: f64,
+    /// How often the trust region shrank since the last gain.
+    shrinks: usize,
+    /// The fallback of the mesh motion since the last gain.
+    level: FallbackLevel,
+    tightenings: usize,
+    /// The design refused last.
+    refused: Option<Refusal>,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(run: &Run<'_>, settings: &'a Settings) -> Result<Self, Error> {
+        Ok(Self {
+            settings,
+            trust: TrustRegion::new(run.shape(), &run.centre(), 1.0)?,
+            ftol_rel: settings.ftol_rel,
+            shrinks: 0,
+            level: FallbackLevel::None,
+            tightenings: 0,
+            refused: None,
+        })
+    }
+
+    /// Runs the method once within the trust region, from the best design.
+    pub(super) fn minimise(&mut self, run: &mut Run<'_>) -> Ended {
+        let [lower, upper] = self.trust.bounds(run.shape());
+        let minimisation = Minimisation {
+            algorithm: self.settings.algorithm,
+            lower,
+            upper,
+            constraints: run.constraint_count(),
+            ftol_rel: self.ftol_rel,
+            xtol_rel: self.settings.xtol_rel,
+        };
+        let before = (run.evaluations(), run.standing());
+        let outcome = minimise(&minimisation, &run.centre(), |p| run.evaluate(p));
+        let evaluations = run.evaluations() - before.0;
+        if let Outcome::Interrupted(Stop::Mesh(refusal)) = &outcome {
+            self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
+            self.refused = Some(refusal.clone());
+        }
+        let gained = run.has_gained(before, LEAST_GAIN.max(self.settings.ftol_rel));
+        Ended { outcome, gained, evaluations }
+    }
+
+    /// What follows from how a search ended.
+    ///
+    /// # Errors
+    /// Of an evaluation, and [`Error::FirstDesign`] where there is no best design to return to.
+    pub(super) fn decide(&self, run: &mut Run<'_>, ended: Ended) -> Result<NextStep, Error> {
+        let Ended { outcome, gained, evaluations } = ended;
+        match outcome {
+            Outcome::Ended(ending) => Ok(self.after_ending(run, ending, gained, evaluations)),
+            Outcome::Failed(cause) if run.has_best() => {
+                run.warn(cause);
+                Ok(NextStep::Stop(StopReason::MethodStalled))
+            }
+            Outcome::Failed(cause) => Err(Error::Optimisation { cause }),
+            Outcome::Interrupted(Stop::Limit(reason)) => Ok(NextStep::Stop(reason)),
+            Outcome::Interrupted(Stop::Error(error)) if run.has_best() && error.is_numerical() => {
+                run.warn(&error.to_string());
+                Ok(NextStep::Stop(StopReason::NumericalFailure))
+            }
+            Outcome::Interrupted(Stop::Error(error)) => Err(*error),
+            Outcome::Interrupted(Stop::Mesh(Refusal { cause, .. })) if !run.has_best() => {
+                Err(Error::FirstDesign { cause })
+            }
+            Outcome::Interrupted(Stop::Mesh(Refusal { cause, .. })) if gained && run.has_rounds_left() => {
+                Ok(NextStep::NewReference { cause })
+            }
+            Outcome::Interrupted(Stop::Mesh(refusal)) => Ok(self.after_refusal(run, refusal, gained)),
+        }
+    }
+
+    /// After a method that ended by itself.
+    fn after_ending(
+        &self,
+        run: &mut Run<'_>,
+        ending: Ending,
+        gained: bool,
+        evaluations: usize,
+    ) -> NextStep {
+        let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS;
+        if is_cautious && self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS {
+            return NextStep::TightenTolerance;
+        }
+        let held_back = self.trust.holds_back(run.shape(), &run.centre());
+        match &self.refused {
+            _ if held_back && gained && run.has_rounds_left() => {
+                NextStep::NewReference { cause: "the search stopped at the trust-region boundary".to_owned() }
+            }
+            _ if held_back && gained => NextStep::MoveTrustRegion,
+            Some(refusal) if held_back && self.trust.scale < 1.0 => {
+                self.after_refusal(run, refusal.clone(), gained)
+            }
+            _ => NextStep::Stop(match ending {
+                Ending::Objective => StopReason::ObjectiveConverged,
+                Ending::Step => StopReason::StepConverged,
+            }),
+        }
+    }
+
+    /// Where no new reference is to be had, or would be of use.
+    fn after_refusal(&self, run: &mut Run<'_>, refusal: Refusal, gained: bool) -> NextStep {
+        match run.limit_reached() {
+            Some(reason) => NextStep::Stop(reason),
+            // After a gain without rounds the reference stays, and so does what the mesh can carry: search nearer to
+            // the best design.
+            None if gained || self.shrinks < MAX_SHRINKS => {
+                NextStep::ShrinkTrustRegion { refused: refusal, gained }
+            }
+            None => NextStep::FallBack(refusal),
+        }
+    }
+
+    /// Continues with a tighter tolerance after a cautious first step.
+    pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
+        self.tightenings += 1;
+        self.ftol_rel *= RESTART_TOLERANCE;
+        run.warn(&format!(
+            "the method's first step changed the objective by less than its relative tolerance: continuing with {:.0e}",
+            self.ftol_rel
+        ));
+    }
+
+    /// Lays the trust region around the best design.
+    pub(super) fn move_trust_region(&mut self, run: &Run<'_>) -> Result<(), Error> {
+        self.trust = TrustRegion::new(run.shape(), &run.centre(), self.trust.scale)?;
+        Ok(())
+    }
+
+    /// Makes the best mesh the reference of a new round, and lays the trust region around the best design.
+    pub(super) fn begin_round(&mut self, run: &mut Run<'_>, cause: &str) -> Result<(), Error> {
+        run.begin_round()?;
+        // What a trust region shrank to is doubled with every gain.
+        let scale = (self.trust.scale / SHRINK).min(1.0);
+        self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
+        (self.shrinks, self.level, self.tightenings) = (0, FallbackLevel::None, 0);
+        self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
+        let event = self.event(run, cause);
+        run.report(event);
+        Ok(())
+    }
+
+    /// Searches nearer to the best design.
+    pub(super) fn shrink_trust_region(
+        &mut self,
+        run: &mut Run<'_>,
+        refused: &Refusal,
+        gained: bool,
+    ) -> Result<(), Error> {
+        if gained {
+            (self.shrinks, self.level) = (0, FallbackLevel::None);
+        }
+        self.shrinks += 1;
+        let scale = SHRINK * self.trust.scale;
+        self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
+        let shape = run.shape();
+        let step = shape.motion().step(&shape.displacement(&refused.wanted))?;
+        let admitted = shape.motion().admissible_share(&step, &shape.limits);
+        let event = self.event(run, &refused.cause);
+        run.report(RoundEvent { kind: RoundKind::SmallerSteps, admitted: Some([admitted; 2]), ..event });
+        Ok(())
+    }
+
+    /// Takes the next fallback of the mesh motion; a reason to stop where none is left.
+    pub(super) fn fall_back(
+        &mut self,
+        run: &mut Run<'_>,
+        refused: &Refusal,
+    ) -> Result<Option<StopReason>, Error> {
+        let Some((report, level)) = run.fall_back(&refused.wanted, self.level)? else {
+            run.warn(&format!(
+                "{}, {}: the mesh carries the design no further",
+                refused.cause,
+                run.why_no_fallback()
+            ));
+            return Ok(Some(StopReason::MeshLimit));
+        };
+        self.level = level;
+        (self.shrinks, self.tightenings) = (0, 0);
+        self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
+        self.trust = TrustRegion::new(run.shape(), &run.centre(), 1.0)?;
+        let event = self.event(run, &refused.cause).with(&report);
+        run.report(event);
+        Ok(None)
+    }
+
+    /// A round that begins now at the best design.
+    fn event(&self, run: &Run<'_>, cause: &str) -> RoundEvent {
+        let motion = run.shape().motion();
+        let quality = motion.quality(motion.reference()).worst;
+        RoundEvent {
+            round: motion.round(),
+            kind: RoundKind::Round,
+            evaluation: run.best_evaluation(),
+            worst_quality: [quality; 2],
+            admitted: None,
+            stiffness: motion.policy().name().to_owned(),
+            reach: self.trust.reach(),
+            cause: cause.to_owned(),
+        }
+    }
+}
