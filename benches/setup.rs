@@ -6,13 +6,13 @@
 use std::path::Path;
 
 use cpu_time::ProcessTime;
+use fluxmorph::config::Config;
+use fluxmorph::fields;
+use fluxmorph::setup::{Purpose, build_mesh, set_up};
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph::config::Config;
-use fluxmorph::fields;
 use fluxmorph_optimizer::problem::{Analysis, Want};
-use fluxmorph::setup::{Purpose, build_mesh, set_up};
 use fluxmorph_optimizer::thickness::Thickness;
 
 /// Refinements of `shield_quick.toml`: 10k, 55k and 595k tetrahedra.

@@ -4,9 +4,9 @@
 
 use fluxmorph::Error;
 use fluxmorph::config::{Config, Optimizer};
-use fluxmorph_optimizer::driver::{Unrecorded, optimise};
 use fluxmorph::observer::Console;
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::driver::{Unrecorded, optimise};
 
 pub(crate) fn main() -> Result<(), Error> {
     let (config, source) =

@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use fluxmorph::config::Config;
-use fluxmorph_optimizer::driver::{self, Unrecorded};
 use fluxmorph::fields;
-use fluxmorph_optimizer::memory::Memory;
 use fluxmorph::observer::Silent;
 use fluxmorph::output::peak_memory_bytes;
-use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::driver::{self, Unrecorded};
+use fluxmorph_optimizer::memory::Memory;
+use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph_solver::adjoint;
 use serde::{Deserialize, Serialize};
 
@@ -124,8 +124,14 @@ impl Case {
             Kind::Optimisation => {
                 let optimizer = &config.optimizer;
                 let (run, optimised) = timed(|| {
-                    driver::optimise(&mut problem, &optimizer.settings(), &mut Silent, &mut Unrecorded, &|| false)
-                        .unwrap_or_else(|e| panic!("{e}"))
+                    driver::optimise(
+                        &mut problem,
+                        &optimizer.settings(),
+                        &mut Silent,
+                        &mut Unrecorded,
+                        &|| false,
+                    )
+                    .unwrap_or_else(|e| panic!("{e}"))
                 });
                 record.run = run;
                 record.evaluations = optimised.evaluations;

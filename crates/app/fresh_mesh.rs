@@ -11,17 +11,17 @@
 use fluxmorph_geometry::tet4::Point;
 
 use crate::config::{Config, MeshConfig, Source};
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::design::Triangulation;
 use crate::error::Error;
-use fluxmorph_optimizer::problem::SolverCache;
-use fluxmorph_optimizer::memory_estimate::of_other_mesh;
 use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{ObjectiveResult, Verification};
-use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem};
 use crate::setup::{Purpose, Setup, design_triangulation, set_up};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::design::Triangulation;
+use fluxmorph_optimizer::driver::StopReason;
+use fluxmorph_optimizer::memory_estimate::of_other_mesh;
+use fluxmorph_optimizer::problem::SolverCache;
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem};
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
 /// alone counts, and not the way to it.
@@ -241,7 +241,7 @@ fn objective_at(
         None => problem.moved(&[])?,
     };
     let analysis = problem.analyse(moved, &[], Derivatives::None, memory, &mut NoProgress)?;
-    if let (Some(shape), Some(motion)) = (problem.shape(), undeformed) {
+    if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
         shape.set_motion(motion);
     }
     Ok(analysis.objective.unwrap_or(f64::NAN))
@@ -320,7 +320,10 @@ mod tests {
             let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
             let best = dished(&setup);
             let value = |p: &[f64]| {
-                let analysis = setup.problem.evaluate(p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress).expect("a valid mesh");
+                let analysis = setup
+                    .problem
+                    .evaluate(p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+                    .expect("a valid mesh");
                 analysis.objective.expect("an objective")
             };
             let shape = setup.problem.shape().expect("a shape");

@@ -3,16 +3,16 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use fluxmorph_geometry::io::read_vtu;
-use fluxmorph_optimizer::Error;
 use fluxmorph::config::{Algorithm, Config, ConfigError, Optimizer, Source};
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::driver::Record;
 use fluxmorph::observer::{Evaluation, Silent};
 use fluxmorph::output::{OlderRun, RunResult, system_disk};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph::session::{self, Options};
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_geometry::io::read_vtu;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use support::{config, repository, setup};
 
 #[derive(Default)]

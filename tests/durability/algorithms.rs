@@ -3,12 +3,12 @@
 
 use std::path::Path;
 
-use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::nlopt::{Minimisation, Sample, minimise};
 use fluxmorph::config::Algorithm;
 use fluxmorph::journal::{Identity, Journal, Record, parse};
 use fluxmorph::observer::Evaluation;
 use fluxmorph::output::{OlderRun, RunDirectory};
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::nlopt::{Minimisation, Sample, minimise};
 use fluxmorph_optimizer::problem::Timings;
 
 use crate::disk::SimulatedDisk;

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use fluxmorph_optimizer::Error;
 use fluxmorph::config::{Config, Source};
 use fluxmorph::observer::Silent;
 use fluxmorph::output::{Disk, OlderRun, RunResult};
 use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph_optimizer::Error;
 
 /// An iron block over a gap in a uniform field; its lower face moves.
 const BLOCK: &str = include_str!("block.toml");

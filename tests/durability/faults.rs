@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
-use fluxmorph_optimizer::Error;
 use fluxmorph::cli::ExitCode;
 use fluxmorph::config::{Config, Source};
 use fluxmorph::output::{OutputError, RunResult};
 use fluxmorph::session::Limits;
+use fluxmorph_optimizer::Error;
 use rayon::prelude::*;
 
 use crate::device::{FOLDER, block, constrained, resume, run, with_rounds};

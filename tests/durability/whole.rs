@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph_geometry::io::read_vtu;
 use fluxmorph::journal;
+use fluxmorph_geometry::io::read_vtu;
 
 /// What the ends of logs may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,8 @@
 use std::io::Write;
 
 use fluxmorph::config::Config;
-use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::problem::{Problem, Want};
 
 use super::{MESHED, Settings, certify_all, check, wavy};
 use crate::support::repository;

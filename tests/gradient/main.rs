@@ -3,11 +3,11 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+use fluxmorph::config::Config;
+use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error;
-use fluxmorph::config::Config;
 use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
 use fluxmorph_remesh::Moved;
 use support::{repository, setup};

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use fluxmorph_optimizer::Error;
 use fluxmorph::config::{Algorithm, Config, Optimizer};
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::driver::Record;
 use fluxmorph::observer::{Evaluation, Observer, Silent};
 use fluxmorph::output::StopReason;
+use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
 use fluxmorph_optimizer::rounds::{RoundEvent, RoundKind};
-use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify_all};
 
 fn quick() -> (Problem, Optimizer) {

@@ -3,16 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
-use fluxmorph_geometry::{ElementId, Partition};
 use fluxmorph::config::Config;
 use fluxmorph::fields::{self, FieldData};
 use fluxmorph::observer::Silent;
 use fluxmorph::output::{Disk, OlderRun, RunDirectory, system_disk};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph::report::ReportedRun;
 use fluxmorph::session::{self, Options};
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
+use fluxmorph_geometry::{ElementId, Partition};
+use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 
 /// Three ranks, and one that owns no element.
 const RANKS: usize = 4;

@@ -39,10 +39,7 @@ fn taylor(value: impl Fn(&[f64]) -> (f64, Vec<f64>), p: &[f64], first_step: f64)
         assert!((1.9..2.2).contains(&order), "order {order}: {remainders:?}");
     }
     // Without second order the remainder is nothing but rounding: then the gradient is exact as it stands.
-    assert!(
-        remainders[0] < 0.5 * (first_step * slope).abs() + rounding,
-        "{remainders:?} against {slope}"
-    );
+    assert!(remainders[0] < 0.5 * (first_step * slope).abs() + rounding, "{remainders:?} against {slope}");
 }
 
 const MESHED: [&str; 2] = ["regions.plate.model=\"volume\"", "remesh.region=[\"plate\", \"remesh\"]"];
@@ -88,14 +85,12 @@ fn the_gradient_holds_in_both_models_and_both_agree() {
     assert!((values[0] - values[1]).abs() < 1e-12 * values[0], "{values:?}");
 }
 
-
 #[test]
 fn the_bound_is_conservative_by_no_more_than_its_margin() {
     let setup = shield(&[]);
     let shape = setup.problem.shape.as_ref().expect("a shape");
     let p = wavy(&setup.problem);
-    let (least, most) =
-        shape.thickness.as_ref().expect("a plate has one").range(&shape.surface.heights(&p));
+    let (least, most) = shape.thickness.as_ref().expect("a plate has one").range(&shape.surface.heights(&p));
     for (bound, excess, limit) in
         [(Bound::Minimum(0.012), 0.012 - least, 0.012), (Bound::Maximum(0.014), most - 0.014, 0.014)]
     {

@@ -7,15 +7,15 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use fluxmorph_optimizer::Error;
 use fluxmorph::config::Optimizer;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph::fresh_mesh::{Gain, Shapes};
-use fluxmorph_optimizer::driver::Record;
 use fluxmorph::observer::{Evaluation, Silent};
 use fluxmorph::output::{ObjectiveResult, StopReason};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph::setup::Setup;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_solver::recovery;
 use support::{ShieldReference, config, relative_l2, setup};
 

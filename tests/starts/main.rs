@@ -8,14 +8,14 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-use fluxmorph_optimizer::Error;
 use fluxmorph::config::Optimizer;
-use fluxmorph_optimizer::driver::{Recorder, optimise};
-use fluxmorph_optimizer::driver::Record;
 use fluxmorph::observer::Silent;
 use fluxmorph::output::StopReason;
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::{Recorder, optimise};
+use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use support::setup;
 
 const MESHED: &str = "shield.toml";

@@ -4,9 +4,9 @@
 
 use std::path::PathBuf;
 
-use fluxmorph_geometry::fem::c64;
 use fluxmorph::config::{Config, Source};
 use fluxmorph::setup::{Purpose, Setup, set_up};
+use fluxmorph_geometry::fem::c64;
 
 /// A file of the repository.
 pub(crate) fn repository(path: &str) -> PathBuf {

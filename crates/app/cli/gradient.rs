@@ -6,10 +6,10 @@ use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::config::FactorReuse;
 use crate::error::Error;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up_watched};
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
 /// Do what the command line says.

@@ -15,8 +15,8 @@ use super::ExitCode;
 use super::launcher;
 use super::ranks::is_worker;
 use crate::error::Error;
-use fluxmorph_optimizer::Error as OptimizerError;
 use crate::observer::take_down;
+use fluxmorph_optimizer::Error as OptimizerError;
 
 /// What is shown at the first signal of a run.
 pub(super) const FINISHES_EVALUATION: &str =
@@ -48,7 +48,10 @@ impl Signal {
     /// How a command ended: one that a signal has ended, before it could have a result, says so and has that signal's code.
     pub(super) fn ended(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
         match (outcome, self.received()) {
-            (Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)), Some(code)) => {
+            (
+                Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)),
+                Some(code),
+            ) => {
                 let _ = writeln!(std::io::stderr(), "{error}");
                 Ok(code)
             }

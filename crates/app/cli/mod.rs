@@ -31,7 +31,7 @@ pub use init::InitError;
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
-use crate::observer::{Bar, Console, RunObserver, Quiet};
+use crate::observer::{Bar, Console, Quiet, RunObserver};
 use crate::output::DesignFileError;
 use args::{Cli, Command, Progress, WorkArgs};
 

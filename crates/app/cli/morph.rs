@@ -6,8 +6,8 @@ use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::morph::{self, Parameters};
 use crate::output::system_disk;
-use fluxmorph_optimizer::driver::StopReason;
 use crate::session::Options;
+use fluxmorph_optimizer::driver::StopReason;
 
 /// Do what the command line says.
 ///

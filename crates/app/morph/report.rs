@@ -11,8 +11,8 @@ use crate::cli::ExitCode;
 use crate::config::Paper;
 use crate::error::Error;
 use crate::output::RunStatus;
-use fluxmorph_optimizer::driver::StopReason;
 use crate::setup::MotionSetup;
+use fluxmorph_optimizer::driver::StopReason;
 
 /// The result of `fluxmorph morph`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

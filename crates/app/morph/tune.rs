@@ -14,11 +14,11 @@ use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
 use super::table::aligned;
-use fluxmorph_optimizer::nlopt::{Search, maximise};
 use crate::config::{Config, Increments, Remesh, Source, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::observer::Observer;
 use crate::setup::{MotionSetup, set_up_motion};
+use fluxmorph_optimizer::nlopt::{Search, maximise};
 
 /// Gain of worst quality for which another policy is taken: on equal cells the isotropic ones are
 /// the same but for rounding.

@@ -12,7 +12,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, W
 use super::console::announced;
 use super::summary::{self, Named};
 use super::table::{self, Columns};
-use super::{Colour, Evaluation, Observer, RunObserver, Paint, Started, show};
+use super::{Colour, Evaluation, Observer, Paint, RunObserver, Started, show};
 use crate::output::RunResult;
 use fluxmorph_optimizer::problem::Stage;
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::summary::{self, Named};
 use super::table::{self, Columns};
-use super::{Evaluation, Observer, RunObserver, Paint, Started, show};
+use super::{Evaluation, Observer, Paint, RunObserver, Started, show};
 use crate::output::RunResult;
 use fluxmorph_optimizer::problem::Stage;
 

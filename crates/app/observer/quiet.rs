@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::{Observer, RunObserver, Paint, show};
+use super::{Observer, Paint, RunObserver, show};
 
 /// Shows the warnings alone.
 #[derive(Debug)]

@@ -17,25 +17,25 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
 use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver;
 use crate::error::Error;
 use crate::exports;
 use crate::fresh_mesh::{self, Check, Gain, Shapes};
 use crate::journal::{self, Identity};
-use fluxmorph_optimizer::problem::SolverCache;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::observer::{RunObserver, Started};
 use crate::output::{
-    Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus, StopReason,
-    check_finite, peak_memory_bytes, resume_command, surface_files,
+    Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
+    StopReason, check_finite, peak_memory_bytes, resume_command, surface_files,
 };
-use fluxmorph_optimizer::problem::{Problem, Derivatives};
-use fluxmorph_optimizer::problem::RoundEvent;
 use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver;
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::problem::RoundEvent;
+use fluxmorph_optimizer::problem::SolverCache;
 use fluxmorph_optimizer::problem::Stage;
+use fluxmorph_optimizer::problem::{Derivatives, Problem};
 use pieces::SharedPieces;
 use recorder::{DirectoryRecorder, write_collection, write_field};
 pub(crate) use resume::configuration;
@@ -144,7 +144,8 @@ pub fn solve(
         observer.phase("solving the field");
         let p = values.as_deref().unwrap_or_default();
         let progress = &mut |stage| observer.stage(stage);
-        let analysis = problem.analyse(moved, p, Derivatives::First, &mut SolverCache::default(), progress)?;
+        let analysis =
+            problem.analyse(moved, p, Derivatives::First, &mut SolverCache::default(), progress)?;
         observer.stage(Stage::Writing);
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
@@ -243,8 +244,9 @@ impl<'a> Session<'a> {
 
     /// What the journal of this run belongs to.
     fn identity(&self) -> Identity {
-        let Problem { shape, constraints, .. } = &self.setup.problem;
-        let variables = shape.as_ref().map_or(0, |shape| shape.surface().variable_count());
+        let problem = &self.setup.problem;
+        let (shape, constraints) = (problem.shape(), problem.constraints());
+        let variables = shape.map_or(0, |shape| shape.surface().variable_count());
         Identity::new(self.config, &self.setup.full_mesh, variables, constraints.len())
     }
 
@@ -259,7 +261,8 @@ impl<'a> Session<'a> {
         let config = self.config;
         approach.iter().for_each(|event| observer.round(event));
         let problem = &mut self.setup.problem;
-        let optimised = driver::optimise(problem, &config.optimizer.settings(), observer, &mut recorder, interrupted)?;
+        let optimised =
+            driver::optimise(problem, &config.optimizer.settings(), observer, &mut recorder, interrupted)?;
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, problem, &best.analysis)?;

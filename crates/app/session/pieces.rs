@@ -29,7 +29,8 @@ impl SharedPieces {
     pub(super) fn of(problem: &Problem, directory: PathBuf) -> Option<Self> {
         let share = problem.share()?;
         let states = problem.states().iter().map(FieldModel::of_one_process).collect();
-        let writer = PieceWriter { states, share: share.clone(), mesh: problem.original().clone(), directory };
+        let writer =
+            PieceWriter { states, share: share.clone(), mesh: problem.original().clone(), directory };
         Some(Self { channel: share.group.register(Box::new(writer)), ranks: share.group.size() })
     }
 

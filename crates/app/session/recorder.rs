@@ -9,14 +9,14 @@ use fluxmorph_geometry::io::pvd_text;
 
 use super::pieces::SharedPieces;
 use crate::config::FieldsKept;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver::Recorder;
 use crate::error::Error;
 use crate::fields::{self, FieldData};
 use crate::journal::{Contents, Identity, Journal};
-use fluxmorph_optimizer::driver::Record;
 use crate::observer::Evaluation;
 use crate::output::{History, RunDirectory};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::Recorder;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 /// Writes journal, history and fields into the run directory.

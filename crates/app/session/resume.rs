@@ -11,8 +11,6 @@ use super::{Options, Session, constraint_names, unreached};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::observer::RunObserver;
 use crate::output::{
@@ -20,6 +18,8 @@ use crate::output::{
     surface_files,
 };
 use crate::setup::{Purpose, set_up_watched};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
 
 /// Largest configuration and largest result that are read [bytes].
 const LARGEST: [u64; 2] = [1 << 20, 1 << 30];

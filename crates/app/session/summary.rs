@@ -7,14 +7,14 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::{SolverError, recovery};
 
 use super::Session;
-use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use crate::error::Error;
-use fluxmorph_optimizer::objective::Term;
 use crate::observer::RunObserver;
 use crate::output::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ProbeResult, RunResult, StateResult,
     StopReason, TermResult, peak_memory_bytes,
 };
+use fluxmorph_optimizer::constraint::{Bound, Constraint};
+use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
 
 impl Session<'_> {

@@ -7,10 +7,10 @@ use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
 
 use super::millimetres;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, Source};
+use crate::error::Error;
 use fluxmorph_optimizer::design::{
     Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
 };
-use crate::error::Error;
 
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(

@@ -9,12 +9,12 @@ use fluxmorph_solver::linear::{
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, SolverError, UniformField};
 
 use super::blame::Gathered;
-use fluxmorph_optimizer::Error as OptimizerError;
 use crate::config::{
     self, Config, FactorReuse, Fault, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel, SolverMethod,
     Source,
 };
 use crate::error::Error;
+use fluxmorph_optimizer::Error as OptimizerError;
 
 /// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
 pub(super) fn without_impedance_regions(

@@ -6,12 +6,12 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional};
 
-use fluxmorph_optimizer::Error as OptimizerError;
 use crate::config::{
     self, BodyKind, Config, Fault, Limit as Written, ObjectiveKind, RegionModel, Source, UpperBound,
 };
-use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use crate::error::Error;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::geometric;
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
@@ -187,7 +187,8 @@ pub(super) fn constraints(
             Written::Body { kind, region, bound } => {
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);
                 let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
-                let body = geometric::Volume::new(mesh, full_mesh, region, surface).map_err(OptimizerError::from)?;
+                let body =
+                    geometric::Volume::new(mesh, full_mesh, region, surface).map_err(OptimizerError::from)?;
                 let body = match (kind, density(config, region)) {
                     (BodyKind::Mass, Some(density)) => body.with_density(density),
                     _ => body,

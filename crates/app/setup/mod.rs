@@ -27,9 +27,9 @@ use fluxmorph_solver::{FieldModel, Material};
 
 use crate::config::{self, Config, ConfigError, Fault, FaultReport, RegionModel, Source};
 use crate::error::Error;
+use blame::Gathered;
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_optimizer::problem::{Progress, Stage};
-use blame::Gathered;
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]

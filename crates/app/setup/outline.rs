@@ -10,8 +10,8 @@ use fluxmorph_remesh::KinematicConstraint;
 use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, Source};
-use fluxmorph_optimizer::design::DesignSurface;
 use crate::error::Error;
+use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 
 /// Mesh, design surface and audits of a configuration.

@@ -15,10 +15,10 @@ use super::millimetres;
 use crate::config::{
     self, Config, Design, DesignDirection, DirectionWord, Fault, Remesh, RemeshExtent, Source, StiffnessLaw,
 };
-use fluxmorph_optimizer::design::DesignSurface;
 use crate::error::Error;
-use fluxmorph_optimizer::problem::Shape;
+use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
+use fluxmorph_optimizer::problem::Shape;
 
 /// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
 const LEAST_QUALITY_SHARE: f64 = 0.05;
@@ -388,7 +388,8 @@ fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Re
         return Ok(());
     }
     let mut faults = Vec::new();
-    if let Err(error @ RemeshError::Inverted { .. }) = shape.motion().moved(&shape.displacement(shape.initial()))
+    if let Err(error @ RemeshError::Inverted { .. }) =
+        shape.motion().moved(&shape.displacement(shape.initial()))
     {
         faults.push(
             source

@@ -6,9 +6,9 @@
 use fluxmorph_geometry::Mesh;
 use fluxmorph_remesh::RemeshError;
 
-use crate::nlopt::CONSTRAINT_TOLERANCE;
 use crate::error::Error;
 use crate::geometric;
+use crate::nlopt::CONSTRAINT_TOLERANCE;
 use crate::objective::Term;
 use crate::problem::Shape;
 

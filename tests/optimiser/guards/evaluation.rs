@@ -1,8 +1,8 @@
 //! One evaluation with something in it that cannot be computed.
 
+use fluxmorph::cli::ExitCode;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_optimizer::Error;
-use fluxmorph::cli::ExitCode;
 use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};

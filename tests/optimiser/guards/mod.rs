@@ -7,10 +7,10 @@ mod session;
 
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::fem::{c64, norm};
 use fluxmorph::config::{Config, Goal, Optimizer};
-use fluxmorph_optimizer::problem::Problem;
 use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph_geometry::fem::{c64, norm};
+use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::{FieldModel, FieldModelSetup};
 
 /// Norm beyond which a right side is refused [any unit]: what an iteration makes of its squares must be numbers.

@@ -3,14 +3,14 @@
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use fluxmorph_geometry::fem::c64;
-use fluxmorph_optimizer::Error;
 use fluxmorph::cli::ExitCode;
 use fluxmorph::config::{Algorithm, Optimizer};
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::driver::Record;
 use fluxmorph::observer::{Evaluation, Observer, Silent};
 use fluxmorph::output::{OutputError, RunStatus, StopReason};
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::SolverError;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, Reuse};

@@ -14,11 +14,11 @@ use crate::config::{
 };
 use crate::error::Error;
 use crate::fresh_mesh;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use crate::memory_limit;
 use crate::morph::{self, MotionSummary};
 use crate::output::OlderRun;
 use crate::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::problem::Progress;
 
 /// What `check` found.
@@ -191,7 +191,8 @@ pub(super) fn summary<'a>(
         optimizer: &config.optimizer,
         probes: &config.probes,
         output_directory: config.output.directory.display().to_string(),
-        memory_estimate_bytes: of_evaluation(problem).max(fresh_mesh::memory_estimate(config, problem).unwrap_or(0)),
+        memory_estimate_bytes: of_evaluation(problem)
+            .max(fresh_mesh::memory_estimate(config, problem).unwrap_or(0)),
         warnings,
     })
 }

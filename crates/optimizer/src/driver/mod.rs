@@ -18,6 +18,7 @@
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
 
+mod compute;
 mod incumbent;
 mod observer;
 mod outcome;
@@ -82,7 +83,9 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
         NextStep::TightenTolerance => search.tighten_tolerance(run),
         NextStep::MoveTrustRegion => search.move_trust_region(run)?,
         NextStep::NewReference { cause } => search.begin_round(run, &cause)?,
-        NextStep::ShrinkTrustRegion { refused, gained } => search.shrink_trust_region(run, &refused, gained)?,
+        NextStep::ShrinkTrustRegion { refused, gained } => {
+            search.shrink_trust_region(run, &refused, gained)?
+        }
         NextStep::FallBack(refused) => return search.fall_back(run, &refused),
     }
     Ok(None)

@@ -4,8 +4,8 @@
 
 use fluxmorph_remesh::FallbackLevel;
 
-use super::trust_region::TrustRegion;
 use super::run::Run;
+use super::trust_region::TrustRegion;
 use super::{Settings, StopReason};
 use crate::error::Error;
 use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
@@ -158,13 +158,7 @@ impl<'a> Search<'a> {
     }
 
     /// After a method that ended by itself.
-    fn after_ending(
-        &self,
-        run: &mut Run<'_>,
-        ending: Ending,
-        gained: bool,
-        evaluations: usize,
-    ) -> NextStep {
+    fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
         let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS;
         if is_cautious && self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS {
             return NextStep::TightenTolerance;

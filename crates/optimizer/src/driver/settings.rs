@@ -21,12 +21,6 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            algorithm: Algorithm::Mma,
-            max_evaluations: 30,
-            max_time: None,
-            ftol_rel: 1e-3,
-            xtol_rel: 0.0,
-        }
+        Self { algorithm: Algorithm::Mma, max_evaluations: 30, max_time: None, ftol_rel: 1e-3, xtol_rel: 0.0 }
     }
 }

@@ -63,8 +63,10 @@ impl ThicknessBound {
             Bound::Minimum(limit) => (-1.0, limit),
             Bound::Maximum(limit) => (1.0, limit),
         };
-        let excess: Vec<(usize, f64)> =
-            thickness.at_nodes().map(|(node, t)| (node, sign * (t + normal_displacements[node] - limit))).collect();
+        let excess: Vec<(usize, f64)> = thickness
+            .at_nodes()
+            .map(|(node, t)| (node, sign * (t + normal_displacements[node] - limit)))
+            .collect();
         let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
         // Relative to the greatest: no exponential overflows.
         let terms: Vec<f64> = excess.iter().map(|&(_, g)| (self.sharpness * (g - greatest)).exp()).collect();

@@ -6,11 +6,10 @@
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use ::nlopt::{Algorithm, Nlopt, Target};
 
-use super::STOP_VALUE;
+use super::{PanicGuard, STOP_VALUE};
 
 /// First step of every variable, as a share of its span: both methods look around as far as that, and no further than
 /// half way from the middle to the bounds.
@@ -54,33 +53,9 @@ pub fn maximise(
     if n == 0 || search.upper.len() != n || !(0..n).all(are_sound) {
         return None;
     }
-    let physical = |x: &[f64]| -> Vec<f64> {
-        let scaled = |k: usize| search.lower[k] + x[k] * (search.upper[k] - search.lower[k]);
-        (0..n).map(|k| scaled(k).clamp(search.lower[k], search.upper[k])).collect()
-    };
-    let state = RefCell::new(State { evaluate, best: None, panic: None });
-    let objective = |x: &[f64], _: Option<&mut [f64]>, (): &mut ()| -> f64 {
-        let state = &mut *state.borrow_mut();
-        if state.panic.is_some() || x.iter().any(|x| !x.is_finite()) {
-            return 2.0 * STOP_VALUE;
-        }
-        let point = physical(x);
-        match catch_unwind(AssertUnwindSafe(|| (state.evaluate)(&point))) {
-            Ok(ControlFlow::Break(())) => 2.0 * STOP_VALUE,
-            Ok(ControlFlow::Continue(value)) => {
-                // Larger ones would overflow in the products of the library.
-                let value = if value.abs() < 1e30 { value } else { -1e30 };
-                if state.best.as_ref().is_none_or(|best| value > best.1) {
-                    state.best = Some((point, value));
-                }
-                -value
-            }
-            Err(panic) => {
-                state.panic = Some(panic);
-                2.0 * STOP_VALUE
-            }
-        }
-    };
+    let state = RefCell::new(State { search, evaluate, best: None, guard: PanicGuard::default() });
+    let objective =
+        |x: &[f64], _: Option<&mut [f64]>, (): &mut ()| -> f64 { state.borrow_mut().objective(x) };
     let method = if n == 1 { Algorithm::Cobyla } else { Algorithm::Bobyqa };
     let mut library = Nlopt::new(method, n, &objective, Target::Minimize, ());
     let accepted = library
@@ -101,21 +76,45 @@ pub fn maximise(
         let _ = library.optimize(&mut x);
     }
     drop(library);
-    let State { best, panic, .. } = state.into_inner();
-    match panic {
-        Some(panic) => resume_unwind(panic),
-        None => best,
-    }
+    let State { best, guard, .. } = state.into_inner();
+    guard.resume();
+    best
 }
 
-struct State<F> {
+struct State<'a, F> {
+    search: &'a Search,
     evaluate: F,
     best: Option<(Vec<f64>, f64)>,
-    panic: Option<Box<dyn std::any::Any + Send>>,
+    guard: PanicGuard,
+}
+
+impl<F: FnMut(&[f64]) -> ControlFlow<(), f64>> State<'_, F> {
+    /// What NLopt makes small at a point of the unit cube; below the stop value where the search ends.
+    fn objective(&mut self, x: &[f64]) -> f64 {
+        if self.guard.has_caught() || x.iter().any(|x| !x.is_finite()) {
+            return 2.0 * STOP_VALUE;
+        }
+        let Search { lower, upper, .. } = self.search;
+        let physical = |k: usize| (lower[k] + x[k] * (upper[k] - lower[k])).clamp(lower[k], upper[k]);
+        let point: Vec<f64> = (0..x.len()).map(physical).collect();
+        match self.guard.call(|| (self.evaluate)(&point)) {
+            Some(ControlFlow::Continue(value)) => {
+                // Larger ones would overflow in the products of the library.
+                let value = if value.abs() < 1e30 { value } else { -1e30 };
+                if self.best.as_ref().is_none_or(|best| value > best.1) {
+                    self.best = Some((point, value));
+                }
+                -value
+            }
+            Some(ControlFlow::Break(())) | None => 2.0 * STOP_VALUE,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::panic::catch_unwind;
+
     use super::*;
 
     #[test]

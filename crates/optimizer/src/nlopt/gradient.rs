@@ -9,11 +9,10 @@
 //! caught here and goes on after NLopt has returned.
 
 use std::cell::RefCell;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-use ::nlopt::{FailState, Nlopt, SuccessState, Target};
+use ::nlopt::{FailState, SuccessState, Target};
 
-use super::STOP_VALUE;
+use super::{PanicGuard, STOP_VALUE};
 use crate::error::Error;
 
 /// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres. The
@@ -179,66 +178,31 @@ pub fn minimise<E: From<Error>>(
     start: &[f64],
     evaluate: impl FnMut(&[f64]) -> Result<Sample, E>,
 ) -> Outcome<E> {
-    let [lower, upper] = [&settings.lower, &settings.upper];
-    let are_sound = start.len() == lower.len()
-        && start.len() == upper.len()
-        && start.iter().all(|p| p.is_finite())
-        // Of infinite bounds the span is no length either.
-        && lower.iter().zip(upper).all(|(low, high)| low <= high && (high - low).is_finite());
-    if !are_sound {
+    let Some(scaling) = Scaling::new(settings, start) else {
         return Outcome::Failed("a bound or the first design is not finite, or the bounds cross");
-    }
-    // A variable between equal bounds keeps its value in any unit.
-    let unit_of = |span: f64| if span > 0.0 { span / SCALED_SPAN } else { 1.0 };
-    let unit: Vec<f64> = lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect();
-    let factor = settings.algorithm.objective_scale();
-    let scaled =
-        |values: &[f64]| -> Vec<f64> { values.iter().zip(&unit).map(|(v, unit)| v / unit).collect() };
+    };
     let bridge = RefCell::new(Bridge {
         evaluate,
         settings,
-        unit: &unit,
-        start: (start, scaled(start)),
+        scaling: &scaling,
+        start: (start, scaling.scaled(start)),
         last: None,
         asked: 0,
+        guard: PanicGuard::default(),
         interruption: None,
     });
-    let fill = |target: &mut [f64], factor: f64, derivative: &[f64]| {
-        for ((g, d), unit) in target.iter_mut().zip(derivative).zip(&unit) {
-            *g = factor * d * unit;
-        }
-    };
     let objective = |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| -> f64 {
-        let mut bridge = bridge.borrow_mut();
-        let Some(sample) = bridge.at(x) else { return 2.0 * STOP_VALUE };
-        if let Some(gradient) = gradient {
-            fill(gradient, factor, &sample.gradient);
-        }
-        factor * sample.value
+        bridge.borrow_mut().objective(x, gradient)
     };
     let constraints = |values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>, (): &mut ()| {
-        let mut bridge = bridge.borrow_mut();
-        let Some(sample) = bridge.at(x) else {
-            // Feasible: NLopt heeds its stop value at feasible designs alone.
-            values.fill(-1.0);
-            if let Some(gradients) = gradients {
-                gradients.fill(0.0);
-            }
-            return;
-        };
-        for (value, (own, _)) in values.iter_mut().zip(&sample.constraints) {
-            *value = *own;
-        }
-        if let Some(gradients) = gradients {
-            for (row, (_, own)) in gradients.chunks_exact_mut(x.len()).zip(&sample.constraints) {
-                fill(row, 1.0, own);
-            }
-        }
+        bridge.borrow_mut().constraints(values, x, gradients);
     };
-    let mut library = Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
+    let mut library =
+        ::nlopt::Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
+    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scaled(bounds));
     let mut accepted = library
-        .set_lower_bounds(&scaled(&settings.lower))
-        .and_then(|_| library.set_upper_bounds(&scaled(&settings.upper)))
+        .set_lower_bounds(&lower)
+        .and_then(|_| library.set_upper_bounds(&upper))
         .and_then(|_| library.set_stopval(STOP_VALUE))
         .and_then(|_| library.set_ftol_rel(settings.ftol_rel))
         .and_then(|_| library.set_xtol_rel(settings.xtol_rel));
@@ -251,18 +215,23 @@ pub fn minimise<E: From<Error>>(
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
     }
-    let mut x = scaled(start);
+    let mut x = scaling.scaled(start);
     for (k, x) in x.iter_mut().enumerate() {
-        *x = x.clamp(settings.lower[k] / unit[k], settings.upper[k] / unit[k]);
+        *x = x.clamp(lower[k], upper[k]);
     }
     let ended = library.optimize(&mut x);
     drop(library);
-    match bridge.into_inner().interruption {
-        Some(Interruption::Settled) => return Outcome::Ended(Ending::Step),
-        Some(Interruption::Error(error)) => return Outcome::Interrupted(error),
-        Some(Interruption::Panic(panic)) => resume_unwind(panic),
-        None => {}
+    let bridge = bridge.into_inner();
+    bridge.guard.resume();
+    match bridge.interruption {
+        Some(Interruption::Settled) => Outcome::Ended(Ending::Step),
+        Some(Interruption::Error(error)) => Outcome::Interrupted(error),
+        None => outcome(ended),
     }
+}
+
+/// What NLopt's own word on its end means.
+fn outcome<E>(ended: Result<(SuccessState, f64), (FailState, f64)>) -> Outcome<E> {
     match ended {
         Ok((SuccessState::XtolReached, _)) => Outcome::Ended(Ending::Step),
         Ok(_) | Err((FailState::RoundoffLimited, _)) => Outcome::Ended(Ending::Objective),
@@ -272,78 +241,142 @@ pub fn minimise<E: From<Error>>(
     }
 }
 
+/// Units in which NLopt sees variables and objective.
+struct Scaling {
+    /// Length of a scaled unit of every variable.
+    unit: Vec<f64>,
+    /// On the objective.
+    factor: f64,
+}
+
+impl Scaling {
+    /// Of the bounds; `None` where they or the start are not finite, or the bounds cross.
+    fn new(settings: &Minimisation, start: &[f64]) -> Option<Self> {
+        let [lower, upper] = [&settings.lower, &settings.upper];
+        let are_sound = start.len() == lower.len()
+            && start.len() == upper.len()
+            && start.iter().all(|p| p.is_finite())
+            // Of infinite bounds the span is no length either.
+            && lower.iter().zip(upper).all(|(low, high)| low <= high && (high - low).is_finite());
+        // A variable between equal bounds keeps its value in any unit.
+        let unit_of = |span: f64| if span > 0.0 { span / SCALED_SPAN } else { 1.0 };
+        are_sound.then(|| Self {
+            unit: lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect(),
+            factor: settings.algorithm.objective_scale(),
+        })
+    }
+
+    fn scaled(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(&self.unit).map(|(v, unit)| v / unit).collect()
+    }
+
+    /// Derivatives by the scaled variables.
+    fn fill(&self, target: &mut [f64], factor: f64, derivative: &[f64]) {
+        for ((g, d), unit) in target.iter_mut().zip(derivative).zip(&self.unit) {
+            *g = factor * d * unit;
+        }
+    }
+}
+
 /// Questions for one design after which the method counts as settled there: MMA and CCSAQ, without a tolerance, ask for
 /// ever at a solution on its bounds. No method needs more than a few.
 const SETTLED: usize = 100;
 
-/// What ended the calls of the closure.
+/// What ended the calls of the closure, but for a panic.
 enum Interruption<E> {
     /// The method asks for the same design again and again.
     Settled,
     Error(E),
-    Panic(Box<dyn std::any::Any + Send>),
 }
 
 /// Between NLopt's questions and the closure.
 struct Bridge<'a, F, E> {
     evaluate: F,
     settings: &'a Minimisation,
-    /// Length of a scaled unit of every variable.
-    unit: &'a [f64],
+    scaling: &'a Scaling,
     /// The start, in metres and as NLopt sees it.
     start: (&'a [f64], Vec<f64>),
     /// The design asked for last, as NLopt sees it, and its answer.
     last: Option<(Vec<f64>, Sample)>,
     /// How often it has been asked for in a row.
     asked: usize,
+    guard: PanicGuard,
     interruption: Option<Interruption<E>>,
 }
 
 impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
+    /// The objective and its gradient at a design of NLopt's; below the stop value once the closure has been interrupted.
+    fn objective(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> f64 {
+        let scaling = self.scaling;
+        let Some(sample) = self.at(x) else { return 2.0 * STOP_VALUE };
+        if let Some(gradient) = gradient {
+            scaling.fill(gradient, scaling.factor, &sample.gradient);
+        }
+        scaling.factor * sample.value
+    }
+
+    /// The constraints and their gradients.
+    fn constraints(&mut self, values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>) {
+        let scaling = self.scaling;
+        let Some(sample) = self.at(x) else {
+            // Feasible: NLopt heeds its stop value at feasible designs alone.
+            values.fill(-1.0);
+            if let Some(gradients) = gradients {
+                gradients.fill(0.0);
+            }
+            return;
+        };
+        for (value, (own, _)) in values.iter_mut().zip(&sample.constraints) {
+            *value = *own;
+        }
+        if let Some(gradients) = gradients {
+            for (row, (_, own)) in gradients.chunks_exact_mut(x.len()).zip(&sample.constraints) {
+                scaling.fill(row, 1.0, own);
+            }
+        }
+    }
+
     /// The sample at a design of NLopt's; `None` once the closure has been interrupted.
     fn at(&mut self, x: &[f64]) -> Option<&Sample> {
-        if self.interruption.is_some() {
+        if self.interruption.is_some() || self.guard.has_caught() {
             return None;
         }
         self.asked += 1;
         if self.last.as_ref().is_none_or(|(design, _)| design != x) {
             self.asked = 1;
-            if let Some(k) = x.iter().position(|x| !x.is_finite()) {
-                let what = format!("variable {k} of a design that the method asks for");
-                let expected = "the method broke down; take another algorithm, or other bounds";
-                let error = Error::NotFinite { what, value: x[k], expected };
-                self.interruption = Some(Interruption::Error(error.into()));
-                return None;
-            }
-            // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
-            // mesh that is known.
-            let (start, scaled_start) = &self.start;
-            let back = |k: usize| if x[k] == scaled_start[k] { start[k] } else { x[k] * self.unit[k] };
-            let physical: Vec<f64> =
-                (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
-            match catch_unwind(AssertUnwindSafe(|| (self.evaluate)(&physical))) {
-                Ok(Ok(sample)) => {
-                    if let Err(error) = sample.check(x.len(), self.settings.constraints) {
-                        self.interruption = Some(Interruption::Error(error.into()));
-                        return None;
-                    }
-                    self.last = Some((x.to_vec(), sample));
-                }
-                Ok(Err(error)) => {
-                    self.interruption = Some(Interruption::Error(error));
-                    return None;
-                }
-                Err(panic) => {
-                    self.interruption = Some(Interruption::Panic(panic));
-                    return None;
-                }
+            match self.ask(x)? {
+                Ok(sample) => self.last = Some((x.to_vec(), sample)),
+                Err(error) => self.interruption = Some(Interruption::Error(error)),
             }
         }
         if self.asked > SETTLED {
             self.interruption = Some(Interruption::Settled);
+        }
+        if self.interruption.is_some() {
             return None;
         }
         self.last.as_ref().map(|(_, sample)| sample)
+    }
+
+    /// Asks the closure; `None` where it panics.
+    fn ask(&mut self, x: &[f64]) -> Option<Result<Sample, E>> {
+        if let Some(k) = x.iter().position(|x| !x.is_finite()) {
+            let what = format!("variable {k} of a design that the method asks for");
+            let expected = "the method broke down; take another algorithm, or other bounds";
+            return Some(Err(Error::NotFinite { what, value: x[k], expected }.into()));
+        }
+        // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
+        // mesh that is known.
+        let (start, scaled_start) = &self.start;
+        let unit = &self.scaling.unit;
+        let back = |k: usize| if x[k] == scaled_start[k] { start[k] } else { x[k] * unit[k] };
+        let physical: Vec<f64> =
+            (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
+        let answer = self.guard.call(|| (self.evaluate)(&physical))?;
+        Some(answer.and_then(|sample| {
+            sample.check(x.len(), self.settings.constraints)?;
+            Ok(sample)
+        }))
     }
 }
 

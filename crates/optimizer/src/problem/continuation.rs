@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_remesh::{Motion, Moved, RemeshError, StepEvent, StepLimits, SteppingOutcome};
 
-use crate::error::Error;
 use super::{Problem, RoundEvent, Shape};
+use crate::error::Error;
 
 impl Problem {
     /// Makes the mesh of a design the reference of the present round; nothing where it is already, or where the problem
@@ -19,7 +19,11 @@ impl Problem {
     ///
     /// # Panics
     /// If `p` has another length than there are variables.
-    pub fn continue_to(&mut self, p: &[f64], interrupted: &dyn Fn() -> bool) -> Result<Vec<RoundEvent>, Error> {
+    pub fn continue_to(
+        &mut self,
+        p: &[f64],
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Vec<RoundEvent>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let displacement = shape.displacement(p);
         self.continue_to_displacement(displacement, interrupted)

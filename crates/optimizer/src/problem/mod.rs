@@ -20,8 +20,8 @@ mod shape;
 mod solver_cache;
 mod stopwatch;
 
-use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::parallel::Ownership;
+use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_remesh::{Moved, RemeshError, StepToInversion};
 use fluxmorph_solver::FieldModel;

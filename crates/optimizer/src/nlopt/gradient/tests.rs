@@ -1,5 +1,7 @@
 //! Every method of NLopt on small functions with closed forms, and on evaluations that fail.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
 use super::*;
 
 /// What the closures of these tests end a method with.
@@ -256,14 +258,16 @@ fn a_variable_between_equal_bounds_keeps_its_value() {
 #[test]
 fn a_design_of_the_method_that_is_no_number_is_never_evaluated() {
     for bad in [f64::NAN, f64::INFINITY] {
-        let (settings, unit) = (settings(Algorithm::Mma), [0.001; 8]);
+        let settings = settings(Algorithm::Mma);
+        let scaling = Scaling { unit: vec![0.001; 8], factor: 1.0 };
         let mut bridge = Bridge {
             evaluate: |_: &[f64]| -> Result<Sample, Halt> { panic!("it is to be refused before") },
             settings: &settings,
-            unit: &unit,
+            scaling: &scaling,
             start: (&[0.0; 8], vec![0.0; 8]),
             last: None,
             asked: 0,
+            guard: PanicGuard::default(),
             interruption: None,
         };
         let mut x = vec![0.0; 8];

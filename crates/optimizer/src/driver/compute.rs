@@ -1,0 +1,205 @@
+//! One evaluation: the mesh, objective and constraints, the row of the history, and how the design compares.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use fluxmorph_geometry::ElementId;
+use fluxmorph_remesh::{Moved, RemeshError};
+
+use super::incumbent::{BestField, Comparison, Initial};
+use super::run::Run;
+use super::search::{Refusal, Stop};
+use super::{Evaluation, Record, StopReason, column, reference_hash};
+use crate::error::Error;
+use crate::nlopt::Sample;
+use crate::problem::{Analysis, Derivatives, Measured, Stage};
+
+impl Run<'_> {
+    /// ±F/|F0| and the constraints of a design, with their gradients.
+    ///
+    /// What is known of the best design in this round is not computed again, nor what was computed before the run was
+    /// interrupted.
+    pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+        let round = self.shape().motion().round();
+        if let Some(best) = &self.best
+            && best.round == round
+            && best.values == p
+        {
+            return Ok(best.sample.clone());
+        }
+        if self.is_replaying() && (self.interrupted)() {
+            return Err(Stop::Limit(StopReason::Interrupted));
+        }
+        match self.next.take() {
+            Some(record) if self.is_of(&record, p) => self.replay(record),
+            Some(record) => {
+                // A design that the mesh refused has left no record.
+                let difference = self.difference(&record, p);
+                self.next = Some(record);
+                self.mesh(p)?;
+                Err(Stop::Error(Box::new(difference)))
+            }
+            None => self.compute(p),
+        }
+    }
+
+    /// Computes a design.
+    fn compute(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+        self.check_limits()?;
+        let clock = Instant::now();
+        self.observer.stage(Stage::Moving);
+        let moved = self.mesh(p)?;
+        let remesh = clock.elapsed().as_secs_f64();
+        let Self { problem, cache, observer, .. } = self;
+        let progress = &mut |stage| observer.stage(stage);
+        let mut analysis = problem.analyse(moved, p, Derivatives::First, cache, progress)?;
+        analysis.timings.remesh += remesh;
+        let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
+        let objective = analysis.objective.expect("an optimisation has an objective");
+        let initial = self.initial(objective, analysis.quality.worst, &values)?;
+        let mut record = self.record(p, &initial, &analysis);
+        let sample = self.sample(&initial, &record);
+        // Before anything of it is kept.
+        sample.check(p.len(), self.constraint_count())?;
+        let comparison = self.compare(objective, &sample);
+        record.improved = comparison.is_improved();
+        record.row.iteration = self.iterations_after(comparison);
+        let names = self.problem.constraints().iter().map(|constraint| column(&constraint.name));
+        record.row.constraints = names.zip(sample.constraints.iter().map(|(c, _)| *c)).collect();
+        record.row.seconds = clock.elapsed().as_secs_f64();
+        for event in &analysis.solver_events {
+            self.observer.notice(&event.to_string());
+        }
+        self.observer.stage(Stage::Writing);
+        self.recorder.record(&record, &analysis, self.problem)?;
+        self.observer.evaluation(&record.row);
+        self.keep(record, sample.clone(), comparison, |_| BestField::Computed(Box::new(analysis)));
+        Ok(sample)
+    }
+
+    /// The mesh of a design, unless it goes beyond what the round's reference can carry.
+    fn mesh(&self, p: &[f64]) -> Result<Moved, Stop> {
+        let refused = |cause: String| Stop::Mesh(Refusal { cause, wanted: p.to_vec() });
+        let moved = self.problem.moved(p).map_err(|error| match error {
+            RemeshError::Inverted { .. } => refused(error.to_string()),
+            other => Stop::Error(Box::new(other.into())),
+        })?;
+        let limits = &self.shape().limits;
+        let share = 1.0 / moved.inversion.step;
+        // Without rounds there is no other reference to take.
+        if let Some(element) =
+            moved.inversion.element.filter(|_| share > limits.inversion_share && limits.rounds > 0)
+        {
+            return Err(refused(format!(
+                "a design would go {:.0} % of the way to inverting element {element}, beyond the allowed share of {}",
+                100.0 * share,
+                limits.inversion_share
+            )));
+        }
+        if limits.least_quality > 0.0 {
+            let quality = self.problem.quality(&moved.mesh);
+            if quality.worst < limits.least_quality {
+                return Err(refused(format!(
+                    "element {} would have the quality {:.4e}, below the minimum of {:.4e}",
+                    quality.worst_element, quality.worst, limits.least_quality
+                )));
+            }
+        }
+        Ok(moved)
+    }
+
+    /// Scale of the objective and bounds of the constraints, which the first design fixes.
+    pub(super) fn initial(
+        &mut self,
+        objective: f64,
+        quality: f64,
+        measured: &[f64],
+    ) -> Result<Initial, Error> {
+        if let Some(initial) = &self.initial {
+            return Ok(initial.clone());
+        }
+        if objective == 0.0 {
+            return Err(Error::Optimisation {
+                cause: "the objective of the initial design is zero: there is no field to change, or its terms cancel; \
+                        check coils, regions, frequencies and weights",
+            });
+        }
+        let constraints = self.problem.constraints().iter().zip(measured);
+        let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
+        let initial = Initial { objective, quality, bounds: bounds.collect::<Result<_, _>>()? };
+        Ok(self.initial.insert(initial).clone())
+    }
+
+    /// What the method sees of a design.
+    pub(super) fn sample(&self, initial: &Initial, record: &Record) -> Sample {
+        let scale = self.goal.sign() / initial.objective.abs();
+        let constraints = initial.bounds.iter().zip(&record.constraints);
+        Sample {
+            value: scale * record.row.objective,
+            gradient: record.gradient.iter().map(|d| scale * d).collect(),
+            constraints: constraints
+                .map(|(bound, (value, gradient))| (bound.excess(*value), bound.gradient(gradient)))
+                .collect(),
+        }
+    }
+
+    /// How a design compares with the best so far.
+    pub(super) fn compare(&self, objective: f64, sample: &Sample) -> Comparison {
+        match &self.best {
+            None => Comparison::First,
+            Some(_) if self.best_is_stale => Comparison::Remeshed,
+            Some(best) => best.compare(self.goal, objective, sample),
+        }
+    }
+
+    pub(super) fn iterations_after(&self, comparison: Comparison) -> usize {
+        self.iterations + usize::from(comparison == Comparison::Better)
+    }
+
+    /// The record of a design, but for how it compares with the best.
+    fn record(&self, p: &[f64], initial: &Initial, analysis: &Analysis) -> Record {
+        let shape = self.shape();
+        let displacements = || shape.surface().normal_displacements(p);
+        let thickness = shape.thickness().map(|thickness| thickness.range(&displacements()));
+        let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
+        let objective = analysis.objective.expect("an optimisation has an objective");
+        let gradient = analysis.gradient.clone().expect("a gradient was asked for");
+        let region = |e: ElementId| analysis.mesh.topology().region_name_at(e).to_owned();
+        let row = Evaluation {
+            evaluation: self.evaluations,
+            iteration: 0,
+            objective,
+            ratio: objective / initial.objective,
+            gradient_norm: euclidean(&gradient),
+            step_norm: euclidean(&difference),
+            worst_quality: analysis.quality.worst,
+            min_thickness_m: thickness.map(|t| t.0),
+            max_thickness_m: thickness.map(|t| t.1),
+            linear_iterations: analysis.linear_iterations,
+            seconds: 0.0,
+            step_to_inversion: analysis.inversion.element.map(|_| analysis.inversion.step),
+            inversion_element: analysis.inversion.element.map(ElementId::index),
+            inversion_region: analysis.inversion.element.map(region),
+            round: shape.motion().round(),
+            constraints: BTreeMap::new(),
+        };
+        let constraint = |measured: &Measured| {
+            (measured.value, measured.gradient.clone().expect("a gradient was asked for"))
+        };
+        Record {
+            row,
+            improved: false,
+            design: p.to_vec(),
+            gradient,
+            constraints: analysis.constraints.iter().map(constraint).collect(),
+            reference: reference_hash(shape.motion().reference()),
+            methods: self.cache.methods(),
+            worst_residual: analysis.worst_residual,
+            timings: analysis.timings,
+        }
+    }
+}
+
+fn euclidean(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
