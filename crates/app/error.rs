@@ -7,8 +7,9 @@ use fluxmorph_geometry::parallel::RankError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
-use crate::cli::{ExitCode, InitError};
+
 use crate::config::ConfigError;
+use crate::exit_code::ExitCode;
 use crate::journal::Mismatch;
 use crate::output::{DesignFileError, OutputError};
 use crate::sweep::SweepError;
@@ -29,9 +30,22 @@ pub enum Error {
     /// A file cannot be written or read.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A starting configuration cannot be written.
-    #[error(transparent)]
-    Init(#[from] InitError),
+    /// A file stands in its place.
+    #[error("`{}` exists, and nothing was written; choose another NAME or folder, or replace it with --force", path.display())]
+    FileExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The name cannot be that of a file or cannot stand in a configuration.
+    #[error(
+        "`{}` cannot be the name of a configuration: expected the name of a file in UTF-8 without quotes, backslashes and \
+         control characters, such as plate or devices/plate.toml",
+        name.display()
+    )]
+    ConfigurationName {
+        /// What was given.
+        name: PathBuf,
+    },
     /// A sweep cannot be begun.
     #[error(transparent)]
     Sweep(#[from] SweepError),
@@ -105,7 +119,7 @@ impl Error {
             | Self::Design(DesignFileError::Read { .. })
             | Self::Output(_)
             | Self::Pieces { .. }
-            | Self::Init(InitError::Exists { .. }) => ExitCode::Files,
+            | Self::FileExists { .. } => ExitCode::Files,
             Self::Certificate { .. } => ExitCode::Numerical,
             Self::OtherRun { .. }
             | Self::NotResumable { .. }
@@ -113,7 +127,7 @@ impl Error {
             | Self::Config(_)
             | Self::Design(_) => ExitCode::Configuration,
             Self::Sweep(error) => error.exit_code(),
-            Self::Threads { .. } | Self::Ranks { .. } | Self::Init(_) => ExitCode::Usage,
+            Self::Threads { .. } | Self::Ranks { .. } | Self::ConfigurationName { .. } => ExitCode::Usage,
         }
     }
 }

@@ -7,10 +7,12 @@ pub mod cli;
 pub mod config;
 pub mod diagnostics;
 mod error;
+mod exit_code;
 mod exports;
 pub mod fields;
 pub mod fresh_mesh;
 pub mod journal;
+mod launcher;
 mod memory_limit;
 pub mod morph;
 pub mod observer;
@@ -22,3 +24,4 @@ pub mod setup;
 pub mod sweep;
 
 pub use error::Error;
+pub use exit_code::ExitCode;

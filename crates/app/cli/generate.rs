@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::{Command, CommandFactory};
 
 use super::args::{Cli, GenerateArgs, Generated};
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::stdout;
 use crate::error::Error;
 use crate::output::{OutputError, system_disk, write_whole};

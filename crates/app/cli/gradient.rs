@@ -1,7 +1,7 @@
 //! `fluxmorph gradient`.
 
 use super::args::GradientArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::config::FactorReuse;

@@ -6,32 +6,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::args::InitArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::template::Template;
 use crate::error::Error;
 use crate::output::{OutputError, shell_word, system_disk, write_whole};
-
-/// Why a starting configuration is not written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum InitError {
-    /// A file stands in its place.
-    #[error("`{}` exists, and nothing was written; choose another NAME or folder, or replace it with --force", path.display())]
-    Exists {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The name cannot be that of a file or cannot stand in a configuration.
-    #[error(
-        "`{}` cannot be the name of a configuration: expected the name of a file in UTF-8 without quotes, backslashes and \
-         control characters, such as plate or devices/plate.toml",
-        name.display()
-    )]
-    Name {
-        /// What was given.
-        name: PathBuf,
-    },
-}
 
 /// Do what the command line says.
 ///
@@ -50,7 +28,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
         .collect();
     let taken = |(path, _): &&(PathBuf, Vec<u8>)| path.symlink_metadata().is_ok();
     if let Some((path, _)) = files.iter().find(taken).filter(|_| !args.force) {
-        return Err(InitError::Exists { path: path.clone() }.into());
+        return Err(Error::FileExists { path: path.clone() });
     }
     let disk = system_disk();
     if !place.folder.as_os_str().is_empty() {
@@ -77,13 +55,13 @@ struct Place {
 }
 
 impl Place {
-    fn of(args: &InitArgs) -> Result<Self, InitError> {
+    fn of(args: &InitArgs) -> Result<Self, Error> {
         let Some(given) = &args.name else {
             let template = args.template.unwrap_or(Template::Shield);
             let folder = args.out.clone().unwrap_or_default();
             return Ok(Self { folder, name: template.name().to_owned(), template });
         };
-        let wrong = || InitError::Name { name: given.clone() };
+        let wrong = || Error::ConfigurationName { name: given.clone() };
         let text = given.to_str().ok_or_else(wrong)?;
         let file = given.file_name().and_then(|name| name.to_str()).ok_or_else(wrong)?;
         let name = file.strip_suffix(".toml").unwrap_or(file);
@@ -153,7 +131,7 @@ mod tests {
     fn names_that_are_none_are_refused() {
         for name in ["", ".toml", "..", "/", "folder/", "a\nb", "a\"b", "a\\b"] {
             assert!(
-                matches!(Place::of(&args(Some(name), None, None)), Err(InitError::Name { .. })),
+                matches!(Place::of(&args(Some(name), None, None)), Err(Error::ConfigurationName { .. })),
                 "{name:?}"
             );
         }

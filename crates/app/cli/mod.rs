@@ -8,7 +8,6 @@ mod generate;
 mod gradient;
 mod init;
 mod interrupt;
-pub(crate) mod launcher;
 mod morph;
 mod panic;
 #[cfg(feature = "petsc")]
@@ -25,12 +24,11 @@ use std::io::Write;
 
 use clap::Parser;
 
-pub use exit::ExitCode;
-pub use init::InitError;
-
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
+use crate::launcher;
 use crate::observer::{Bar, Console, Quiet, RunObserver};
 use crate::output::DesignFileError;
 use args::{Cli, Command, Progress, WorkArgs};

@@ -1,7 +1,7 @@
 //! `fluxmorph morph`.
 
 use super::args::MorphArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::morph::{self, Parameters};

@@ -9,7 +9,7 @@ use std::io::Write;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use crate::observer::take_down;
 
 /// Does the work; a panic is told once, and ends as a numerical failure.

@@ -13,7 +13,7 @@ use fluxmorph_geometry::parallel::{
 };
 use fluxmorph_petsc::petsc::{Petsc, Settings, Shape, Solver};
 
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 
 /// Relative residual beyond which there is no solution to speak of; what is enough is for who asked to judge.
 const LOST: f64 = 1e-3;

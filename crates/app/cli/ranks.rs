@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;

@@ -1,7 +1,7 @@
 //! `fluxmorph report`: one HTML page from a run directory.
 
 use super::args::ReportArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::memory_limit;

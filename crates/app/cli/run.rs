@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::args::{ResumeArgs, RunArgs};
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::interrupt::{self, Signal};
 use super::ranks::Ranks;
 use super::{observer, stdout, with_threads};

@@ -1,7 +1,7 @@
 //! `fluxmorph solve`.
 
 use super::args::SolveArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;

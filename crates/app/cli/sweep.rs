@@ -4,7 +4,7 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use super::args::SweepArgs;
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::{interrupt, stdout};
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};

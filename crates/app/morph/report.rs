@@ -7,7 +7,7 @@ use fluxmorph_geometry::tet4::{Point, centroid};
 use serde::Serialize;
 
 use super::{TuneReport, Walk};
-use crate::cli::ExitCode;
+use crate::exit_code::ExitCode;
 use crate::config::Paper;
 use crate::error::Error;
 use crate::output::RunStatus;

@@ -241,7 +241,7 @@ fn number(value: Option<f64>) -> String {
 mod tests {
     use super::super::report::verdict;
     use super::*;
-    use crate::cli::ExitCode;
+    use crate::exit_code::ExitCode;
     use crate::output::{RunStatus, StopReason, to_json};
 
     fn broken() -> CaseReport {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::MOST_COMBINATIONS;
-use crate::cli::ExitCode;
+use crate::exit_code::ExitCode;
 use crate::config::ConfigError;
 
 /// Why a sweep is not begun. Nothing has been run or replaced then.

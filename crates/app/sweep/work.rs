@@ -10,8 +10,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::{Layout, Planned, Sweep, Task};
-use crate::cli::ExitCode;
-use crate::cli::launcher;
+use crate::exit_code::ExitCode;
+use crate::launcher;
 use crate::error::Error;
 use crate::output::OutputError;
 

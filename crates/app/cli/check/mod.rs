@@ -10,7 +10,7 @@ mod text;
 use std::io::Write;
 
 use super::args::{CheckArgs, Progress};
-use super::exit::ExitCode;
+use crate::exit_code::ExitCode;
 use super::{stdout, with_threads};
 use crate::error::Error;
 use crate::observer::{Bar, Observer, Paint, Silent};

@@ -14,17 +14,17 @@ pub(crate) fn variables() -> impl Iterator<Item = &'static str> {
 }
 
 /// Whether a launcher has started this process.
-pub(super) fn is_launched() -> bool {
+pub(crate) fn is_launched() -> bool {
     RANK.iter().any(|name| var_os(name).is_some())
 }
 
 /// Number of this rank; 0 without a launcher.
-pub(super) fn rank() -> usize {
+pub(crate) fn rank() -> usize {
     number(&RANK).unwrap_or(0)
 }
 
 /// How many ranks the launcher has started; 1 without one.
-pub(super) fn size() -> usize {
+pub(crate) fn size() -> usize {
     // Slurm says how many there are also where it has no part in MPI.
     number(&SIZE).unwrap_or(1)
 }
