@@ -62,11 +62,7 @@ fn check_numbers(p: &ShieldParameters) -> Result<(), MeshError> {
     check_ascending("shield.observation_y", p.observation.y, gap)?;
     check_ascending("shield.observation_z", p.observation.z, gap)?;
     if !(1.0..=100.0).contains(&p.growth) {
-        return Err(refuse(
-            "shield.growth",
-            p.growth,
-            "a ratio between 1 and 100 is needed; 1.6 is usual",
-        ));
+        return Err(refuse("shield.growth", p.growth, "a ratio between 1 and 100 is needed; 1.6 is usual"));
     }
     let [least, most] = REFINEMENTS;
     if !(least..=most).contains(&p.refinement) {
@@ -139,11 +135,7 @@ fn check_nesting(p: &ShieldParameters) -> Result<(), MeshError> {
         ));
     }
     if p.coil_z[0] < 0.0 {
-        return Err(refuse(
-            "shield.coil_z",
-            p.coil_z,
-            "the coil must lie above the plate, that is, above 0",
-        ));
+        return Err(refuse("shield.coil_z", p.coil_z, "the coil must lie above the plate, that is, above 0"));
     }
     let beyond = |d: usize| {
         let coil = p.coil_half_window[d] + p.coil_width;

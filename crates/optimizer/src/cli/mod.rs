@@ -33,6 +33,7 @@ use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::observer::{Bar, Console, Observer, Quiet};
 use crate::output::DesignFileError;
+use crate::setup::blame;
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -92,7 +93,10 @@ fn message(error: &Error) -> String {
         Error::Config(ConfigError::Faults(report)) | Error::Design(DesignFileError::Fault(report)) => {
             diagnostics::render(report, Style::for_stderr())
         }
-        other => format!("error: {other}"),
+        other => match blame::keys_of_advice(other) {
+            Some(keys) => format!("error: {other} ({keys})"),
+            None => format!("error: {other}"),
+        },
     }
 }
 

@@ -119,7 +119,11 @@ impl Active {
     }
 
     /// Weights with `Σ_j product(i, j) λ_j + a_i` equal for all members and `Σ λ = 1`: elimination with pivoting.
-    fn balanced_weights(&self, values: &[f64], product: impl Fn(usize, usize) -> f64) -> Option<[f64; CAPACITY]> {
+    fn balanced_weights(
+        &self,
+        values: &[f64],
+        product: impl Fn(usize, usize) -> f64,
+    ) -> Option<[f64; CAPACITY]> {
         const SIZE: usize = CAPACITY + 1;
         let n = self.count;
         let mut rows = [[0.0; SIZE + 1]; SIZE];

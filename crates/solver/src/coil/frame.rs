@@ -56,7 +56,7 @@ impl Frame {
                 sub(w, normal.map(|c| along * c))
             })
             .filter(|across| norm(*across) > PARALLEL)
-            .and_then(normalised)
+            .and_then(normalise)
             .ok_or_else(|| refuse("direction", wanted, "a vector with a length across the coil's axis"))?;
         Ok(Self { centre, directions: [first, cross(normal, first), normal] })
     }
