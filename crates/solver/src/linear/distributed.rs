@@ -10,9 +10,9 @@ use fluxmorph_geometry::parallel::{
     solution_of,
 };
 
-use super::LinearSolverReport;
 use super::method::LinearSolverSettings;
 use super::range::checked_norm;
+use super::report::LinearSolverReport;
 use crate::error::{NonConvergence, SolverError};
 
 /// The command to solve with the present matrix.

@@ -18,11 +18,12 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64, norm};
 
 use super::analysis::SystemAnalysis;
 use super::cache::{CachedPreconditioner, LinearSolverCache};
+use super::cocg;
 use super::cost::Ledger;
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 use super::range::checked_norm;
-use super::{LinearSolverReport, cocg};
+use super::report::LinearSolverReport;
 use crate::error::{NonConvergence, SolverError};
 
 /// Iterations after which the speed of an iteration can be judged.
