@@ -31,6 +31,7 @@ use crate::exit_code::ExitCode;
 use crate::launcher;
 use crate::observer::{Bar, Console, Quiet, RunObserver};
 use crate::output::DesignFileError;
+use crate::setup::blame;
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -90,7 +91,10 @@ fn message(error: &Error) -> String {
         Error::Config(ConfigError::Faults(report)) | Error::Design(DesignFileError::Fault(report)) => {
             diagnostics::render(report, Style::for_stderr())
         }
-        other => format!("error: {other}"),
+        other => match blame::keys_of_advice(other) {
+            Some(keys) => format!("error: {other} ({keys})"),
+            None => format!("error: {other}"),
+        },
     }
 }
 

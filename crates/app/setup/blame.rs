@@ -5,8 +5,8 @@
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_remesh::RemeshError;
-use fluxmorph_solver::SolverError;
-use fluxmorph_solver::coil::RegionFault;
+use fluxmorph_solver::coil::{PlaneFault, RegionFault};
+use fluxmorph_solver::{NonConvergence, SolverError};
 
 use super::functional;
 use super::mesh::surface_names;
@@ -33,6 +33,39 @@ pub(crate) fn placed(error: Error, config: &Config, source: &Source) -> Error {
     match fault {
         Some(fault) => source.error(vec![fault]).into(),
         None => error,
+    }
+}
+
+/// The keys that the advice of an error is about, of those that no single value is to blame for.
+pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
+    let solver = match error {
+        Error::Solver(error) => error,
+        Error::Field { cause, .. } => cause,
+        Error::Remesh(RemeshError::NotFinite { .. }) => return Some("remesh.stiffness"),
+        _ => return None,
+    };
+    match solver {
+        SolverError::NotConverged { cause: NonConvergence::IllConditioned, .. } => {
+            Some("analysis.linear_solver.factor_gib")
+        }
+        SolverError::NotConverged { cause: NonConvergence::OnRanks, .. } => {
+            Some("analysis.petsc.solver = \"mumps\", analysis.petsc.overlap, analysis.petsc.sub_solver")
+        }
+        _ => None,
+    }
+}
+
+/// What to change in a configuration where a coil meets a surface as it may not; `None` where the error says it all.
+fn plane_advice(fault: &PlaneFault) -> Option<&'static str> {
+    match fault {
+        PlaneFault::Crossing { .. } | PlaneFault::TangentialSource => {
+            Some("name the surface in boundaries.flux_parallel, or move the coil away")
+        }
+        PlaneFault::EndsAtTerminal => Some(
+            "name the surface in boundaries.flux_parallel, or let the coil close on itself with center and axis instead of \
+             terminals",
+        ),
+        _ => None,
     }
 }
 
@@ -127,8 +160,11 @@ impl Blame<'_> {
             }
             SolverError::Conflict { .. } => self.at("boundaries.uniform_field", error),
             SolverError::NoSource { coil, .. } => self.at(&self.coil_place(coil)?, error),
-            SolverError::SourceOnBoundary { coil, surface, .. } => {
-                let fault = self.at(&self.coil_place(coil)?, error)?;
+            SolverError::SourceOnBoundary { coil, surface, reason, .. } => {
+                let mut fault = self.at(&self.coil_place(coil)?, error)?;
+                if let Some(advice) = plane_advice(reason) {
+                    fault.help = Some(advice.to_owned());
+                }
                 Some(match self.surface("boundaries", surface) {
                     Some(surface) => fault.other(self.source.place(&surface), "the surface is named here"),
                     None => fault,
@@ -214,5 +250,21 @@ impl Blame<'_> {
     fn constraint(&self, name: &str, error: &OptimizerError) -> Option<Fault> {
         let index = self.config.constraints.iter().position(|constraint| constraint.name == name)?;
         self.at(&format!("constraints[{index}].upper_ratio"), error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advice_of_a_linear_solver_names_the_keys_to_change() {
+        let failed = |cause| {
+            Error::Solver(SolverError::NotConverged { residual: 1e-3, required: 1e-9, iterations: 9, cause })
+        };
+        let keys = |cause| keys_of_advice(&failed(cause)).unwrap_or_default();
+        assert_eq!(keys(NonConvergence::IllConditioned), "analysis.linear_solver.factor_gib");
+        assert!(keys(NonConvergence::OnRanks).starts_with("analysis.petsc.solver"));
+        assert_eq!(keys(NonConvergence::Breakdown), "");
     }
 }

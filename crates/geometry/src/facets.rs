@@ -27,39 +27,7 @@ pub(crate) fn find_facets(
     tets: &[[NodeId; 4]],
     region_of: &[RegionId],
 ) -> Result<Vec<Facet>, MeshError> {
-    let sorted = |tet: &[NodeId; 4], face: [usize; 3]| {
-        let [mut a, mut b, mut c] = face.map(|v| tet[v]);
-        if a > b {
-            (a, b) = (b, a);
-        }
-        if b > c {
-            (b, c) = (c, b);
-        }
-        if a > b {
-            (a, b) = (b, a);
-        }
-        [a, b, c]
-    };
-    let mut starts = vec![0u32; node_count + 1];
-    for tet in tets {
-        for face in FACES {
-            starts[sorted(tet, face)[0].index() + 1] += 1;
-        }
-    }
-    for i in 0..node_count {
-        starts[i + 1] += starts[i];
-    }
-    let mut cursor = starts.clone();
-    let mut faces = vec![Face { others: [NodeId(0); 2], code: 0 }; 4 * tets.len()];
-    for (e, tet) in tets.iter().enumerate() {
-        for (f, face) in FACES.into_iter().enumerate() {
-            let [a, b, c] = sorted(tet, face);
-            let slot = &mut cursor[a.index()];
-            faces[*slot as usize] = Face { others: [b, c], code: (4 * e + f) as u32 };
-            *slot += 1;
-        }
-    }
-    drop(cursor);
+    let (starts, mut faces) = sort_into_buckets(node_count, tets);
     let mut buckets: Vec<&mut [Face]> = Vec::with_capacity(node_count);
     let mut rest = faces.as_mut_slice();
     for pair in starts.windows(2) {
@@ -83,6 +51,46 @@ pub(crate) fn find_facets(
     }
     facets.sort_unstable_by_key(|&(code, _)| code);
     Ok(facets.into_iter().map(|(_, facet)| facet).collect())
+}
+
+/// The faces of all elements by their smallest nodes: where the bucket of each node starts, and the faces.
+fn sort_into_buckets(node_count: usize, tets: &[[NodeId; 4]]) -> (Vec<u32>, Vec<Face>) {
+    let mut starts = vec![0u32; node_count + 1];
+    for tet in tets {
+        for face in FACES {
+            starts[sorted_nodes(tet, face)[0].index() + 1] += 1;
+        }
+    }
+    for i in 0..node_count {
+        starts[i + 1] += starts[i];
+    }
+    let mut cursor = starts.clone();
+    let mut faces = vec![Face { others: [NodeId(0); 2], code: 0 }; 4 * tets.len()];
+    for (e, tet) in tets.iter().enumerate() {
+        for (f, face) in FACES.into_iter().enumerate() {
+            let [a, b, c] = sorted_nodes(tet, face);
+            let slot = &mut cursor[a.index()];
+            faces[*slot as usize] = Face { others: [b, c], code: (4 * e + f) as u32 };
+            *slot += 1;
+        }
+    }
+    (starts, faces)
+}
+
+/// The nodes of a face, ascending.
+#[inline]
+fn sorted_nodes(tet: &[NodeId; 4], face: [usize; 3]) -> [NodeId; 3] {
+    let [mut a, mut b, mut c] = face.map(|v| tet[v]);
+    if a > b {
+        (a, b) = (b, a);
+    }
+    if b > c {
+        (b, c) = (c, b);
+    }
+    if a > b {
+        (a, b) = (b, a);
+    }
+    [a, b, c]
 }
 
 /// The facets in the sorted bucket of a node, each with its code.

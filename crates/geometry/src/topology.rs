@@ -281,19 +281,7 @@ impl Topology {
     /// [`MeshError::OverfullFace`] cannot occur on a valid topology; it is passed through.
     pub fn without_region(&self, region: RegionId) -> Result<Remainder, MeshError> {
         let keep: Vec<ElementId> = self.elements().filter(|e| self.region_of[e.index()] != region).collect();
-        let mut new_of: Vec<Option<NodeId>> = vec![None; self.node_count];
-        for &e in &keep {
-            for n in self.tet(e) {
-                new_of[n.index()] = Some(NodeId(0));
-            }
-        }
-        let mut old_of = Vec::new();
-        for node in self.nodes() {
-            if new_of[node.index()].is_some() {
-                new_of[node.index()] = Some(NodeId::new(old_of.len()));
-                old_of.push(node);
-            }
-        }
+        let (new_of, old_of) = self.renumber_nodes_of(&keep);
         let mut new_element: Vec<Option<ElementId>> = vec![None; self.tets.len()];
         for (i, e) in keep.iter().enumerate() {
             new_element[e.index()] = Some(ElementId::new(i));
@@ -342,6 +330,24 @@ impl Topology {
             })
             .collect();
         Ok(Remainder { topology, old_of, exposed })
+    }
+
+    /// The nodes of some elements numbered anew, in their order: the new number of every old one, and the reverse.
+    fn renumber_nodes_of(&self, elements: &[ElementId]) -> (Vec<Option<NodeId>>, Vec<NodeId>) {
+        let mut new_of: Vec<Option<NodeId>> = vec![None; self.node_count];
+        for &e in elements {
+            for n in self.tet(e) {
+                new_of[n.index()] = Some(NodeId(0));
+            }
+        }
+        let mut old_of = Vec::new();
+        for node in self.nodes() {
+            if new_of[node.index()].is_some() {
+                new_of[node.index()] = Some(NodeId::new(old_of.len()));
+                old_of.push(node);
+            }
+        }
+        (new_of, old_of)
     }
 }
 

@@ -143,7 +143,7 @@ pub enum RemeshError {
     /// The elastic system gives something that is no number.
     #[error(
         "the elastic system gives a {what} of {value}: the displacements, or the stiffnesses of the remesh region, span \
-         more than numbers hold; check units, bounds and remesh.stiffness"
+         more than numbers hold; check units, bounds and the stiffness policy"
     )]
     NotFinite {
         /// What was solved for.

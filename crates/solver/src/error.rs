@@ -39,9 +39,8 @@ pub enum SolverError {
     },
     /// An applied field and another condition contradict each other.
     #[error(
-        "at ({:.3}, {:.3}, {:.3}) mm the applied field of boundaries.uniform_field contradicts another condition: a \
-         flux-parallel plane must be parallel to the field and hold the field's center, a flux-normal one at right angles \
-         to it",
+        "at ({:.3}, {:.3}, {:.3}) mm the applied field contradicts another condition: a flux-parallel plane must be parallel \
+         to the field and hold the field's center, a flux-normal one at right angles to it",
         place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
     )]
     Conflict {
@@ -100,7 +99,7 @@ pub enum SolverError {
         /// Iterations done.
         iterations: usize,
         /// What it looks like.
-        cause: &'static str,
+        cause: NonConvergence,
     },
     /// A field or objective that is not a finite number.
     #[error("the {what} is {value}: the field problem has no usable solution")]
@@ -133,4 +132,24 @@ pub enum SolverError {
         /// Upper corner [m].
         upper: [f64; 3],
     },
+}
+
+/// What a linear system that is not solved looks like, and what may help.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NonConvergence {
+    /// The residual stays, with the most robust method that there is memory for.
+    #[error(
+        "the mesh may hold nearly flat elements, or the material data span too many orders of magnitude; more memory for a \
+         factor may help"
+    )]
+    IllConditioned,
+    /// Something on the way is not finite.
+    #[error("the iteration broke down; a coefficient or coordinate is not finite")]
+    Breakdown,
+    /// The residual stays, on several ranks.
+    #[error(
+        "more memory or ranks for a direct factor, a larger overlap of the subdomains or complete factors on them may help"
+    )]
+    OnRanks,
 }

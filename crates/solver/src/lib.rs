@@ -32,7 +32,7 @@ pub mod unknowns;
 mod weak_form;
 
 pub use boundary::{Boundary, UniformField};
-pub use error::SolverError;
+pub use error::{NonConvergence, SolverError};
 pub use functional::{Functional, FunctionalValue};
 pub use linear::{LinearSolver, LinearSolverReport};
 pub use material::Material;

@@ -22,7 +22,7 @@ pub enum PlaneFault {
     /// Current crosses a surface with H × n = 0.
     #[error(
         "the current crosses it at {angle:.1}° to its normal, but no current may cross a surface at which H is normal: \
-         the mirrored coil would carry it back; name the surface in boundaries.flux_parallel, or move the coil away"
+         the mirrored coil would carry it back; make the surface flux-parallel, or move the coil away"
     )]
     Crossing {
         /// Between current and normal, 0 to 90 [degrees].
@@ -31,19 +31,19 @@ pub enum PlaneFault {
     /// `T` has a tangential part on a surface on which H is prescribed.
     #[error(
         "H is prescribed there and not B, and the source T of the coil or of its window has a tangential part, which \
-         would act as a surface current; name the face in boundaries.flux_parallel, or move the coil away"
+         would act as a surface current; make the face flux-parallel, or move the coil away"
     )]
     TangentialSource,
     /// Current on a surface on which A is prescribed.
     #[error(
-        "the field of a uniform_field surface is given and holds no coil's current; move the coil inside, away from the \
+        "the field on a surface with an applied field is given and holds no coil's current; move the coil inside, away from the \
          surface"
     )]
     OnPrescribedField,
     /// A terminal that no mirrored coil goes on from.
     #[error(
-        "this terminal does not lie on a flux-parallel outer surface, so the current would end there; name the surface \
-         in boundaries.flux_parallel, or let the coil close on itself with center and axis instead of terminals"
+        "this terminal does not lie on a flux-parallel outer surface, so the current would end there; make that surface \
+         flux-parallel, or let the coil close on itself around an axis"
     )]
     EndsAtTerminal,
 }
@@ -112,7 +112,7 @@ pub enum RegionFault {
     /// Nothing goes round.
     #[error(
         "no closed way in it goes round the line given by center and axis; give a line through the hole of the ring, \
-         or terminals = [..] where the ring is cut by symmetry planes"
+         or two terminals where the ring is cut by symmetry planes"
     )]
     NoRing,
 }

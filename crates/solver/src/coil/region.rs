@@ -106,7 +106,7 @@ impl RegionCurrent {
                     return Err(refuse(RegionFault::SeveralRings { parts: patch.parts }));
                 }
                 let turning = angle_gradient(&patch, frame).map_err(refuse)?;
-                closed(&patch, frame, &turning)?.ok_or_else(|| refuse(RegionFault::NoRing))
+                ring_current(&patch, frame, &turning)?.ok_or_else(|| refuse(RegionFault::NoRing))
             }
         }
     }
@@ -144,11 +144,15 @@ fn between(
     let phi = problem.solve(&vec![[0.0; 3]; patch.elements.len()], &lift);
     let conduction: Vec<Point> = patch.gradient(&phi).into_iter().map(|g| g.map(|c| -c)).collect();
     let sections = Section::LevelsOf(&phi);
-    Ok(stranded(patch, &problem, &conduction, &conduction, terminals, sections))
+    Ok(stranded_current(patch, &problem, &conduction, &conduction, terminals, sections))
 }
 
 /// The current of a ring, `turning` = ∇θ; `None` if nothing goes round.
-fn closed(patch: &Patch, frame: &Frame, turning: &[Point]) -> Result<Option<RegionCurrent>, SolverError> {
+fn ring_current(
+    patch: &Patch,
+    frame: &Frame,
+    turning: &[Point],
+) -> Result<Option<RegionCurrent>, SolverError> {
     let mut given = vec![false; patch.points.len()];
     given[0] = true;
     let problem = Potential::new(patch, &given)?;
@@ -159,11 +163,11 @@ fn closed(patch: &Patch, frame: &Frame, turning: &[Point]) -> Result<Option<Regi
     }
     let guide: Vec<Point> = turning.iter().map(|t| t.map(|c| c / TAU)).collect();
     let sections = Section::HalfPlanesOf(frame);
-    Ok(Some(stranded(patch, &problem, &conduction, &guide, Vec::new(), sections)))
+    Ok(Some(stranded_current(patch, &problem, &conduction, &guide, Vec::new(), sections)))
 }
 
 /// Steps 2 to 4: `∫J·guide = 1` on every part.
-fn stranded(
+fn stranded_current(
     patch: &Patch,
     problem: &Potential<'_>,
     conduction: &[Point],

@@ -5,14 +5,26 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{IncompleteAnalysis, LdltAnalysis, ordering};
+use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, c64, ordering};
 
-use super::SystemPattern;
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
 use super::two_level::{self, TwoLevelAnalysis};
 use crate::error::SolverError;
 use crate::space::Order;
+
+/// What a system is analysed by.
+pub(crate) struct SystemPattern<'a> {
+    /// The pattern.
+    pub(crate) structure: &'a Arc<CsrStructure>,
+    /// Makes the matrix on the reference mesh: strong couplings are taken from it, once.
+    pub(crate) reference: &'a dyn Fn() -> CsrMatrix<c64>,
+    /// Makes the prolongation from a coarse level, for that matrix.
+    pub(crate) prolongation: &'a Prolong<'a>,
+}
+
+/// From a matrix to the prolongation onto its unknowns.
+pub(crate) type Prolong<'a> = dyn Fn(&CsrMatrix<c64>) -> Result<CsrMatrix<f64>, SolverError> + 'a;
 
 /// Orderings and symbolic factors of one pattern, and the method for it.
 #[derive(Debug)]

@@ -123,7 +123,7 @@ pub(crate) fn typical_iterations(method: Method, field: FieldKind, order: Order,
     }
 }
 
-/// The book of a factor that serves several designs.
+/// The ledger of a factor that serves several designs.
 ///
 /// Each further design costs more iterations than a factor of its own would. The factor is replaced when the next
 /// design's excess would be above the mean cost of the designs it has served, factorisation included: the rule that

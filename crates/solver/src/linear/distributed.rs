@@ -10,10 +10,10 @@ use fluxmorph_geometry::parallel::{
     solution_of,
 };
 
-use super::LinearSolverReport;
 use super::method::LinearSolverSettings;
 use super::range::checked_norm;
-use crate::error::SolverError;
+use super::report::LinearSolverReport;
+use crate::error::{NonConvergence, SolverError};
 
 /// The command to solve with the present matrix.
 pub(crate) const SOLVE: u32 = 1;
@@ -41,7 +41,7 @@ pub enum DistributedMethod {
 }
 
 impl DistributedMethod {
-    /// The word for it in results.
+    /// Its name in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "petsc mumps",
@@ -125,9 +125,7 @@ impl DistributedSystem {
         let answer = self.channel.execute(SOLVE, numbers_of(right_side).collect())?;
         let (x, Solved { iterations, residual }) = solution_of(&answer);
         if residual.is_nan() || residual > self.required {
-            let cause = "more memory or ranks for a factor (analysis.petsc.solver = \"mumps\"), a larger \
-                         analysis.petsc.overlap or complete sub-solves may help";
-            let required = self.required;
+            let (required, cause) = (self.required, NonConvergence::OnRanks);
             return Err(SolverError::NotConverged { residual, required, iterations, cause });
         }
         Ok((x, LinearSolverReport { iterations, residual }))

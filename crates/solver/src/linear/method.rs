@@ -34,7 +34,7 @@ impl Method {
         Self::TwoLevel,
     ];
 
-    /// The name in a configuration.
+    /// Its name in messages and records.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",

@@ -18,42 +18,17 @@ mod method;
 mod preconditioner;
 mod prepared;
 mod range;
+mod report;
 mod system;
 pub(crate) mod transfer;
 mod two_level;
 
-use std::sync::Arc;
-
-use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{CsrMatrix, c64};
-
-use crate::error::SolverError;
+pub(crate) use analysis::SystemPattern;
 pub use analysis::{SystemAnalysis, TWO_LEVELS_FROM};
 pub use cache::LinearSolverCache;
 pub use distributed::{DistributedMethod, DistributedSettings, DistributedSystem};
 pub(crate) use method::FieldKind;
 pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};
 pub use prepared::PreparedSystem;
+pub use report::LinearSolverReport;
 pub use system::{LocalSystem, SolverEvent};
-
-/// What a system is analysed by.
-pub(crate) struct SystemPattern<'a> {
-    /// The pattern.
-    pub(crate) structure: &'a Arc<CsrStructure>,
-    /// Makes the matrix on the reference mesh: strong couplings are taken from it, once.
-    pub(crate) reference: &'a dyn Fn() -> CsrMatrix<c64>,
-    /// Makes the prolongation from a coarse level, for that matrix.
-    pub(crate) prolongation: &'a Prolong<'a>,
-}
-
-/// From a matrix to the prolongation onto its unknowns.
-pub(crate) type Prolong<'a> = dyn Fn(&CsrMatrix<c64>) -> Result<CsrMatrix<f64>, SolverError> + 'a;
-
-/// How a solution was reached.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinearSolverReport {
-    /// Iterations done.
-    pub iterations: usize,
-    /// True relative residual `|b − K x| / |b|`.
-    pub residual: f64,
-}

@@ -2,10 +2,10 @@
 
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
-use super::LinearSolverReport;
 use super::cache::LinearSolverCache;
 use super::distributed::DistributedSystem;
 use super::method::Method;
+use super::report::LinearSolverReport;
 use super::system::{LocalSystem, SolverEvent};
 use crate::error::SolverError;
 

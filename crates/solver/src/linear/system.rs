@@ -18,12 +18,13 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64, norm};
 
 use super::analysis::SystemAnalysis;
 use super::cache::{CachedPreconditioner, LinearSolverCache};
+use super::cocg;
 use super::cost::Ledger;
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 use super::range::checked_norm;
-use super::{LinearSolverReport, cocg};
-use crate::error::SolverError;
+use super::report::LinearSolverReport;
+use crate::error::{NonConvergence, SolverError};
 
 /// Iterations after which the speed of an iteration can be judged.
 const TRIAL: usize = 3;
@@ -296,12 +297,8 @@ impl LocalSystem {
         let settings = &self.analysis.settings;
         let from = self.method();
         let Some(to) = next(&self.analysis, from) else {
-            let cause = if residual.is_finite() {
-                "the mesh may hold nearly flat elements, or the material data span too many orders of magnitude; more \
-                 memory for a factor may help (analysis.linear_solver.factor_gib)"
-            } else {
-                "the iteration broke down; a coefficient or coordinate is not finite"
-            };
+            let cause =
+                if residual.is_finite() { NonConvergence::IllConditioned } else { NonConvergence::Breakdown };
             let required = settings.required;
             return Err(SolverError::NotConverged { residual, required, iterations, cause });
         };

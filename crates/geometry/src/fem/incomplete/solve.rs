@@ -27,50 +27,16 @@ impl<T: Number> Incomplete<T> {
     fn solve_gathered(&self, y: &mut [T], value: impl Fn(usize) -> T + Sync) {
         let analysis = &*self.analysis;
         let (interior, border) = y.split_at_mut(analysis.interior());
-        let forward = |rows: &Range<usize>, y: &mut [T], interior: &[T]| {
-            for i in rows.clone() {
-                let own = i - rows.start;
-                let mut sum = value(analysis.order[i] as usize) * self.scales[i];
-                let range = self.analysis.entries(&(i..i + 1));
-                let split = match i.checked_sub(analysis.interior()) {
-                    None => range.start,
-                    Some(s) => analysis.splits[s][1] as usize,
-                };
-                for k in range.start..split {
-                    sum -= self.lower[k] * interior[analysis.columns[k] as usize];
-                }
-                for k in split..range.end {
-                    sum -= self.lower[k] * y[analysis.columns[k] as usize - rows.start];
-                }
-                y[own] = sum;
-            }
-        };
-        // y ← D⁻¹ y and y ← L⁻ᵀ y within one part.
-        let backward = |rows: &Range<usize>, y: &mut [T]| {
-            for i in rows.clone().rev() {
-                let own = i - rows.start;
-                let x = y[own];
-                let range = self.analysis.entries(&(i..i + 1));
-                let split = match i.checked_sub(analysis.interior()) {
-                    None => range.start,
-                    Some(s) => analysis.splits[s][1] as usize,
-                };
-                for k in split..range.end {
-                    y[analysis.columns[k] as usize - rows.start] -= self.lower[k] * x;
-                }
-            }
-        };
         let slabs = pieces(&analysis.slabs, interior);
-        slabs.into_par_iter().for_each(|(_, rows, y)| forward(rows, y, &[]));
+        slabs.into_par_iter().for_each(|(_, rows, y)| self.forward(rows, y, &[], &value));
         let separators = pieces(&analysis.separators, border);
         separators.into_par_iter().for_each(|(_, rows, y)| {
-            forward(rows, y, interior);
-            y.iter_mut().zip(&self.inverse_pivots[rows.clone()]).for_each(|(y, &d)| *y = *y * d);
-            backward(rows, y);
+            self.forward(rows, y, interior, &value);
+            self.backward(rows, y);
         });
         let slabs = pieces(&analysis.slabs, interior);
         slabs.into_par_iter().for_each(|(s, rows, y)| {
-            y.iter_mut().zip(&self.inverse_pivots[rows.clone()]).for_each(|(y, &d)| *y = *y * d);
+            self.divide_by_pivots(rows, y);
             // The separator before the slab has it as its second one, the separator behind as its first.
             for t in [s.checked_sub(1), Some(s)].into_iter().flatten() {
                 for i in analysis.separators.get(t).cloned().unwrap_or_default() {
@@ -82,8 +48,62 @@ impl<T: Number> Incomplete<T> {
                     }
                 }
             }
-            backward(rows, y);
+            self.substitute_backward(rows, y);
         });
+    }
+
+    /// `y ← L⁻¹ S b` within one part, where the rows before it are solved in `interior`.
+    fn forward(
+        &self,
+        rows: &Range<usize>,
+        y: &mut [T],
+        interior: &[T],
+        value: &(impl Fn(usize) -> T + Sync),
+    ) {
+        let analysis = &*self.analysis;
+        for i in rows.clone() {
+            let mut sum = value(analysis.order[i] as usize) * self.scales[i];
+            let (before, within) = self.entries_of(i);
+            for k in before {
+                sum -= self.lower[k] * interior[analysis.columns[k] as usize];
+            }
+            for k in within {
+                sum -= self.lower[k] * y[analysis.columns[k] as usize - rows.start];
+            }
+            y[i - rows.start] = sum;
+        }
+    }
+
+    /// `y ← L⁻ᵀ D⁻¹ y` within one part.
+    fn backward(&self, rows: &Range<usize>, y: &mut [T]) {
+        self.divide_by_pivots(rows, y);
+        self.substitute_backward(rows, y);
+    }
+
+    /// `y ← D⁻¹ y` within one part.
+    fn divide_by_pivots(&self, rows: &Range<usize>, y: &mut [T]) {
+        y.iter_mut().zip(&self.inverse_pivots[rows.clone()]).for_each(|(y, &d)| *y = *y * d);
+    }
+
+    /// `y ← L⁻ᵀ y` within one part.
+    fn substitute_backward(&self, rows: &Range<usize>, y: &mut [T]) {
+        for i in rows.clone().rev() {
+            let x = y[i - rows.start];
+            for k in self.entries_of(i).1 {
+                y[self.analysis.columns[k] as usize - rows.start] -= self.lower[k] * x;
+            }
+        }
+    }
+
+    /// Entries of a row in the columns of other parts, and in those of its own.
+    #[inline]
+    fn entries_of(&self, i: usize) -> (Range<usize>, Range<usize>) {
+        let range = self.analysis.entries(&(i..i + 1));
+        let split = match i.checked_sub(self.analysis.interior()) {
+            None => range.start,
+            Some(s) => self.analysis.splits[s][1] as usize,
+        };
+        (range.start..split, split..range.end)
     }
 
     /// Writes a solution in the order of elimination to that of the matrix.

@@ -10,7 +10,7 @@ use pulp::{Simd, WithSimd};
 
 use super::lanes::add_columns;
 use super::multiply::{Packing, Shape, Store, multiply};
-use super::scalar::FactorScalar;
+use super::scalar::PanelScalar;
 
 /// Columns up to which a triangle is worked on column by column.
 const SMALL_TRIANGLE: usize = 16;
@@ -34,7 +34,7 @@ pub(super) fn column_mut<'a, T>(block: &'a mut MatMut<'_, T>, j: usize) -> &'a m
 ///
 /// # Errors
 /// The column whose pivot is zero or not finite.
-pub(super) fn factor_diagonal<T: FactorScalar>(
+pub(super) fn factor_diagonal<T: PanelScalar>(
     mut block: MatMut<'_, T>,
     scratch: &mut Vec<T>,
     packing: &mut Packing<T>,
@@ -67,7 +67,7 @@ struct SmallFactor<'a, T> {
     block: MatMut<'a, T>,
 }
 
-impl<T: FactorScalar> WithSimd for SmallFactor<'_, T> {
+impl<T: PanelScalar> WithSimd for SmallFactor<'_, T> {
     type Output = Result<(), usize>;
 
     #[inline(always)]
@@ -88,7 +88,7 @@ impl<T: FactorScalar> WithSimd for SmallFactor<'_, T> {
 }
 
 /// `X ← X L⁻ᵀ` with the unit triangle of a factored diagonal block.
-fn divide_by_unit_triangle<T: FactorScalar>(
+fn divide_by_unit_triangle<T: PanelScalar>(
     diagonal: MatRef<'_, T>,
     rows: MatMut<'_, T>,
     packing: &mut Packing<T>,
@@ -114,7 +114,7 @@ struct SmallDivision<'a, T> {
     rows: MatMut<'a, T>,
 }
 
-impl<T: FactorScalar> WithSimd for SmallDivision<'_, T> {
+impl<T: PanelScalar> WithSimd for SmallDivision<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -142,7 +142,7 @@ impl<T: FactorScalar> WithSimd for SmallDivision<'_, T> {
 }
 
 /// `X ← X L⁻ᵀ D⁻¹`: the rows of a panel below its factored diagonal block.
-pub(super) fn divide_by_diagonal_block<T: FactorScalar>(
+pub(super) fn divide_by_diagonal_block<T: PanelScalar>(
     diagonal: MatRef<'_, T>,
     inverse_pivots: &[T],
     mut rows: MatMut<'_, T>,

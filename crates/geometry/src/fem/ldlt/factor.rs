@@ -14,13 +14,16 @@ use super::analysis::LdltAnalysis;
 use super::dense;
 use super::multiply::{Packing, Shape, Store, multiply};
 use super::panels::Update;
-use super::scalar::{Entry, FactorScalar};
+use super::scalar::PanelScalar;
 use super::schedule::{Branch, Task};
 use crate::error::MeshError;
 
 /// Rows of a tile. Every tile reads the columns' rows of an update again, each from another page of memory: tiles of half the
 /// size cost up to a fifth of the time, larger ones leave too few of them to work on at the same time.
 const TILE_ROWS: usize = 512;
+
+/// The values of a matrix: `entry(row, k)` is the stored entry `k` of the structure, which lies in `row`.
+pub type Entry<'a, T> = dyn Fn(usize, usize) -> T + Sync + 'a;
 
 /// A numeric factor `P A Pᵀ = L D Lᵀ`.
 #[derive(Debug)]
@@ -32,19 +35,7 @@ pub struct Ldlt<T> {
     pub(super) inverse_pivots: Vec<T>,
 }
 
-impl<T: FactorScalar> Ldlt<T> {
-    /// Factors a matrix whose pattern was analysed. `entry(row, k)` is the value of the stored entry `k` of the structure,
-    /// which lies in `row`; it is called once or twice for every entry, from any thread.
-    ///
-    /// # Errors
-    /// [`MeshError::Factorisation`] when a pivot is zero or not finite, or the factor does not fit the memory.
-    pub fn new(
-        analysis: &Arc<LdltAnalysis>,
-        entry: impl Fn(usize, usize) -> T + Sync,
-    ) -> Result<Self, MeshError> {
-        T::factored(analysis, &entry)
-    }
-
+impl<T> Ldlt<T> {
     /// Number of unknowns.
     pub fn size(&self) -> usize {
         self.analysis.size()
@@ -59,7 +50,7 @@ impl<T: FactorScalar> Ldlt<T> {
 }
 
 /// The work of [`Ldlt::new`].
-pub(super) fn factored<T: FactorScalar>(
+pub(super) fn factor<T: PanelScalar>(
     analysis: &Arc<LdltAnalysis>,
     entry: &Entry<'_, T>,
 ) -> Result<Ldlt<T>, MeshError> {
@@ -90,13 +81,13 @@ struct FactoredPanel<T> {
 }
 
 /// Scratch memory of one thread.
-struct Workspace<T: FactorScalar> {
+struct Workspace<T: PanelScalar> {
     /// Position in the panel at work of every row of the matrix that it has; other entries are left from other panels.
     position: Vec<u32>,
     tile: TileScratch<T>,
 }
 
-struct TileScratch<T: FactorScalar> {
+struct TileScratch<T: PanelScalar> {
     /// Where the rows of an update go.
     pieces: Vec<Piece>,
     /// `L_d[J, :] D_d`.
@@ -105,7 +96,7 @@ struct TileScratch<T: FactorScalar> {
     packing: Packing<T>,
 }
 
-struct Factorisation<'a, T: FactorScalar> {
+struct Factorisation<'a, T: PanelScalar> {
     analysis: &'a LdltAnalysis,
     entry: &'a Entry<'a, T>,
     panels: Vec<OnceLock<FactoredPanel<T>>>,
@@ -119,7 +110,7 @@ enum Tiles {
     InParallel,
 }
 
-impl<T: FactorScalar> Factorisation<'_, T> {
+impl<T: PanelScalar> Factorisation<'_, T> {
     /// The error of the first task that fails, whatever finishes first.
     fn branch(&self, branch: &Branch) -> Result<(), MeshError> {
         let done: Vec<Result<(), MeshError>> =
@@ -301,13 +292,7 @@ impl<T: FactorScalar> Factorisation<'_, T> {
             return;
         }
         let height = range.len();
-        scratch.pieces.clear();
-        for (i, row) in range.clone().map(place).enumerate() {
-            match scratch.pieces.last_mut() {
-                Some(piece) if row == piece.row + i - piece.from => piece.to = i + 1,
-                _ => scratch.pieces.push(Piece { row, from: i, to: i + 1 }),
-            }
-        }
+        find_pieces(range.clone().map(place), &mut scratch.pieces);
         if scratch.product.len() < height * columns {
             scratch.product.resize(height * columns, T::default());
         }
@@ -318,11 +303,7 @@ impl<T: FactorScalar> Factorisation<'_, T> {
             let own = dense::column_mut(&mut tile, source_rows[from + j] as usize - target.column);
             let start = if shape == Shape::LowerTrapezoid { j } else { 0 };
             for piece in scratch.pieces.iter().filter(|piece| piece.to > start) {
-                let begin = piece.from.max(start);
-                let own = &mut own[piece.row + begin - piece.from..];
-                for (own, &value) in own.iter_mut().zip(&values[begin..piece.to]) {
-                    *own -= value;
-                }
+                piece.subtract(values, start, own);
             }
         }
     }
@@ -335,6 +316,29 @@ struct Piece {
     /// Rows of the product.
     from: usize,
     to: usize,
+}
+
+impl Piece {
+    /// Subtracts a column of the product, from row `start` of it on, from that of the tile.
+    #[inline]
+    fn subtract<T: PanelScalar>(&self, values: &[T], start: usize, own: &mut [T]) {
+        let begin = self.from.max(start);
+        let own = &mut own[self.row + begin - self.from..];
+        for (own, &value) in own.iter_mut().zip(&values[begin..self.to]) {
+            *own -= value;
+        }
+    }
+}
+
+/// The pieces that the rows of a product make in the tile.
+fn find_pieces(rows: impl Iterator<Item = usize>, pieces: &mut Vec<Piece>) {
+    pieces.clear();
+    for (i, row) in rows.enumerate() {
+        match pieces.last_mut() {
+            Some(piece) if row == piece.row + i - piece.from => piece.to = i + 1,
+            _ => pieces.push(Piece { row, from: i, to: i + 1 }),
+        }
+    }
 }
 
 /// Where a tile lies.

@@ -8,13 +8,14 @@
 //!
 //! Lives here: the number types (`scalar`) and vectors of them (`lanes`), the analysis of a pattern (`analysis`,
 //! `panels`, `schedule`), dense kernels of one panel (`dense`, `multiply`, `panel_solve`), the numeric factorisation
-//! (`factor`) and the triangular solves (`solve`). Does not live here: orderings ([`ordering`](super::ordering)), iterations that refine or precondition.
+//! (`factor`) and the triangular solves (`solve`), both compiled for the four types in `compiled`. Does not live here: orderings ([`ordering`](super::ordering)), iterations that refine or precondition.
 //!
 //! The bits of factor and solution do not depend on the number of threads: every panel, and every fixed tile of its rows,
 //! takes its updates in one order, and no dense kernel is itself parallel. They may differ between processors with other vector
 //! instructions.
 
 mod analysis;
+mod compiled;
 mod dense;
 mod factor;
 mod lanes;
@@ -28,5 +29,6 @@ mod solve;
 mod tests;
 
 pub use analysis::LdltAnalysis;
-pub use factor::Ldlt;
-pub use scalar::{Entry, FactorScalar};
+pub use compiled::FactorScalar;
+pub use factor::{Entry, Ldlt};
+pub use scalar::PanelScalar;

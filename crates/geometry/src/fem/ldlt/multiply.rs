@@ -14,7 +14,7 @@ use pulp::{Simd, WithSimd};
 
 use super::dense::{column, column_mut};
 use super::lanes::Lanes;
-use super::scalar::FactorScalar;
+use super::scalar::PanelScalar;
 
 /// Real multiply-adds up to which a product is taken here, not by faer.
 const SMALL_PRODUCT: usize = 1 << 15;
@@ -45,20 +45,20 @@ pub(super) enum Shape {
 
 /// Copies of the operands in the order in which they are read.
 #[derive(Debug)]
-pub(super) struct Packing<T: FactorScalar> {
+pub(super) struct Packing<T: PanelScalar> {
     strip: Vec<T::Part>,
     groups: Vec<T::Part>,
     sums: Vec<T::Part>,
 }
 
-impl<T: FactorScalar> Packing<T> {
+impl<T: PanelScalar> Packing<T> {
     pub(super) fn new() -> Self {
         Self { strip: Vec::new(), groups: Vec::new(), sums: Vec::new() }
     }
 }
 
 /// `product = a · bᵀ` or `product −= a · bᵀ` of shapes `(m, k)` and `(c, k)`.
-pub(super) fn multiply<T: FactorScalar>(
+pub(super) fn multiply<T: PanelScalar>(
     mut product: MatMut<'_, T>,
     into: Store,
     shape: Shape,
@@ -88,7 +88,7 @@ pub(super) fn multiply<T: FactorScalar>(
 }
 
 /// By faer, which has wider instructions where the processor does, and copies more.
-fn multiply_large<T: FactorScalar>(product: MatMut<'_, T>, into: Store, a: MatRef<'_, T>, b: MatRef<'_, T>) {
+fn multiply_large<T: PanelScalar>(product: MatMut<'_, T>, into: Store, a: MatRef<'_, T>, b: MatRef<'_, T>) {
     let (accumulate, sign) = match into {
         Store::Overwrite => (Accum::Replace, T::ONE),
         Store::Subtract => (Accum::Add, -T::ONE),
@@ -96,7 +96,7 @@ fn multiply_large<T: FactorScalar>(product: MatMut<'_, T>, into: Store, a: MatRe
     matmul_with_conj(product, accumulate, a, Conj::No, b.transpose(), Conj::No, sign, Par::Seq);
 }
 
-struct Multiply<'a, T: FactorScalar> {
+struct Multiply<'a, T: PanelScalar> {
     product: MatMut<'a, T>,
     into: Store,
     shape: Shape,
@@ -105,7 +105,7 @@ struct Multiply<'a, T: FactorScalar> {
     packing: &'a mut Packing<T>,
 }
 
-impl<T: FactorScalar> WithSimd for Multiply<'_, T> {
+impl<T: PanelScalar> WithSimd for Multiply<'_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -161,7 +161,7 @@ impl<T: FactorScalar> WithSimd for Multiply<'_, T> {
 
 /// `GROUP` reals of every column after the other, for each group.
 #[inline(always)]
-fn pack_groups<T: FactorScalar>(b: MatRef<'_, T>, groups: usize, packed: &mut Vec<T::Part>) {
+fn pack_groups<T: PanelScalar>(b: MatRef<'_, T>, groups: usize, packed: &mut Vec<T::Part>) {
     let depth = b.ncols();
     packed.clear();
     packed.resize(groups * depth * GROUP, T::Part::default());
@@ -210,7 +210,7 @@ mod tests {
         (((seed * 2_654_435_761) >> 7) % 31) as f32 / 8.0 - 1.875
     }
 
-    fn check<T: FactorScalar + PartialEq>(of: impl Fn(f32, f32) -> T) {
+    fn check<T: PanelScalar + PartialEq>(of: impl Fn(f32, f32) -> T) {
         for (rows, columns, depth) in SHAPES {
             let block = |start: usize, count: usize| -> Vec<T> {
                 (start..start + count).map(|i| of(eighths(2 * i), eighths(2 * i + 1))).collect()

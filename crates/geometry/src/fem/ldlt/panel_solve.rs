@@ -6,7 +6,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::lanes::{Lanes, add_columns, products};
-use super::scalar::FactorScalar;
+use super::scalar::PanelScalar;
 
 /// Columns of the factor that are taken together.
 const GROUP: usize = 4;
@@ -39,7 +39,7 @@ pub(super) struct Subtract<'a, T, const SIDES: usize> {
     pub(super) y: [&'a mut [T]; SIDES],
 }
 
-impl<T: FactorScalar, const SIDES: usize> WithSimd for Subtract<'_, T, SIDES> {
+impl<T: PanelScalar, const SIDES: usize> WithSimd for Subtract<'_, T, SIDES> {
     type Output = ();
 
     #[inline(always)]
@@ -67,7 +67,7 @@ pub(super) struct SubtractTransposed<'a, T, const SIDES: usize> {
     pub(super) y: [&'a [T]; SIDES],
 }
 
-impl<T: FactorScalar, const SIDES: usize> WithSimd for SubtractTransposed<'_, T, SIDES> {
+impl<T: PanelScalar, const SIDES: usize> WithSimd for SubtractTransposed<'_, T, SIDES> {
     type Output = ();
 
     #[inline(always)]
@@ -97,7 +97,7 @@ pub(super) struct Forward<'a, T, const SIDES: usize> {
     pub(super) x: [&'a mut [T]; SIDES],
 }
 
-impl<T: FactorScalar, const SIDES: usize> WithSimd for Forward<'_, T, SIDES> {
+impl<T: PanelScalar, const SIDES: usize> WithSimd for Forward<'_, T, SIDES> {
     type Output = ();
 
     #[inline(always)]
@@ -138,7 +138,7 @@ pub(super) struct Backward<'a, T, const SIDES: usize> {
     pub(super) x: [&'a mut [T]; SIDES],
 }
 
-impl<T: FactorScalar, const SIDES: usize> WithSimd for Backward<'_, T, SIDES> {
+impl<T: PanelScalar, const SIDES: usize> WithSimd for Backward<'_, T, SIDES> {
     type Output = ();
 
     #[inline(always)]

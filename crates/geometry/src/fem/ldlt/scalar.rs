@@ -1,24 +1,12 @@
-//! The four number types a factor can have.
-//!
-//! Factorisation and solves are compiled here, once for each of them: as generic functions they would be compiled again,
-//! dense kernels and all, in every crate that calls them.
-
-use std::sync::Arc;
+//! The four number types of a factor, as the dense kernels of a panel know them.
 
 use faer::traits::ComplexField;
 use num_complex::Complex;
 
-use super::analysis::LdltAnalysis;
-use super::factor::{self, Ldlt};
 use super::lanes::Lanes;
-use super::solve;
-use crate::error::MeshError;
 
-/// The values of a matrix: `entry(row, k)` is the stored entry `k` of the structure, which lies in `row`.
-pub type Entry<'a, T> = dyn Fn(usize, usize) -> T + Sync + 'a;
-
-/// A number that a matrix can be factored in: `f32`, `f64`, and complex numbers of these.
-pub trait FactorScalar:
+/// A number that panels hold: `f32`, `f64`, and complex numbers of these.
+pub trait PanelScalar:
     ComplexField
     + Lanes
     + std::ops::Add<Output = Self>
@@ -45,38 +33,11 @@ pub trait FactorScalar:
 
     /// `1 / self`, without overflow or underflow on the way; `None` where it is not finite.
     fn inverse(self) -> Option<Self>;
-
-    /// What [`Ldlt::new`] does.
-    ///
-    /// # Errors
-    /// Those of [`Ldlt::new`].
-    fn factored(analysis: &Arc<LdltAnalysis>, entry: &Entry<'_, Self>) -> Result<Ldlt<Self>, MeshError>;
-
-    /// What [`Ldlt::solve_in_place`] does.
-    ///
-    /// # Panics
-    /// If the length of `columns` is not a multiple of the size.
-    fn solve(factor: &Ldlt<Self>, columns: &mut [Self]);
-}
-
-/// The numeric work of one concrete type.
-macro_rules! numeric_work {
-    () => {
-        #[inline(never)]
-        fn factored(analysis: &Arc<LdltAnalysis>, entry: &Entry<'_, Self>) -> Result<Ldlt<Self>, MeshError> {
-            factor::factored(analysis, entry)
-        }
-
-        #[inline(never)]
-        fn solve(factor: &Ldlt<Self>, columns: &mut [Self]) {
-            solve::solve_in_place(factor, columns);
-        }
-    };
 }
 
 macro_rules! real {
     ($real:ty) => {
-        impl FactorScalar for $real {
+        impl PanelScalar for $real {
             const ONE: Self = 1.0;
             type Part = $real;
             const PARTS: usize = 1;
@@ -98,11 +59,9 @@ macro_rules! real {
                 let inverse = 1.0 / self;
                 (self.is_finite() && inverse.is_finite()).then_some(inverse)
             }
-
-            numeric_work!();
         }
 
-        impl FactorScalar for Complex<$real> {
+        impl PanelScalar for Complex<$real> {
             const ONE: Self = Complex::new(1.0, 0.0);
             type Part = $real;
             const PARTS: usize = 2;
@@ -136,8 +95,6 @@ macro_rules! real {
                 };
                 (self.is_finite() && inverse.is_finite()).then_some(inverse)
             }
-
-            numeric_work!();
         }
     };
 }

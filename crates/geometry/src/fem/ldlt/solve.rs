@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::factor::Ldlt;
 use super::panel_solve::{Backward, Block, Forward, Subtract, SubtractTransposed, by_pairs};
 use super::panels::Panel;
-use super::scalar::FactorScalar;
+use super::scalar::PanelScalar;
 use super::schedule::{Branch, Task};
 
 /// Entries above which the parts of a panel of a chain are parallel tasks: some 50 µs of memory traffic.
@@ -23,18 +23,8 @@ const LARGE_PANEL: usize = 1 << 16;
 const PART_ROWS: usize = 256;
 const PART_COLUMNS: usize = 32;
 
-impl<T: FactorScalar> Ldlt<T> {
-    /// Solves `A X = B` in place; `columns` holds the right sides one after the other.
-    ///
-    /// # Panics
-    /// If the length of `columns` is not a multiple of the size.
-    pub fn solve_in_place(&self, columns: &mut [T]) {
-        T::solve(self, columns);
-    }
-}
-
 /// The work of [`Ldlt::solve_in_place`].
-pub(super) fn solve_in_place<T: FactorScalar>(factor: &Ldlt<T>, columns: &mut [T]) {
+pub(super) fn solve_in_place<T: PanelScalar>(factor: &Ldlt<T>, columns: &mut [T]) {
     let n = factor.size();
     if n == 0 {
         return;
@@ -76,7 +66,7 @@ enum Parts {
     InParallel,
 }
 
-impl<T: FactorScalar> Sweep<'_, T> {
+impl<T: PanelScalar> Sweep<'_, T> {
     fn panel(&self, p: usize) -> &Panel {
         self.factor.analysis.panels.get(p)
     }
@@ -137,7 +127,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
                 for p in panels.clone() {
                     self.forward_panel(p, Parts::Whole, x, &own, workspace);
                 }
-                self.taken(panels, workspace)
+                self.take_outer(panels, workspace)
             }),
         }
     }
@@ -158,12 +148,12 @@ impl<T: FactorScalar> Sweep<'_, T> {
             for &p in &branch.chain {
                 self.forward_panel(p, Parts::InParallel, x, &own, workspace);
             }
-            self.taken(&branch.panels, workspace)
+            self.take_outer(&branch.panels, workspace)
         })
     }
 
     /// The values at the outer rows, which become zero again: a row that comes twice is taken once.
-    fn taken(&self, panels: &Range<usize>, workspace: &mut Workspace<T>) -> Vec<T> {
+    fn take_outer(&self, panels: &Range<usize>, workspace: &mut Workspace<T>) -> Vec<T> {
         let mut values = Vec::new();
         for row in self.outer_rows(panels.clone()) {
             let at_row = &mut workspace.outside[row * self.count..(row + 1) * self.count];
@@ -179,7 +169,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
             Task::Branch(branch) => self.backward_branch(branch, x, outer),
             Task::Run(panels) => self.with_workspace(|workspace| {
                 let own = self.unknowns(panels);
-                self.put(panels, outer, workspace);
+                self.put_outer(panels, outer, workspace);
                 for p in panels.clone().rev() {
                     self.backward_panel(p, Parts::Whole, x, &own, workspace);
                 }
@@ -190,7 +180,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
     fn backward_branch(&self, branch: &Branch, x: &mut [T], outer: &[T]) {
         let own = self.unknowns(&branch.panels);
         let known: Vec<Vec<T>> = self.with_workspace(|workspace| {
-            self.put(&branch.panels, outer, workspace);
+            self.put_outer(&branch.panels, outer, workspace);
             for &p in branch.chain.iter().rev() {
                 self.backward_panel(p, Parts::InParallel, x, &own, workspace);
             }
@@ -201,7 +191,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
         shares.zip(known).for_each(|((task, x), known)| self.backward(task, x, &known));
     }
 
-    fn put(&self, panels: &Range<usize>, outer: &[T], workspace: &mut Workspace<T>) {
+    fn put_outer(&self, panels: &Range<usize>, outer: &[T], workspace: &mut Workspace<T>) {
         for (row, values) in self.outer_rows(panels.clone()).zip(outer.chunks_exact(self.count)) {
             workspace.outside[row * self.count..][..self.count].copy_from_slice(values);
         }
@@ -260,28 +250,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
             |x| arch.dispatch(Forward { block, x: x.map(|x| &mut x[..block.rows]) }),
         );
         if cut {
-            for values in sides.chunks_mut(2 * height) {
-                match values.len() / height {
-                    2 => {
-                        let (one, other) = values.split_at_mut(height);
-                        let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
-                        let (x, parts) = ([&*x0, &*x1], y0.par_chunks_mut(PART_ROWS));
-                        let parts = parts.zip(y1.par_chunks_mut(PART_ROWS)).enumerate();
-                        parts.for_each(|(part, (y0, y1))| {
-                            let block = below(block, width + part * PART_ROWS, y0.len());
-                            arch.dispatch(Subtract { block, x, y: [y0, y1] });
-                        });
-                    }
-                    _ => {
-                        let (x, y) = values.split_at_mut(width);
-                        let (x, parts) = ([&*x], y.par_chunks_mut(PART_ROWS).enumerate());
-                        parts.for_each(|(part, y)| {
-                            let block = below(block, width + part * PART_ROWS, y.len());
-                            arch.dispatch(Subtract { block, x, y: [y] });
-                        });
-                    }
-                }
-            }
+            subtract_in_parts(block, sides);
         }
         for (side, values) in sides.chunks_exact(height).enumerate() {
             let (solved, changes) = values.split_at(width);
@@ -317,29 +286,7 @@ impl<T: FactorScalar> Sweep<'_, T> {
         let block = Block { entries, height, first_row: 0, rows: if cut { width } else { height } };
         let arch = pulp::Arch::new();
         if cut {
-            let outer = below(block, width, height - width);
-            for values in sides.chunks_mut(2 * height) {
-                match values.len() / height {
-                    2 => {
-                        let (one, other) = values.split_at_mut(height);
-                        let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
-                        let (y, parts) = ([&*y0, &*y1], x0.par_chunks_mut(PART_COLUMNS));
-                        let parts = parts.zip(x1.par_chunks_mut(PART_COLUMNS)).enumerate();
-                        parts.for_each(|(part, (x0, x1))| {
-                            let first = part * PART_COLUMNS;
-                            arch.dispatch(SubtractTransposed { block: outer, first, x: [x0, x1], y });
-                        });
-                    }
-                    _ => {
-                        let (x, y) = values.split_at_mut(width);
-                        let (y, parts) = ([&*y], x.par_chunks_mut(PART_COLUMNS).enumerate());
-                        parts.for_each(|(part, x)| {
-                            let first = part * PART_COLUMNS;
-                            arch.dispatch(SubtractTransposed { block: outer, first, x: [x], y });
-                        });
-                    }
-                }
-            }
+            subtract_transposed_in_parts(block, sides);
         }
         by_pairs(
             sides,
@@ -357,4 +304,59 @@ impl<T: FactorScalar> Sweep<'_, T> {
 /// Other rows of the same columns.
 fn below<T>(block: Block<'_, T>, first_row: usize, rows: usize) -> Block<'_, T> {
     Block { first_row, rows, ..block }
+}
+
+/// `x_R −= L_R x_J` for every side, by parts of the rows; `block` is the square on top of the panel.
+fn subtract_in_parts<T: PanelScalar>(block: Block<'_, T>, sides: &mut [T]) {
+    let (arch, height, width) = (pulp::Arch::new(), block.height, block.rows);
+    for values in sides.chunks_mut(2 * height) {
+        match values.len() / height {
+            2 => {
+                let (one, other) = values.split_at_mut(height);
+                let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+                let (x, parts) = ([&*x0, &*x1], y0.par_chunks_mut(PART_ROWS));
+                let parts = parts.zip(y1.par_chunks_mut(PART_ROWS)).enumerate();
+                parts.for_each(|(part, (y0, y1))| {
+                    let block = below(block, width + part * PART_ROWS, y0.len());
+                    arch.dispatch(Subtract { block, x, y: [y0, y1] });
+                });
+            }
+            _ => {
+                let (x, y) = values.split_at_mut(width);
+                let (x, parts) = ([&*x], y.par_chunks_mut(PART_ROWS).enumerate());
+                parts.for_each(|(part, y)| {
+                    let block = below(block, width + part * PART_ROWS, y.len());
+                    arch.dispatch(Subtract { block, x, y: [y] });
+                });
+            }
+        }
+    }
+}
+
+/// `x_J −= L_Rᵀ x_R` for every side, by parts of the columns; `block` is the square on top of the panel.
+fn subtract_transposed_in_parts<T: PanelScalar>(block: Block<'_, T>, sides: &mut [T]) {
+    let (arch, height, width) = (pulp::Arch::new(), block.height, block.rows);
+    let outer = below(block, width, height - width);
+    for values in sides.chunks_mut(2 * height) {
+        match values.len() / height {
+            2 => {
+                let (one, other) = values.split_at_mut(height);
+                let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+                let (y, parts) = ([&*y0, &*y1], x0.par_chunks_mut(PART_COLUMNS));
+                let parts = parts.zip(x1.par_chunks_mut(PART_COLUMNS)).enumerate();
+                parts.for_each(|(part, (x0, x1))| {
+                    let first = part * PART_COLUMNS;
+                    arch.dispatch(SubtractTransposed { block: outer, first, x: [x0, x1], y });
+                });
+            }
+            _ => {
+                let (x, y) = values.split_at_mut(width);
+                let (y, parts) = ([&*y], x.par_chunks_mut(PART_COLUMNS).enumerate());
+                parts.for_each(|(part, x)| {
+                    let first = part * PART_COLUMNS;
+                    arch.dispatch(SubtractTransposed { block: outer, first, x: [x], y });
+                });
+            }
+        }
+    }
 }

@@ -191,6 +191,56 @@ pub(super) fn elements<'n>(
     let mut list = ElementList::new(nodes);
     for _ in 0..announced.blocks {
         cursor.subject = announced.section.clone();
+        let block = ElementBlock::read(cursor, entities)?;
+        let ElementBlock { shape, groups, .. } = block;
+        let bytes = 8 * (1 + shape.nodes);
+        let least = if cursor.encoding() == Encoding::Ascii { 2 * (1 + shape.nodes) } else { bytes };
+        let count = announced.block(cursor, block.at_count, block.count, least)?;
+        match shape.becomes() {
+            Use::Tetrahedron => list.tetrahedra.reserve_exact(count),
+            Use::Triangle => list.triangles.reserve_exact(count.saturating_mul(groups.len().min(2))),
+            Use::Nothing => {}
+        }
+        let skipped = block.is_skipped();
+        if skipped {
+            list.skip(shape, count);
+            if cursor.encoding() != Encoding::Ascii {
+                cursor.skip_bytes(count * bytes, "an element")?;
+                continue;
+            }
+        }
+        for _ in 0..count {
+            let place = cursor.begin_record();
+            let tag = cursor.size("the tag of an element")?;
+            if skipped {
+                cursor.skip_line();
+                continue;
+            }
+            block.read_element(cursor, (tag, place), names, &mut list)?;
+            cursor.end_record()?;
+            cursor.subject = Subject::Section("Elements".into());
+        }
+    }
+    announced.complete(cursor)?;
+    let volumes = entities.into_iter().flat_map(|entities| entities.groups.range((3, i32::MIN)..));
+    let left_out = volumes.filter(|(_, groups)| groups.is_empty()).map(|((_, tag), _)| *tag);
+    list.notices.ungrouped_volumes = left_out.take(MOST_LISTED).collect();
+    Ok(list)
+}
+
+/// A block of elements of one entity and type, as its head announces it.
+struct ElementBlock<'e> {
+    shape: Shape,
+    dimension: i32,
+    /// Of the entity; none of points and curves.
+    groups: &'e [i32],
+    /// How many elements there are, and where that is said.
+    count: u64,
+    at_count: usize,
+}
+
+impl<'e> ElementBlock<'e> {
+    fn read(cursor: &mut Cursor<'_>, entities: Option<&'e Entities>) -> Result<Self, MshError> {
         let place = cursor.begin_record();
         let dimension = dimension(cursor)?;
         let at_tag = cursor.next_word();
@@ -213,59 +263,43 @@ pub(super) fn elements<'n>(
                 .as_slice(),
             _ => &[],
         };
-        let bytes = 8 * (1 + shape.nodes);
-        let least = if cursor.encoding() == Encoding::Ascii { 2 * (1 + shape.nodes) } else { bytes };
-        let count = announced.block(cursor, at_count, count, least)?;
-        match (shape.becomes(), groups) {
-            (Use::Tetrahedron, _) => list.tetrahedra.reserve_exact(count),
+        Ok(Self { shape, dimension, groups, count, at_count })
+    }
+
+    /// Whether its elements are passed over: no part of a tetrahedral mesh, or of no group.
+    fn is_skipped(&self) -> bool {
+        let becomes = self.shape.becomes();
+        becomes != Use::Tetrahedron && self.groups.is_empty() || becomes == Use::Nothing && self.dimension < 3
+    }
+
+    /// Reads the nodes of the element `tag`, whose record begins at `place`.
+    fn read_element(
+        &self,
+        cursor: &mut Cursor<'_>,
+        (tag, place): (u64, usize),
+        names: &GroupNames,
+        list: &mut ElementList<'_>,
+    ) -> Result<(), MshError> {
+        let shape = self.shape;
+        let subject = Subject::Element(tag);
+        match (shape.becomes(), self.groups) {
+            (Use::Tetrahedron, []) => Err(cursor.fault_at(place, subject, MshFault::NoGroup)),
+            (Use::Tetrahedron, [group, ..]) => {
+                cursor.subject = subject;
+                let group = group.saturating_abs();
+                list.tetrahedron(cursor, (shape, tag, place, group), |cursor, what| cursor.size(what))
+            }
             (Use::Triangle, groups) => {
-                list.triangles.reserve_exact(count.saturating_mul(groups.len().min(2)))
+                cursor.subject = subject;
+                list.triangle(cursor, (shape, tag), groups, |cursor, what| cursor.size(what))
             }
-            _ => {}
-        }
-        let skipped = shape.becomes() != Use::Tetrahedron && groups.is_empty()
-            || shape.becomes() == Use::Nothing && dimension < 3;
-        if skipped {
-            list.skip(shape, count);
-            if cursor.encoding() != Encoding::Ascii {
-                cursor.skip_bytes(count * bytes, "an element")?;
-                continue;
+            (Use::Nothing, groups) => {
+                let group = names.of(3, groups.first().map_or(0, |tag| tag.saturating_abs()));
+                let fault = MshFault::NotTetrahedron { shape: shape.name, group };
+                Err(cursor.fault_at(place, subject, fault))
             }
-        }
-        for _ in 0..count {
-            let place = cursor.begin_record();
-            let tag = cursor.size("the tag of an element")?;
-            if skipped {
-                cursor.skip_line();
-                continue;
-            }
-            let subject = Subject::Element(tag);
-            match (shape.becomes(), groups) {
-                (Use::Tetrahedron, []) => return Err(cursor.fault_at(place, subject, MshFault::NoGroup)),
-                (Use::Tetrahedron, [group, ..]) => {
-                    cursor.subject = subject;
-                    let group = group.saturating_abs();
-                    list.tetrahedron(cursor, (shape, tag, place, group), |cursor, what| cursor.size(what))?;
-                }
-                (Use::Triangle, groups) => {
-                    cursor.subject = subject;
-                    list.triangle(cursor, (shape, tag), groups, |cursor, what| cursor.size(what))?;
-                }
-                (Use::Nothing, groups) => {
-                    let group = names.of(3, groups.first().map_or(0, |tag| tag.saturating_abs()));
-                    let fault = MshFault::NotTetrahedron { shape: shape.name, group };
-                    return Err(cursor.fault_at(place, subject, fault));
-                }
-            }
-            cursor.end_record()?;
-            cursor.subject = Subject::Section("Elements".into());
         }
     }
-    announced.complete(cursor)?;
-    let volumes = entities.into_iter().flat_map(|entities| entities.groups.range((3, i32::MIN)..));
-    let left_out = volumes.filter(|(_, groups)| groups.is_empty()).map(|((_, tag), _)| *tag);
-    list.notices.ungrouped_volumes = left_out.take(MOST_LISTED).collect();
-    Ok(list)
 }
 
 /// Most volumes that a notice lists.
