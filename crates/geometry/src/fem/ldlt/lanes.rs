@@ -147,7 +147,7 @@ pub(super) fn add_columns<T: Lanes, S: Simd, const K: usize, const SIDES: usize>
         }
     }
     let whole = heads[0].len();
-    let mut split: [(&mut [T::Vector<S>], &mut [T]); SIDES] = std::array::from_fn(|_| Default::default());
+    let mut split: [SplitMut<'_, T, S>; SIDES] = std::array::from_fn(|_| Default::default());
     for (split, side) in split.iter_mut().zip(sides) {
         let (head, tail) = T::vectors_mut::<S>(&mut side[from..][..length]);
         *split = (&mut head[..whole], tail);
@@ -210,6 +210,9 @@ pub(super) fn products<T: Lanes, S: Simd, const K: usize, const SIDES: usize>(
 
 /// Whole vectors of several columns, and what is left of each.
 type Split<'a, T, S, const N: usize> = ([&'a [<T as Lanes>::Vector<S>]; N], [&'a [T]; N]);
+
+/// Whole vectors of a side, and what is left of it.
+type SplitMut<'a, T, S> = (&'a mut [<T as Lanes>::Vector<S>], &'a mut [T]);
 
 /// The first `length` numbers of several columns; all heads are as long as the first.
 #[inline(always)]

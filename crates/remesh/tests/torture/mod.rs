@@ -1,19 +1,18 @@
 //! Motions that break a mesh in one step, and that rounds take without a single inverted element.
 //!
-//! `cargo test --release -p fluxmorph-remesh --test torture -- --nocapture` prints what is measured, `write_the_table`
+//! `cargo test --release -p fluxmorph-remesh --test remesh torture -- --nocapture` prints what is measured, `write_the_table`
 //! (`just torture`) puts all of it into docs/torture.md.
-#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 mod case;
 mod cases;
 mod page;
 mod skin;
-#[path = "../support/mod.rs"]
-mod support;
 
 use case::{Case, Outcome};
 use fluxmorph_geometry::quality::qualities;
 use fluxmorph_remesh::{Guidance, Limits, StiffnessPolicy};
+
+use crate::support;
 
 /// Outcomes of a case, with what holds for every one: the motion arrives, every element on the way is valid, and every
 /// round kept away from inversion.
