@@ -29,7 +29,7 @@ torture: torture-meshes torture-runs
 
 # Computes the tables of mesh motion in docs/torture.md
 torture-meshes:
-    cargo test --release -p fluxmorph-remesh --test torture -- --ignored --nocapture write_the_table
+    cargo test --release -p fluxmorph-remesh --test remesh -- --ignored --nocapture write_the_table
 
 # Real kills, full disks (as root, or where this user may mount) and timed signals; writes docs/robustness.md
 torture-runs:

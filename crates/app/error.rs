@@ -7,7 +7,6 @@ use fluxmorph_geometry::parallel::RankError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
-
 use crate::config::ConfigError;
 use crate::exit_code::ExitCode;
 use crate::journal::Mismatch;

@@ -5,9 +5,9 @@ use std::path::Path;
 use clap::{Command, CommandFactory};
 
 use super::args::{Cli, GenerateArgs, Generated};
-use crate::exit_code::ExitCode;
 use super::stdout;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::output::{OutputError, system_disk, write_whole};
 use crate::schema;
 

@@ -1,11 +1,11 @@
 //! `fluxmorph gradient`.
 
 use super::args::GradientArgs;
-use crate::exit_code::ExitCode;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::config::FactorReuse;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::memory_limit;
 use crate::output::read_design;
 use crate::setup::{Purpose, set_up_watched};

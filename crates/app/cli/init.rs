@@ -6,9 +6,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use super::args::InitArgs;
-use crate::exit_code::ExitCode;
 use super::template::Template;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::output::{OutputError, shell_word, system_disk, write_whole};
 
 /// Do what the command line says.

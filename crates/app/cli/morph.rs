@@ -1,9 +1,9 @@
 //! `fluxmorph morph`.
 
 use super::args::MorphArgs;
-use crate::exit_code::ExitCode;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::morph::{self, Parameters};
 use crate::output::system_disk;
 use crate::session::Options;

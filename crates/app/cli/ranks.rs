@@ -9,12 +9,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
-use crate::exit_code::ExitCode;
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
 use crate::config::{Config, Source};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::session;
 use crate::setup::Purpose;
 

@@ -1,9 +1,9 @@
 //! `fluxmorph report`: one HTML page from a run directory.
 
 use super::args::ReportArgs;
-use crate::exit_code::ExitCode;
 use crate::config::OutputNamedBy;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::memory_limit;
 use crate::observer::{Console, Observer};
 use crate::output::system_disk;

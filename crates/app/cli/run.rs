@@ -5,12 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::args::{ResumeArgs, RunArgs};
-use crate::exit_code::ExitCode;
 use super::interrupt::{self, Signal};
 use super::ranks::Ranks;
 use super::{observer, stdout, with_threads};
 use crate::config::OutputNamedBy;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::memory_limit;
 use crate::observer::RunObserver;
 use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};

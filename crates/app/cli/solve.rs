@@ -1,10 +1,10 @@
 //! `fluxmorph solve`.
 
 use super::args::SolveArgs;
-use crate::exit_code::ExitCode;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::output::{read_design, system_disk};
 use crate::session::{self, Options};
 use crate::setup::{Purpose, variable_count};

@@ -4,11 +4,11 @@ use std::io::Write;
 use std::time::{Duration, Instant};
 
 use super::args::SweepArgs;
-use crate::exit_code::ExitCode;
 use super::{interrupt, stdout};
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::observer::{Console, Observer};
 use crate::output::{OlderRun, OutputError, shell_word, system_disk};
 use crate::sweep::{

@@ -7,9 +7,9 @@ use fluxmorph_geometry::tet4::{Point, centroid};
 use serde::Serialize;
 
 use super::{TuneReport, Walk};
-use crate::exit_code::ExitCode;
 use crate::config::Paper;
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::output::RunStatus;
 use crate::setup::MotionSetup;
 use fluxmorph_optimizer::driver::StopReason;

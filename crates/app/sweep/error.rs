@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use super::MOST_COMBINATIONS;
-use crate::exit_code::ExitCode;
 use crate::config::ConfigError;
+use crate::exit_code::ExitCode;
 
 /// Why a sweep is not begun. Nothing has been run or replaced then.
 #[derive(Debug, thiserror::Error)]

@@ -10,9 +10,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::{Layout, Planned, Sweep, Task};
+use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::launcher;
-use crate::error::Error;
 use crate::output::OutputError;
 
 /// Between two looks at the children: far shorter than a run, and no load.

@@ -1,10 +1,8 @@
 //! Gmsh files that are sound: read exactly, in every form; written so that they are read back exactly.
 
-mod msh_support;
-
+use crate::msh_support::{Device, Form, Random, Version, Writer, assert_same};
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
-use msh_support::{Device, Form, Random, Version, Writer, assert_same};
 
 const FORMS: [Form; 3] = [Form::Ascii, Form::Little, Form::Big];
 
@@ -74,82 +72,17 @@ fn surfaces_that_see_one_face_from_both_sides_keep_their_sides() {
 }
 
 /// Two tets, one of them left-handed, with nodes and elements that are of no use, and every kind of extra section.
-const CLUTTERED: &str = "$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$Comments
-anything at all, $EndNodes too
-$EndComments
-$PhysicalNames
-3
-1 9 \"edge\"
-2 4 \"top | side\"
-3 2 \"iron\"
-$EndPhysicalNames
-$Entities
-1 1 2 2
-1 0 0 0 0
-1 0 0 0 1 0 0 1 9 2 1 -1
-1 0 0 0 1 1 1 1 -4 1 1
-2 0 0 0 1 1 1 0 0
-1 0 0 0 1 1 1 1 -2 1 1
-2 0 0 0 1 1 1 1 5 0
-$EndEntities
-$Nodes
-2 7 1 20
-2 1 1 3
-1
-2
-3
-0 0 0 0.5 0.5
-1 0 0 0.5 0.5
-0 1 0 0.5 0.5
-3 1 0 4
-4
-5
-19
-20
-0 0 1
-0 0 -1
-7 7 7
-8 8 8
-$EndNodes
-$Elements
-6 8 1 8
-0 1 15 1
-1 1
-1 1 1 2
-2 1 2
-3 2 3
-2 1 2 2
-4 1 3 2
-5 1 3 19
-2 2 2 1
-6 1 2 4
-3 1 4 1
-7 1 2 3 4
-3 2 4 1
-8 1 2 3 5
-$EndElements
-$Periodic
-1
-0 1 1
-0
-1
-1 1
-$EndPeriodic
-$NodeData
-1
-\"a view\"
-1
-0
-3
-0
-1
-1
-1 2.5
-$EndNodeData
-";
+pub(crate) const CLUTTERED: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat
+$Comments\nanything at all, $EndNodes too\n$EndComments
+$PhysicalNames\n3\n1 9 \"edge\"\n2 4 \"top | side\"\n3 2 \"iron\"\n$EndPhysicalNames
+$Entities\n1 1 2 2\n1 0 0 0 0\n1 0 0 0 1 0 0 1 9 2 1 -1\n1 0 0 0 1 1 1 1 -4 1 1\n2 0 0 0 1 1 1 0 0
+1 0 0 0 1 1 1 1 -2 1 1\n2 0 0 0 1 1 1 1 5 0\n$EndEntities
+$Nodes\n2 7 1 20\n2 1 1 3\n1\n2\n3\n0 0 0 0.5 0.5\n1 0 0 0.5 0.5\n0 1 0 0.5 0.5\n3 1 0 4\n4\n5\n19\n20\n0 0 1
+0 0 -1\n7 7 7\n8 8 8\n$EndNodes
+$Elements\n6 8 1 8\n0 1 15 1\n1 1\n1 1 1 2\n2 1 2\n3 2 3\n2 1 2 2\n4 1 3 2\n5 1 3 19\n2 2 2 1\n6 1 2 4
+3 1 4 1\n7 1 2 3 4\n3 2 4 1\n8 1 2 3 5\n$EndElements
+$Periodic\n1\n0 1 1\n0\n1\n1 1\n$EndPeriodic
+$NodeData\n1\n\"a view\"\n1\n0\n3\n0\n1\n1\n1 2.5\n$EndNodeData\n";
 
 #[test]
 fn what_is_of_no_use_is_skipped_with_a_count() {
@@ -191,49 +124,31 @@ fn second_order_elements_are_read_with_straight_edges() {
         let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         if version == Version::V4 {
             out.line("$Entities");
-            [0u64, 0, 0, 1].into_iter().for_each(|n| out.size(n));
-            out.end();
-            out.int(1);
-            (0..6).for_each(|_| out.real(0.0));
-            out.size(1);
-            out.int(3);
-            out.size(0);
-            out.end();
+            out.sizes(&[0, 0, 0, 1]).end();
+            out.ints(&[1]).reals(&[0.0; 6]).sizes(&[1]).ints(&[3]).sizes(&[0]).end();
             out.end_section("Entities");
             out.line("$Nodes");
-            [1u64, 10, 1, 10].into_iter().for_each(|n| out.size(n));
-            out.end();
-            [3, 1, 0].into_iter().for_each(|n| out.int(n));
-            out.size(10);
-            out.end();
-            for tag in 1..=10 {
-                out.size(tag);
-                out.end();
-            }
+            out.sizes(&[1, 10, 1, 10]).end();
+            out.ints(&[3, 1, 0]).sizes(&[10]).end();
+            (1..=10).for_each(|tag| out.sizes(&[tag]).end());
         } else {
             out.line("$Nodes\n10");
         }
         for i in 0..10 {
             if version == Version::V2 {
-                out.int(i + 1);
+                out.ints(&[i + 1]);
             }
-            corners.get(i as usize).unwrap_or(&[0.4; 3]).iter().for_each(|&x| out.real(x));
-            out.end();
+            out.reals(corners.get(i as usize).unwrap_or(&[0.4; 3])).end();
         }
         out.end_section("Nodes");
         if version == Version::V4 {
             out.line("$Elements");
-            [1u64, 1, 1, 1].into_iter().for_each(|n| out.size(n));
-            out.end();
-            [3, 1, 11].into_iter().for_each(|n| out.int(n));
-            out.size(1);
-            out.end();
-            out.size(1);
-            (1..=10).for_each(|n| out.size(n));
+            out.sizes(&[1, 1, 1, 1]).end();
+            out.ints(&[3, 1, 11]).sizes(&[1]).end();
+            out.sizes(&[1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
         } else {
             out.line("$Elements\n1");
-            [1, 11, 2, 3, 1].into_iter().for_each(|n| out.int(n));
-            (1..=10).for_each(|n| out.int(n));
+            out.ints(&[1, 11, 2, 3, 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10]);
         }
         out.end();
         out.end_section("Elements");

@@ -1,10 +1,8 @@
 //! Gmsh files that are damaged: refused at the right line or byte, with the node or element named, and never with a panic.
 
-mod msh_support;
-
+use crate::msh_support::{Device, Form, Random, Version};
 use fluxmorph_geometry::io::msh::{MshError, Place, Subject};
 use fluxmorph_geometry::io::read_msh;
-use msh_support::{Device, Form, Random, Version};
 use proptest::prelude::*;
 
 /// Two tets in two volumes, with a triangle between them.
@@ -305,6 +303,11 @@ fn a_file_cut_off_anywhere_is_refused() {
     }
 }
 
+/// The bytes with others from `at` on.
+fn replaced(bytes: &[u8], at: usize, new: &[u8]) -> Vec<u8> {
+    [&bytes[..at], new, &bytes[at + new.len()..]].concat()
+}
+
 #[test]
 fn damage_in_binary_files_is_found_at_its_byte() {
     let device = Device::random(&mut Random(4), 1000);
@@ -319,9 +322,7 @@ fn damage_in_binary_files_is_found_at_its_byte() {
         let bytes = device.bytes(Version::V4, form);
         let at = find(&bytes, &order(device.nodes[3].1[0].to_le_bytes()));
         // The y coordinate of the fourth node.
-        let mut damaged = bytes.clone();
-        damaged[at + 8..at + 16].copy_from_slice(&order(f64::NAN.to_le_bytes()));
-        let error = refused(&damaged, "NaN");
+        let error = refused(&replaced(&bytes, at + 8, &order(f64::NAN.to_le_bytes())), "NaN");
         assert_eq!((error.place, error.subject), (Place::Byte(at + 8), Subject::Node(device.nodes[3].0)));
 
         // The last node of the first tet of the last block.
@@ -330,30 +331,22 @@ fn damage_in_binary_files_is_found_at_its_byte() {
         let record: Vec<u8> =
             std::iter::once(tag).chain(nodes).flat_map(|n| order(n.to_le_bytes())).collect();
         let at = find(&bytes, &record);
-        let mut damaged = bytes.clone();
-        damaged[at + 32..at + 40].copy_from_slice(&order(123_456u64.to_le_bytes()));
-        let error = refused(&damaged, "dangling");
+        let error = refused(&replaced(&bytes, at + 32, &order(123_456u64.to_le_bytes())), "dangling");
         assert_eq!((error.place, &error.subject), (Place::Byte(at + 32), &Subject::Element(*tag)));
         assert!(error.to_string().contains("node 123456"), "{error}");
 
         // A count that no memory could hold.
         let at = find(&bytes, b"$Nodes\n") + 7;
-        let mut damaged = bytes.clone();
-        damaged[at + 8..at + 16].copy_from_slice(&[0x7f; 8]);
-        let error = refused(&damaged, "count");
+        let error = refused(&replaced(&bytes, at + 8, &[0x7f; 8]), "count");
         assert_eq!(error.place, Place::Byte(at + 8));
-        let mut damaged = bytes;
-        let at = find(&damaged, b"4.1 1 8\n") + 8;
-        damaged[at] = 3;
-        assert_eq!(refused(&damaged, "byte order").place, Place::Byte(at));
+        let at = find(&bytes, b"4.1 1 8\n") + 8;
+        assert_eq!(refused(&replaced(&bytes, at, &[3]), "byte order").place, Place::Byte(at));
     }
     let bytes = device.bytes(Version::V2, Form::Little);
     let at = find(&bytes, b"$Elements\n") + b"$Elements\n".len();
     let at = at + bytes[at..].iter().position(|&b| b == b'\n').expect("a line") + 1;
     for (field, value) in [(0, 99), (1, 1_000_000), (1, -1), (2, -1), (2, 1_000_000)] {
-        let mut damaged = bytes.clone();
-        damaged[at + 4 * field..at + 4 * field + 4].copy_from_slice(&i32::to_le_bytes(value));
-        let error = refused(&damaged, "head");
+        let error = refused(&replaced(&bytes, at + 4 * field, &i32::to_le_bytes(value)), "head");
         assert!(
             matches!(error.place, Place::Byte(place) if place >= at && place <= at + 16),
             "{field} {value}: {error}"

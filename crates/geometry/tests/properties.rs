@@ -1,14 +1,12 @@
 //! Gmsh files by chance: any bytes behind a right header, sound files with random changes, and meshes that are written and
 //! read again.
 
-mod msh_support;
-
 use std::time::Duration;
 
+use crate::msh_support::{Device, Form, Random, Version, Writer, assert_same};
 use cpu_time::ThreadTime;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
 use fluxmorph_geometry::tet4::volume;
-use msh_support::{Device, Form, Random, Version, assert_same};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
@@ -140,7 +138,7 @@ proptest! {
         form in form(),
         pieces in vec(piece(), 0..40),
     ) {
-        let mut file = msh_support::Writer { bytes: Vec::new(), form };
+        let mut file = Writer { bytes: Vec::new(), form };
         file.header(version);
         file.bytes.extend(pieces.concat());
         read(&file.bytes);

@@ -4,14 +4,13 @@
 //! have refused; any answer in time will do. `fuzz/seeds/msh*` are sound files without their headers, as the targets of
 //! `fuzz/` take them: a seed that is refused leads a fuzzer nowhere.
 
-mod msh_support;
-
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::msh::CLUTTERED;
+use crate::msh_support::{Device, Form, Random, Version};
 use cpu_time::ThreadTime;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
-use msh_support::{Device, Form, Random, Version};
 
 /// Files of a folder below that of the crate, in the order of their names.
 fn files(folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
@@ -74,23 +73,12 @@ fn every_seed_of_the_fuzz_targets_is_a_mesh() {
     }
 }
 
-/// Two tetrahedra with nodes and elements of no use, parametric coordinates and all sections that are skipped.
-const CLUTTERED: &str = "$Comments\nanything\n$EndComments
-$PhysicalNames\n3\n1 9 \"edge\"\n2 4 \"top | side\"\n3 2 \"iron\"\n$EndPhysicalNames
-$Entities\n1 1 2 2\n1 0 0 0 0\n1 0 0 0 1 0 0 1 9 2 1 -1\n1 0 0 0 1 1 1 1 -4 1 1\n2 0 0 0 1 1 1 0 0
-1 0 0 0 1 1 1 1 -2 1 1\n2 0 0 0 1 1 1 1 5 0\n$EndEntities
-$Nodes\n2 7 1 20\n2 1 1 3\n1\n2\n3\n0 0 0 0.5 0.5\n1 0 0 0.5 0.5\n0 1 0 0.5 0.5\n3 1 0 4\n4\n5\n19\n20\n0 0 1
-0 0 -1\n7 7 7\n8 8 8\n$EndNodes
-$Elements\n6 8 1 8\n0 1 15 1\n1 1\n1 1 1 2\n2 1 2\n3 2 3\n2 1 2 2\n4 1 3 2\n5 1 3 19\n2 2 2 1\n6 1 2 4
-3 1 4 1\n7 1 2 3 4\n3 2 4 1\n8 1 2 3 5\n$EndElements
-$Periodic\n1\n0 1 1\n0\n1\n1 1\n$EndPeriodic\n";
-
 /// Two tetrahedra and a point in version 2.2, the second of second order.
 const QUADRATIC: &str = "$Nodes\n12\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 1 1 1\n6 0 0 0\n7 0 0 0\n8 0 0 0\n9 0 0 0
 10 0 0 0\n11 0 0 0\n12 3 3 3\n$EndNodes
 $Elements\n4\n1 15 2 0 1 12\n2 2 2 1 1 2 3 4\n3 4 4 1 1 1 7 1 2 3 4\n4 11 2 2 2 5 2 4 3 6 7 8 9 10 11\n$EndElements\n";
 
-/// Writes the seeds of meshes: `cargo test --release -p fluxmorph-geometry --test regressions -- --ignored`.
+/// Writes the seeds of meshes: `cargo test --release -p fluxmorph-geometry --test geometry -- --ignored write_the_seeds`.
 #[test]
 #[ignore = "writes fuzz/seeds"]
 fn write_the_seeds() {
@@ -133,6 +121,10 @@ fn write_the_seeds() {
         let own = msh_bytes(&mesh, 1.0, MshEncoding::Binary).expect("finite");
         write("msh41_binary", &format!("own{seed}"), &[b"l", &body(&own)[..]].concat());
     }
-    write("msh41_ascii", "cluttered", CLUTTERED.as_bytes());
+    write(
+        "msh41_ascii",
+        "cluttered",
+        CLUTTERED.split_once("$EndMeshFormat\n").expect("a header").1.as_bytes(),
+    );
     write("msh22", "quadratic", &[b"a", QUADRATIC.as_bytes()].concat());
 }

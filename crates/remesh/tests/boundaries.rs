@@ -1,13 +1,10 @@
 //! Who moves, slides and stays: on the shield in both models, and at the corners of the rules.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::{self, Point, hollow_shield, meshed_shield, nodes_where, unit_cells, whole};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, ElasticMap, RemeshError, RemeshSetup, StiffnessPolicy, Subregion,
 };
-use support::{Point, hollow_shield, meshed_shield, nodes_where, unit_cells, whole};
 
 const TIGHT: f64 = 1e-9;
 

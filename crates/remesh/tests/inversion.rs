@@ -1,14 +1,11 @@
 //! Step to inversion against closed forms and brute force, and the guard of a move.
-#![allow(missing_docs, clippy::unwrap_used)]
-
-mod support;
 
 use std::sync::Arc;
 
+use crate::support::{self, Point, random, unit_cells};
 use fluxmorph_geometry::tet4::volume;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology};
 use fluxmorph_remesh::{RemeshError, check_step, step_to_inversion};
-use support::{Point, random, unit_cells};
 
 fn unit_tet() -> Mesh {
     let tets = vec![[0, 1, 2, 3].map(NodeId)];
@@ -70,12 +67,11 @@ fn the_first_inversion_equals_a_brute_force_scan() {
 fn the_step_has_the_same_bits_for_any_number_of_threads() {
     let mesh = unit_cells([12, 12, 12]);
     let displacement = random(mesh.points().len(), 9);
-    let with_threads = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let found = pool.install(|| step_to_inversion(&mesh, &displacement));
+    let found = || {
+        let found = step_to_inversion(&mesh, &displacement);
         (found.step.to_bits(), found.element)
     };
-    assert_eq!(with_threads(1), with_threads(4));
+    assert_eq!(support::on_threads(1, found), support::on_threads(4, found));
     // Every tetrahedron of a regular grid inverts at once: the first is named.
     let flat: Vec<Point> = mesh.points().iter().map(|p| [0.0, 0.0, -2.0 * p[2]]).collect();
     assert_eq!(step_to_inversion(&mesh, &flat).element, Some(ElementId(0)));

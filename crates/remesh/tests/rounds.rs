@@ -1,11 +1,11 @@
 //! Motion over rounds: what a round reproduces, where a path ends, what is tried when it is closed.
-#![allow(missing_docs, clippy::unwrap_used)]
-
-mod support;
 
 use std::ops::ControlFlow::Continue;
 use std::path::Path;
 
+use crate::support::{
+    self, Point, at, largest_difference, nodes_where, on_threads, product, random, shaken, unit_cells, whole,
+};
 use fluxmorph_geometry::generate::{BlockParameters, SphereParameters, block, sphere};
 use fluxmorph_geometry::io::msh::read_msh_file;
 use fluxmorph_geometry::quality::qualities;
@@ -15,7 +15,6 @@ use fluxmorph_remesh::{
     Boundary, BoundaryKind, Fallback, FallbackLevel, FallbackReport, KinematicConstraint, Motion,
     RemeshSetup, StepEvent, StepLimits, StiffnessPolicy, Subregion,
 };
-use support::{Point, at, largest_difference, nodes_where, random, shaken, unit_cells, whole};
 
 /// Blocks, plain and distorted, the octant of a ball in its layers, and Gmsh meshes; scaled to about a metre, so that
 /// 1e-12 is rounding on all of them.
@@ -138,9 +137,6 @@ fn a_later_round_is_affine_about_its_reference_design_and_transposes_exactly() {
         let tenth: Vec<Point> = linear.iter().map(|u| u.map(|u| 0.1 * u)).collect();
         assert!(largest_difference(&step, &tenth) < 1e-14, "{policy:?}: the reference is 1, steps are 0.1");
         let y = random(step.len(), 4);
-        let product = |a: &[Point], b: &[Point]| -> f64 {
-            a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
-        };
         let (forward, transposed) = (product(&linear, &y), product(&x, &second.map().gradient(&y).unwrap()));
         assert!((forward - transposed).abs() <= 1e-12 * forward.abs().max(1.0), "{policy:?}");
     }
@@ -209,18 +205,15 @@ fn a_path_that_a_step_cannot_take_ends_on_its_displacement_with_every_element_wh
 }
 
 #[test]
-fn rounds_and_fallbacks_have_the_same_bits_for_any_number_of_threads() {
-    let bits = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| {
-            let motion = lined([8, 8, 8], StiffnessPolicy::Directional, [0.0; 3]);
-            let path = sinking(&motion, -6.4);
-            let outcome = motion.step_along(&path, &StepLimits::default(), &mut |_| Continue(())).unwrap();
-            assert!(outcome.fallbacks > 0);
-            outcome.moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
-        })
+fn rounds_and_remedies_have_the_same_bits_for_any_number_of_threads() {
+    let bits = || {
+        let motion = lined([8, 8, 8], StiffnessPolicy::Directional, [0.0; 3]);
+        let path = sinking(&motion, -6.4);
+        let travelled = motion.step_along(&path, &StepLimits::default(), &mut |_| Continue(())).unwrap();
+        assert!(travelled.fallbacks > 0);
+        travelled.moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
     };
-    assert_eq!(bits(1), bits(3));
+    assert_eq!(on_threads(1, bits), on_threads(3, bits));
 }
 
 #[test]

@@ -1,12 +1,9 @@
 //! What the stiffness policies leave of the shield's skin layers when its 10 mm become 30, 5, or the optimal frame.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::{self, Point, plate_columns};
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{ElasticMap, StiffnessPolicy, check_step, step_to_inversion};
-use support::{Point, plate_columns};
 
 const LAYERS: usize = 8;
 

@@ -1,16 +1,13 @@
 //! Smoothing of interior nodes: repair, untangling, and what it never does.
-#![allow(missing_docs, clippy::unwrap_used)]
-
-mod support;
 
 use std::sync::Arc;
 
+use crate::support::{self, Point, is_outer, painted, unit_cells};
 use cpu_time::ProcessTime;
 use fluxmorph_geometry::quality::quality;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 use fluxmorph_remesh::{RemeshError, Smoothed, SmoothingSettings, smooth, smooth_points};
 use proptest::prelude::*;
-use support::{Point, is_outer, painted, unit_cells};
 
 /// A Kuhn tetrahedron of a cube.
 const KUHN: f64 = 0.6568;
@@ -222,14 +219,11 @@ fn thin_layers_keep_their_thickness_against_a_reference() {
 fn smoothing_has_the_same_bits_for_any_number_of_threads() {
     let mesh = unit_cells([9, 9, 9]);
     let points = shaken_points(&mesh, 0.5, 11);
-    let with_threads = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let smoothed = pool
-            .install(|| smooth_points(mesh.topology(), &points, Some(&mesh), &all(&mesh), &to(0.5)))
-            .unwrap();
+    let result = || {
+        let smoothed = smooth_points(mesh.topology(), &points, Some(&mesh), &all(&mesh), &to(0.5)).unwrap();
         (bits(smoothed.mesh.points()), smoothed.measure_after.to_bits(), smoothed.sweeps)
     };
-    assert_eq!(with_threads(1), with_threads(2));
+    assert_eq!(support::on_threads(1, result), support::on_threads(2, result));
 }
 
 #[test]
@@ -285,7 +279,7 @@ proptest! {
     }
 }
 
-/// `cargo test --release -p fluxmorph-remesh --test smoothing -- --ignored --nocapture`
+/// `cargo test --release -p fluxmorph-remesh --test remesh cost -- --ignored --nocapture`
 #[test]
 #[ignore = "prints CPU times"]
 fn cost_of_a_large_block_with_one_poor_node_in_twenty() {

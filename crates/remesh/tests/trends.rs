@@ -1,15 +1,12 @@
 //! The trends of the paper's example 1: what Tables 1 and 2 say of parameters and region, on the boundary sets where it
 //! holds. Lengths are in edges of a cell; the paper's own set-up is not known (`docs/results.md`), so that no printed worst
 //! quality is asserted, only the numbers of equations.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
-
+use crate::support::{Point, largest_difference, nodes_where, unit_cells};
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{add, centroid};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{Boundary, BoundaryKind, ElasticMap, RemeshSetup, StiffnessPolicy, Subregion};
-use support::{Point, largest_difference, nodes_where, unit_cells};
 
 /// What the sides of the body do; its top is free and its bottom fixed.
 #[derive(Clone, Copy, Debug)]

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
+use crate::terminal;
 use fluxmorph_geometry::generate::{BlockParameters, block};
 use fluxmorph_geometry::tet4::{self, Point, dot, norm};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
@@ -51,10 +52,6 @@ fn ring(cells: [usize; 3]) -> Mesh {
     let regions = vec![RegionId(0); tets.len()];
     let topology = Topology::new(node_count, tets, vec!["ring".to_owned()], regions).expect("a ring");
     Mesh::new(Arc::new(topology), points).expect("a mesh")
-}
-
-fn terminal(mesh: &Mesh, name: &str) -> Terminal {
-    Terminal { name: name.to_owned(), triangles: mesh.topology().surface(name).expect("a face").to_vec() }
 }
 
 fn between(mesh: &Mesh, from: &str, to: &str) -> Result<RegionCurrent, SolverError> {

@@ -21,10 +21,7 @@ fn model(paint: [u32; 7], materials: Vec<Material>, boundaries: &[(&str, Boundar
     let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
     let setup = FieldModelSetup {
         frequency: 50.0,
-        penalty: 1.0,
         materials,
-        impedance_surfaces: Vec::new(),
-        coils: Vec::new(),
         boundaries: boundaries.iter().map(|(name, b)| ((*name).to_owned(), *b)).collect(),
         ..FieldModelSetup::default()
     };

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::{OUTSIDE, flux_parallel, on_threads};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::{Mesh, MeshError, RegionId};
@@ -10,9 +11,7 @@ use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{
     LinearSolver, LinearSolverCache, LinearSolverSettings, Method, Reuse, SolverEvent,
 };
-use fluxmorph_solver::{
-    Boundary, FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence, SolverError,
-};
+use fluxmorph_solver::{FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence, SolverError};
 
 const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
 
@@ -28,12 +27,11 @@ fn mesh() -> Mesh {
 fn setup(settings: LinearSolverSettings, ampere_turns: c64, plate: Material) -> FieldModelSetup {
     let shape = Racetrack::new([0.03, 0.03, 0.06], 2, [0.008, 0.008], 0.01, 0.01, Corner::Mitred)
         .expect("a racetrack inside the mesh");
-    let planes = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"];
     FieldModelSetup {
         frequency: 50.0,
         materials: vec![Material::AIR, plate],
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns, shape: shape.into() }],
-        boundaries: planes.map(|name| (name.to_owned(), Boundary::FluxParallel)).to_vec(),
+        boundaries: flux_parallel(&OUTSIDE),
         linear_solver: settings,
         ..FieldModelSetup::default()
     }
@@ -80,23 +78,15 @@ fn no_method_factors(damage: impl Fn(CsrMatrix<c64>) -> CsrMatrix<c64>) -> Vec<S
 }
 
 #[test]
-fn a_diagonal_that_is_no_number_is_named_by_every_method() {
-    for cause in no_method_factors(|matrix| with_diagonal(matrix, c64::new(f64::NAN, 0.0))) {
-        assert!(cause.contains("diagonal entry of unknown") && cause.contains("NaN"), "{cause}");
-    }
-}
-
-#[test]
-fn an_infinite_diagonal_is_named_by_every_method() {
-    for cause in no_method_factors(|matrix| with_diagonal(matrix, c64::new(0.0, f64::INFINITY))) {
-        assert!(cause.contains("diagonal entry of unknown") && cause.contains("inf"), "{cause}");
-    }
-}
-
-#[test]
-fn a_vanishing_diagonal_is_named_by_every_method() {
-    for cause in no_method_factors(|matrix| with_diagonal(matrix, c64::default())) {
-        assert!(cause.contains("is 0, not positive"), "{cause}");
+fn a_diagonal_that_vanishes_or_is_no_number_is_named_by_every_method() {
+    for (value, parts) in [
+        (c64::new(f64::NAN, 0.0), ["diagonal entry of unknown", "NaN"]),
+        (c64::new(0.0, f64::INFINITY), ["diagonal entry of unknown", "inf"]),
+        (c64::default(), ["is 0, not positive"; 2]),
+    ] {
+        for cause in no_method_factors(|matrix| with_diagonal(matrix, value)) {
+            assert!(parts.iter().all(|part| cause.contains(part)), "{cause}");
+        }
     }
 }
 
@@ -366,13 +356,18 @@ fn material_data_out_of_range_are_refused_by_name() {
     }
 }
 
+/// What a first solution leaves for the next.
+fn memory_of_a_solution(mesh: &Mesh, model: &FieldModel) -> LinearSolverCache {
+    let mut first =
+        model.prepare_with(model.assemble(mesh), &mut LinearSolverCache::default()).expect("a factor");
+    first.solve(&model.load(mesh)).expect("a solution");
+    first.into_cache()
+}
+
 #[test]
 fn an_earlier_factor_is_replaced_where_the_matrix_has_changed_beyond_use() {
     let (mesh, model) = model(fixed(Method::DirectSingle));
-    let mut memory = LinearSolverCache::default();
-    let mut first = model.prepare_with(model.assemble(&mesh), &mut memory).expect("a factor");
-    first.solve(&model.load(&mesh)).expect("a solution");
-    memory = first.into_cache();
+    let mut memory = memory_of_a_solution(&mesh, &model);
     // A diagonal that grows by up to ten digits from one end to the other: the earlier factor is far from it.
     let mut matrix = model.assemble(&mesh);
     let n = matrix.structure.row_count();
@@ -388,10 +383,7 @@ fn an_earlier_factor_is_replaced_where_the_matrix_has_changed_beyond_use() {
 #[test]
 fn an_earlier_factor_does_not_hide_a_matrix_that_is_no_number() {
     let (mesh, model) = model(fixed(Method::Direct));
-    let mut memory = LinearSolverCache::default();
-    let mut first = model.prepare_with(model.assemble(&mesh), &mut memory).expect("a factor");
-    first.solve(&model.load(&mesh)).expect("a solution");
-    memory = first.into_cache();
+    let mut memory = memory_of_a_solution(&mesh, &model);
     let damaged = with_diagonal(model.assemble(&mesh), c64::new(f64::NAN, 0.0));
     let mut system = model.prepare_with(damaged, &mut memory).expect("the earlier factor is at hand");
     let error = system.solve(&model.load(&mesh)).expect_err("no number");
@@ -404,20 +396,14 @@ fn an_earlier_factor_does_not_hide_a_matrix_that_is_no_number() {
 
 #[test]
 fn a_fall_back_has_the_same_bits_for_any_number_of_threads() {
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let settings = LinearSolverSettings {
-                max_iterations: Some(1),
-                reuse: Reuse::Never,
-                ..fixed(Method::Incomplete)
-            };
-            let (mesh, model) = model(settings);
-            let (state, system) = model.solve(&mesh).expect("the last of the ladder");
-            (state.values().to_vec(), system.events().to_vec())
-        })
+    let cut_short =
+        LinearSolverSettings { max_iterations: Some(1), reuse: Reuse::Never, ..fixed(Method::Incomplete) };
+    let result = || {
+        let (mesh, model) = model(cut_short);
+        let (state, system) = model.solve(&mesh).expect("the last of the ladder");
+        (state.values().to_vec(), system.events().to_vec())
     };
-    let one = on(1);
+    let one = on_threads(1, result);
     assert!(!one.1.is_empty());
-    assert!(on(2) == one && on(4) == one);
+    assert!(on_threads(2, result) == one && on_threads(4, result) == one);
 }

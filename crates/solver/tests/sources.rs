@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use crate::{OUTSIDE, flux_parallel, terminal};
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{
     Coil, CoilShape, Condition, ConditionedSurface, Corner, Path, PlaneFault, Racetrack, RegionCurrent,
-    SourceTerms, Terminal, planes,
+    SourceTerms, planes,
 };
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, SolverError};
@@ -18,15 +19,12 @@ fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
         ShieldParameters { refinement: 0.25, skin: vec![], side_skin: vec![], ..ShieldParameters::default() };
     let mesh = shield(&parameters)?;
     let shape = Racetrack::new([0.0, 0.0, centre_z], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred)?;
-    let mut boundaries = ["x_max", "y_min", "y_max", "z_min", "z_max"]
-        .map(|s| (s.to_owned(), Boundary::FluxParallel))
-        .to_vec();
+    let mut boundaries = flux_parallel(&OUTSIDE[1..]);
     boundaries.push(("x_min".to_owned(), x_min));
     let setup = FieldModelSetup {
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR; mesh.topology().region_names().len()],
-        impedance_surfaces: Vec::new(),
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1.0, 0.0), shape: shape.into() }],
         boundaries,
         ..FieldModelSetup::default()
@@ -63,8 +61,7 @@ fn quarter_of_a_square_coil() -> Mesh {
         lines.extend((1..=4).map(|i| fine + (outer - fine) * f64::from(i * i) / 16.0));
         lines
     };
-    let height: Vec<f64> = lines(0.06, 0.2).into_iter().collect();
-    let grid = Grid::new("grid", [lines(0.06, 0.2), lines(0.06, 0.2), height]).expect("a grid");
+    let grid = Grid::new("grid", [(); 3].map(|()| lines(0.06, 0.2))).expect("a grid");
     // Window 40 mm, width 20 mm, half height 10 mm.
     let winding = |[x, y, z]: [f64; 3]| z < 0.01 && x.max(y) > 0.04 && x.max(y) < 0.06;
     let topology = grid.topology(&["air", "winding"], |x| RegionId(u32::from(winding(x)))).expect("regions");
@@ -72,15 +69,12 @@ fn quarter_of_a_square_coil() -> Mesh {
 }
 
 fn solved(mesh: &Mesh, shape: CoilShape, ampere_turns: c64) -> Result<[c64; 3], SolverError> {
-    let mut boundaries = ["x_min", "x_max", "y_min", "y_max", "z_max"]
-        .map(|s| (s.to_owned(), Boundary::FluxParallel))
-        .to_vec();
+    let mut boundaries = flux_parallel(&["x_min", "x_max", "y_min", "y_max", "z_max"]);
     boundaries.push(("z_min".to_owned(), Boundary::FluxNormal));
     let setup = FieldModelSetup {
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR; 2],
-        impedance_surfaces: Vec::new(),
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns, shape }],
         boundaries,
         ..FieldModelSetup::default()
@@ -97,13 +91,9 @@ fn a_coil_region_makes_the_field_of_the_analytic_coil() {
     let analytic = solved(&mesh, racetrack.into(), c64::from(1000.0)).expect("a field");
 
     let region = mesh.topology().region("winding").expect("a region");
-    let terminal = |name: &str| Terminal {
-        name: name.to_owned(),
-        triangles: mesh.topology().surface(name).expect("a surface").to_vec(),
-    };
     // Anticlockwise about z: from the positive x axis (on y = 0) to the positive y axis. The upper half of the coil
     // carries half of the ampere-turns.
-    let path = Path::Terminals { from: terminal("y_min"), to: terminal("x_min") };
+    let path = Path::Terminals { from: terminal(&mesh, "y_min"), to: terminal(&mesh, "x_min") };
     let elements = mesh.topology().elements_of(region);
     let current = RegionCurrent::new(&mesh, "coil", &elements, &path).expect("a coil");
     println!("quarter of a square coil: {}", current.report());
@@ -118,11 +108,7 @@ fn a_coil_region_makes_the_field_of_the_analytic_coil() {
 fn the_terminals_of_a_region_lie_on_flux_parallel_surfaces() {
     let mesh = quarter_of_a_square_coil();
     let elements: Vec<_> = mesh.topology().elements_of(mesh.topology().region("winding").expect("a region"));
-    let terminal = |name: &str| Terminal {
-        name: name.to_owned(),
-        triangles: mesh.topology().surface(name).expect("a surface").to_vec(),
-    };
-    let path = Path::Terminals { from: terminal("x_min"), to: terminal("y_min") };
+    let path = Path::Terminals { from: terminal(&mesh, "x_min"), to: terminal(&mesh, "y_min") };
     let current = RegionCurrent::new(&mesh, "coil", &elements, &path).expect("a coil");
     let surface = |name, condition| ConditionedSurface {
         name,

@@ -1,11 +1,12 @@
 //! The two-level preconditioner on skin-graded meshes of the shield: its iterations hardly grow, its bits do not depend on the threads.
 
+use crate::{OUTSIDE, flux_parallel, on_threads};
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{FieldModel, FieldModelSetup, Material, Order};
 
 /// The shipped shield, coarser.
 fn mesh(refinement: f64) -> Mesh {
@@ -32,9 +33,7 @@ fn model(mesh: &Mesh, order: Order) -> FieldModel {
         linear_solver: LinearSolverSettings { method, ..LinearSolverSettings::default() },
         materials: names.iter().map(|name| if name == "plate" { steel } else { Material::AIR }).collect(),
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(40e3, 0.0), shape: shape.into() }],
-        boundaries: ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
-            .map(|surface| (surface.to_owned(), Boundary::FluxParallel))
-            .to_vec(),
+        boundaries: flux_parallel(&OUTSIDE),
         ..FieldModelSetup::default()
     };
     FieldModel::new(mesh, setup).expect("a sound problem")
@@ -79,11 +78,8 @@ fn the_iterations_of_quadratic_elements_hardly_grow_with_the_mesh() {
 #[test]
 fn the_bits_do_not_depend_on_the_threads() {
     let mesh = mesh(0.25);
-    let on = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| model(&mesh, Order::Linear).solve(&mesh).expect("it converges").0.values().to_vec())
-    };
-    let one = on(1);
-    assert_eq!(on(2), one);
-    assert_eq!(on(4), one);
+    let values = || model(&mesh, Order::Linear).solve(&mesh).expect("it converges").0.values().to_vec();
+    let one = on_threads(1, values);
+    assert_eq!(on_threads(2, values), one);
+    assert_eq!(on_threads(4, values), one);
 }

@@ -10,9 +10,9 @@ mod text;
 use std::io::Write;
 
 use super::args::{CheckArgs, Progress};
-use crate::exit_code::ExitCode;
 use super::{stdout, with_threads};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::observer::{Bar, Observer, Paint, Silent};
 
 /// Set the problem up and print what it is, as a table or JSON.

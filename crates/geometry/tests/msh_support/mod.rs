@@ -199,10 +199,8 @@ impl Device {
 
     fn version2(&self, out: &mut Writer) {
         out.line(&format!("$Nodes\n{}", self.nodes.len()));
-        for &(tag, x) in &self.nodes {
-            out.int(tag as i32);
-            x.into_iter().for_each(|x| out.real(x));
-            out.end();
+        for (tag, x) in &self.nodes {
+            out.ints(&[*tag as i32]).reals(x).end();
         }
         out.end_section("Nodes");
         let elements: Vec<(u64, i32, Vec<u64>, i32)> = self
@@ -214,16 +212,16 @@ impl Device {
         out.line(&format!("$Elements\n{}", elements.len()));
         for block in elements.chunk_by(|a, b| a.1 == b.1) {
             if out.form != Form::Ascii {
-                [block[0].1, block.len() as i32, 2].into_iter().for_each(|n| out.int(n));
+                out.ints(&[block[0].1, block.len() as i32, 2]);
             }
             for (tag, code, nodes, group) in block {
-                out.int(*tag as i32);
+                out.ints(&[*tag as i32]);
                 if out.form == Form::Ascii {
-                    [*code, 2].into_iter().for_each(|n| out.int(n));
+                    out.ints(&[*code, 2]);
                 }
-                [*group, *group].into_iter().for_each(|n| out.int(n));
-                nodes.iter().for_each(|&n| out.int(n as i32));
-                out.end();
+                out.ints(&[*group, *group]);
+                let nodes: Vec<i32> = nodes.iter().map(|&n| n as i32).collect();
+                out.ints(&nodes).end();
             }
         }
         out.end_section("Elements");
@@ -237,63 +235,35 @@ impl Device {
         volumes.sort_unstable();
         volumes.dedup();
         out.line("$Entities");
-        [1, 0, surfaces.len(), volumes.len()].into_iter().for_each(|n| out.size(n as u64));
-        out.end();
-        out.int(1);
-        [0.0; 3].into_iter().for_each(|x| out.real(x));
-        out.size(0);
-        out.end();
+        out.sizes(&[1, 0, surfaces.len() as u64, volumes.len() as u64]).end();
+        out.ints(&[1]).reals(&[0.0; 3]).sizes(&[0]).end();
         let groups = surfaces.iter().cloned().chain(volumes.iter().map(|&group| vec![group]));
         for (i, groups) in groups.enumerate() {
-            out.int(if i < surfaces.len() { i + 1 } else { i - surfaces.len() + 1 } as i32);
-            [0.0; 6].into_iter().for_each(|x| out.real(x));
-            out.size(groups.len() as u64);
-            groups.iter().for_each(|&group| out.int(group));
-            out.size(0);
-            out.end();
+            out.ints(&[if i < surfaces.len() { i + 1 } else { i - surfaces.len() + 1 } as i32]);
+            out.reals(&[0.0; 6]).sizes(&[groups.len() as u64]).ints(&groups).sizes(&[0]).end();
         }
         out.end_section("Entities");
         out.line("$Nodes");
         let half = self.nodes.len() / 2;
-        [2, self.nodes.len(), 1, 9].into_iter().for_each(|n| out.size(n as u64));
-        out.end();
+        out.sizes(&[2, self.nodes.len() as u64, 1, 9]).end();
         for (dimension, nodes) in [(2, &self.nodes[..half]), (3, &self.nodes[half..])] {
-            [dimension, 1, 0].into_iter().for_each(|n| out.int(n));
-            out.size(nodes.len() as u64);
-            out.end();
-            for &(tag, _) in nodes {
-                out.size(tag);
-                out.end();
-            }
-            for &(_, x) in nodes {
-                x.into_iter().for_each(|x| out.real(x));
-                out.end();
-            }
+            out.ints(&[dimension, 1, 0]).sizes(&[nodes.len() as u64]).end();
+            nodes.iter().for_each(|(tag, _)| out.sizes(&[*tag]).end());
+            nodes.iter().for_each(|(_, x)| out.reals(x).end());
         }
         out.end_section("Nodes");
         out.line("$Elements");
         let count = self.tets.len() + self.triangles.len();
-        [surfaces.len() + volumes.len(), count, 1, 9].into_iter().for_each(|n| out.size(n as u64));
-        out.end();
+        out.sizes(&[(surfaces.len() + volumes.len()) as u64, count as u64, 1, 9]).end();
         for (i, groups) in surfaces.iter().enumerate() {
             let of: Vec<_> = self.triangles.iter().filter(|t| t.2 == *groups).collect();
-            [2, i as i32 + 1, 2].into_iter().for_each(|n| out.int(n));
-            out.size(of.len() as u64);
-            out.end();
-            for (tag, nodes, _) in of {
-                std::iter::once(tag).chain(nodes).for_each(|&n| out.size(n));
-                out.end();
-            }
+            out.ints(&[2, i as i32 + 1, 2]).sizes(&[of.len() as u64]).end();
+            of.into_iter().for_each(|(tag, nodes, _)| out.sizes(&[*tag]).sizes(nodes).end());
         }
         for (i, group) in volumes.iter().enumerate() {
             let of: Vec<_> = self.tets.iter().filter(|t| t.2 == *group).collect();
-            [3, i as i32 + 1, 4].into_iter().for_each(|n| out.int(n));
-            out.size(of.len() as u64);
-            out.end();
-            for (tag, nodes, _) in of {
-                std::iter::once(tag).chain(nodes).for_each(|&n| out.size(n));
-                out.end();
-            }
+            out.ints(&[3, i as i32 + 1, 4]).sizes(&[of.len() as u64]).end();
+            of.into_iter().for_each(|(tag, nodes, _)| out.sizes(&[*tag]).sizes(nodes).end());
         }
         out.end_section("Elements");
     }
@@ -315,7 +285,7 @@ impl Writer {
         let version = if version == Version::V2 { "2.2" } else { "4.1" };
         self.line(&format!("$MeshFormat\n{version} {} 8", u8::from(self.form != Form::Ascii)));
         if self.form != Form::Ascii {
-            self.int(1);
+            self.ints(&[1]);
         }
         self.end_section("MeshFormat");
     }
@@ -328,16 +298,19 @@ impl Writer {
         }
     }
 
-    pub(crate) fn int(&mut self, value: i32) {
-        self.number(value.to_string(), value.to_le_bytes());
+    pub(crate) fn ints(&mut self, values: &[i32]) -> &mut Self {
+        values.iter().for_each(|n| self.number(n.to_string(), n.to_le_bytes()));
+        self
     }
 
-    pub(crate) fn size(&mut self, value: u64) {
-        self.number(value.to_string(), value.to_le_bytes());
+    pub(crate) fn sizes(&mut self, values: &[u64]) -> &mut Self {
+        values.iter().for_each(|n| self.number(n.to_string(), n.to_le_bytes()));
+        self
     }
 
-    pub(crate) fn real(&mut self, value: f64) {
-        self.number(format!("{value:e}"), value.to_le_bytes());
+    pub(crate) fn reals(&mut self, values: &[f64]) -> &mut Self {
+        values.iter().for_each(|x| self.number(format!("{x:e}"), x.to_le_bytes()));
+        self
     }
 
     pub(crate) fn end(&mut self) {

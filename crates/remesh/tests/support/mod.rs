@@ -1,5 +1,4 @@
 //! Meshes and vectors for the tests of this crate.
-#![allow(dead_code, unreachable_pub)]
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,15 +10,15 @@ use fluxmorph_remesh::{
     Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, StiffnessPolicy, Subregion,
 };
 
-pub type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
 /// A block of unit cells.
-pub fn unit_cells(cells: [usize; 3]) -> Mesh {
+pub(crate) fn unit_cells(cells: [usize; 3]) -> Mesh {
     block(&BlockParameters { size: cells.map(|n| n as f64), cells }).expect("a block")
 }
 
 /// The same mesh and outer surfaces with other regions, asked for at the centroid of each element.
-pub fn painted(mesh: &Mesh, names: &[&str], region: impl Fn(Point) -> u32) -> Mesh {
+pub(crate) fn painted(mesh: &Mesh, names: &[&str], region: impl Fn(Point) -> u32) -> Mesh {
     let old = mesh.topology();
     let region_of = old.elements().map(|e| RegionId(region(centroid(mesh.vertices(e))))).collect();
     let names = names.iter().map(|n| (*n).to_owned()).collect();
@@ -33,7 +32,7 @@ pub fn painted(mesh: &Mesh, names: &[&str], region: impl Fn(Point) -> u32) -> Me
 }
 
 /// The mesh with its interior nodes displaced by up to `amplitude` [m]; pseudo-random but always the same.
-pub fn shaken(mesh: &Mesh, amplitude: f64) -> Mesh {
+pub(crate) fn shaken(mesh: &Mesh, amplitude: f64) -> Mesh {
     let mut noise = noise(7);
     let shift = |n: NodeId| {
         let scale = if is_outer(mesh, n) { 0.0 } else { amplitude };
@@ -44,34 +43,34 @@ pub fn shaken(mesh: &Mesh, amplitude: f64) -> Mesh {
 }
 
 /// Whether a node lies on the bounding box.
-pub fn is_outer(mesh: &Mesh, node: NodeId) -> bool {
+pub(crate) fn is_outer(mesh: &Mesh, node: NodeId) -> bool {
     let ([low, high], p) = (mesh.bounding_box(), mesh.point(node));
     (0..3).any(|d| p[d] == low[d] || p[d] == high[d])
 }
 
 /// Nodes at which a condition holds, ascending.
-pub fn nodes_where(mesh: &Mesh, on: impl Fn(Point) -> bool) -> Vec<NodeId> {
+pub(crate) fn nodes_where(mesh: &Mesh, on: impl Fn(Point) -> bool) -> Vec<NodeId> {
     mesh.topology().nodes().filter(|&n| on(mesh.point(n))).collect()
 }
 
 /// A set-up in which the whole outer boundary of the mesh is designed and every element is remeshed.
-pub fn outer_design(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> RemeshSetup {
+pub(crate) fn outer_design(mesh: &Mesh, subregions: Vec<Subregion>, policy: StiffnessPolicy) -> RemeshSetup {
     let design_nodes = mesh.topology().nodes().filter(|&n| is_outer(mesh, n)).collect();
     RemeshSetup { subregions, policy, design_nodes, ..RemeshSetup::default() }
 }
 
 /// All elements in one subregion.
-pub fn whole(mesh: &Mesh) -> Vec<Subregion> {
+pub(crate) fn whole(mesh: &Mesh) -> Vec<Subregion> {
     vec![Subregion::new("all", mesh.topology().elements().collect())]
 }
 
 /// `motion` at some nodes.
-pub fn at(mesh: &Mesh, nodes: &[NodeId], motion: impl Fn(Point) -> Point) -> Vec<Point> {
+pub(crate) fn at(mesh: &Mesh, nodes: &[NodeId], motion: impl Fn(Point) -> Point) -> Vec<Point> {
     nodes.iter().map(|&n| motion(mesh.point(n))).collect()
 }
 
 /// Rotation by `angle` [rad] about an oblique axis through an oblique point, as a displacement (Rodrigues).
-pub fn rotation(angle: f64) -> impl Fn(Point) -> Point {
+pub(crate) fn rotation(angle: f64) -> impl Fn(Point) -> Point {
     let axis = [2.0 / 7.0, -3.0 / 7.0, 6.0 / 7.0];
     move |x| {
         let r = [x[0] - 0.3, x[1] - 0.1, x[2] + 0.2];
@@ -81,8 +80,18 @@ pub fn rotation(angle: f64) -> impl Fn(Point) -> Point {
     }
 }
 
+/// `Σ a · b`.
+pub(crate) fn product(a: &[Point], b: &[Point]) -> f64 {
+    a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| a * b).sum()
+}
+
+/// What `run` yields in a pool of so many threads.
+pub(crate) fn on_threads<R: Send>(threads: usize, run: impl FnOnce() -> R + Send) -> R {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run)
+}
+
 /// Numbers in −1 … 1 from a linear congruential generator.
-pub fn noise(seed: u64) -> impl FnMut() -> f64 {
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -91,30 +100,30 @@ pub fn noise(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// `n` pseudo-random vectors.
-pub fn random(n: usize, seed: u64) -> Vec<Point> {
+pub(crate) fn random(n: usize, seed: u64) -> Vec<Point> {
     let mut noise = noise(seed);
     (0..n).map(|_| std::array::from_fn(|_| noise())).collect()
 }
 
-pub fn largest_difference(a: &[Point], b: &[Point]) -> f64 {
+pub(crate) fn largest_difference(a: &[Point], b: &[Point]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter().flatten().zip(b.iter().flatten()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
 }
 
 /// The shield of the paper's example 2 with its plate meshed: 12k nodes, eight plate layers.
-pub fn meshed_shield() -> Mesh {
+pub(crate) fn meshed_shield() -> Mesh {
     shield(&ShieldParameters::default()).expect("the default is valid")
 }
 
 /// The shield without its plate, as for the impedance model.
-pub fn hollow_shield() -> Mesh {
+pub(crate) fn hollow_shield() -> Mesh {
     let solid = ShieldParameters { skin: Vec::new(), side_skin: Vec::new(), ..ShieldParameters::default() };
     let mesh = shield(&solid).expect("valid");
     mesh.without_region(mesh.topology().region("plate").expect("it is there")).expect("a region may go").0
 }
 
 /// Nodes of the shield's design surface, ascending.
-pub fn plate_bottom(mesh: &Mesh) -> Vec<NodeId> {
+pub(crate) fn plate_bottom(mesh: &Mesh) -> Vec<NodeId> {
     let mut nodes = mesh.topology().surface("plate_bottom").expect("a surface").concat();
     nodes.sort_unstable();
     nodes.dedup();
@@ -122,7 +131,12 @@ pub fn plate_bottom(mesh: &Mesh) -> Vec<NodeId> {
 }
 
 /// The shield's set-up: sliding symmetry planes and plate sides, the plate's lower face designed.
-pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, poisson: f64) -> RemeshSetup {
+pub(crate) fn shield_setup(
+    mesh: &Mesh,
+    regions: &[&str],
+    policy: StiffnessPolicy,
+    poisson: f64,
+) -> RemeshSetup {
     let topology = mesh.topology();
     let subregion = |r: &&str| Subregion { poisson, ..Subregion::of_region(topology, r).expect("a region") };
     let slide = |s| Boundary::of_surface(topology, s, BoundaryKind::Slide).expect("a surface");
@@ -137,7 +151,7 @@ pub fn shield_setup(mesh: &Mesh, regions: &[&str], policy: StiffnessPolicy, pois
 }
 
 /// Nodes of each grid column of the plate, bottom to top.
-pub fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
+pub(crate) fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
     let mut columns = BTreeMap::<(u64, u64), Vec<NodeId>>::new();
     let plate = mesh.topology().region("plate").expect("a shield");
     let mut nodes: Vec<NodeId> =

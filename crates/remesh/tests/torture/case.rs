@@ -9,42 +9,42 @@ use fluxmorph_remesh::{Motion, RemeshSetup, StepEvent, StepLimits, SteppingOutco
 use crate::support::Point;
 
 /// A mesh, its elastic body, and where the design nodes go.
-pub struct Case {
-    pub name: String,
-    pub mesh: Mesh,
+pub(crate) struct Case {
+    pub(crate) name: String,
+    pub(crate) mesh: Mesh,
     /// The policy in it is replaced by that of the measurement.
-    pub setup: RemeshSetup,
+    pub(crate) setup: RemeshSetup,
     /// Displacement of the design nodes [m] over the path `0 ≤ t ≤ 1`.
-    pub path: Path,
+    pub(crate) path: Path,
 }
 
-pub type Path = Box<dyn Fn(f64) -> Vec<Point> + Sync>;
+pub(crate) type Path = Box<dyn Fn(f64) -> Vec<Point> + Sync>;
 
 /// What one policy makes of a case.
-pub struct Outcome {
-    pub policy: StiffnessPolicy,
+pub(crate) struct Outcome {
+    pub(crate) policy: StiffnessPolicy,
     /// Worst quality (Eq. 4) of the body before the motion.
-    pub start: f64,
+    pub(crate) start: f64,
     /// The whole motion in one linear step.
-    pub single: SingleStep,
+    pub(crate) single: SingleStep,
     /// The motion in rounds.
-    pub outcome: SteppingOutcome,
+    pub(crate) travelled: SteppingOutcome,
     /// Worst quality of the body after them.
-    pub worst: f64,
-    pub events: Vec<StepEvent>,
+    pub(crate) worst: f64,
+    pub(crate) events: Vec<StepEvent>,
 }
 
 /// The whole motion in one linear step, inverted or not.
-pub struct SingleStep {
-    pub worst: f64,
-    pub inverted: usize,
+pub(crate) struct SingleStep {
+    pub(crate) worst: f64,
+    pub(crate) inverted: usize,
     /// Step to inversion.
-    pub step: f64,
+    pub(crate) step: f64,
 }
 
 impl Case {
     /// A case in which each design node moves as a function of the path's parameter and its own first place.
-    pub fn new(
+    pub(crate) fn new(
         name: &str,
         mesh: Mesh,
         setup: RemeshSetup,
@@ -55,11 +55,11 @@ impl Case {
         Self { name: name.to_owned(), mesh, setup, path }
     }
 
-    pub fn motion(&self, policy: StiffnessPolicy) -> Motion {
+    pub(crate) fn motion(&self, policy: StiffnessPolicy) -> Motion {
         Motion::new(self.mesh.clone(), RemeshSetup { policy, ..self.setup.clone() }).expect("a sound case")
     }
 
-    pub fn single_step(&self, motion: &Motion) -> SingleStep {
+    pub(crate) fn single_step(&self, motion: &Motion) -> SingleStep {
         let step = motion.step(&(self.path)(1.0)).expect("a direct solve");
         let moved = |n: NodeId| {
             let (p, u) = (self.mesh.point(n), step[n.index()]);
@@ -75,7 +75,7 @@ impl Case {
         SingleStep { worst, inverted, step: motion.inversion(&step).step }
     }
 
-    pub fn outcome(&self, policy: StiffnessPolicy, limits: &StepLimits) -> Outcome {
+    pub(crate) fn outcome(&self, policy: StiffnessPolicy, limits: &StepLimits) -> Outcome {
         let motion = self.motion(policy);
         let single = self.single_step(&motion);
         let start = motion.quality(&self.mesh).worst;
@@ -87,13 +87,13 @@ impl Case {
             })
             .expect("a direct solve");
         let worst = outcome.motion.quality(&outcome.moved.mesh).worst;
-        Outcome { policy, start, single, outcome, worst, events }
+        Outcome { policy, start, single, travelled: outcome, worst, events }
     }
 }
 
 impl Outcome {
     /// Share of the way to the first inversion that each round used.
-    pub fn shares(&self) -> Vec<f64> {
+    pub(crate) fn shares(&self) -> Vec<f64> {
         let share = |event: &StepEvent| match event {
             StepEvent::Stepped { share, .. } => Some(*share),
             StepEvent::FellBack { .. } => None,

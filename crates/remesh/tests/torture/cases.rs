@@ -8,12 +8,12 @@ use fluxmorph_geometry::io::msh::read_msh_file;
 use fluxmorph_geometry::tet4::{add, cross, sub};
 use fluxmorph_remesh::{Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, Subregion};
 
-use crate::case::Case;
+use super::case::Case;
 use crate::support::{Point, nodes_where, plate_bottom, shield_setup, whole};
 
 /// The middle line of a block's top face moves by a share of the block's edge, upwards if positive. The bottom is fixed,
 /// the sides slide, the rest of the top is free.
-pub fn block_line(share: f64) -> Case {
+pub(crate) fn block_line(share: f64) -> Case {
     let parameters = BlockParameters::default();
     let mesh = block(&parameters).expect("the default block");
     let [_, width, height] = parameters.size;
@@ -33,7 +33,7 @@ pub fn block_line(share: f64) -> Case {
 }
 
 /// A mesh of `configs/meshes`, in millimetres.
-pub fn shipped(file: &str) -> Mesh {
+pub(crate) fn shipped(file: &str) -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/meshes").join(file);
     read_msh_file(&path, 1e-3).expect("a shipped mesh").mesh
 }
@@ -53,7 +53,7 @@ fn surface_setup(mesh: &Mesh, surface: &str) -> RemeshSetup {
 }
 
 /// A ball inside a box grows to 2.5 times its radius; the box, of half size 4 r, stays.
-pub fn growing_ball() -> Case {
+pub(crate) fn growing_ball() -> Case {
     let mesh = shipped("ball.msh");
     let setup = surface_setup(&mesh, "ball_surface");
     Case::new("ball growing to 2.5 r", mesh, setup, |t, p| p.map(|c| 1.5 * t * c))
@@ -71,13 +71,13 @@ fn rotor(name: &str, axis: Point, gap: f64) -> Case {
     })
 }
 
-pub fn rotor_about_own_axis() -> Case {
+pub(crate) fn rotor_about_own_axis() -> Case {
     let [half, radius, _] = ROTOR;
     rotor("cylinder +80 % of its gap, 45° about its axis", [0.0, 0.0, 1.0], half - radius)
 }
 
 /// Turned about y, the cylinder reaches further along x: the gap is what it then leaves.
-pub fn rotor_about_cross_axis() -> Case {
+pub(crate) fn rotor_about_cross_axis() -> Case {
     let [half, radius, half_length] = ROTOR;
     let reach = (radius + half_length) * std::f64::consts::FRAC_1_SQRT_2;
     rotor("cylinder +80 % of its gap, 45° across its axis", [0.0, 1.0, 0.0], half - reach)
@@ -91,7 +91,7 @@ fn turned(p: Point, axis: Point, angle: f64) -> Point {
 }
 
 /// The plate of configs/shield.toml.
-pub fn shield_parameters() -> ShieldParameters {
+pub(crate) fn shield_parameters() -> ShieldParameters {
     ShieldParameters {
         skin: vec![0.3e-3, 0.8e-3, 1.6e-3, 3e-3, 5e-3],
         side_skin: vec![0.5e-3, 1.5e-3, 4e-3, 10e-3],
@@ -105,7 +105,10 @@ pub fn shield_parameters() -> ShieldParameters {
 const THICKNESS: [f64; 2] = [-5e-3, 20e-3];
 
 /// Control points at the 20 mm pitch alternate between the bounds, bilinear between them: 5 and 30 mm.
-pub fn alternating_control_points(p: &ShieldParameters, kinematic_constraint: KinematicConstraint) -> Case {
+pub(crate) fn alternating_control_points(
+    p: &ShieldParameters,
+    kinematic_constraint: KinematicConstraint,
+) -> Case {
     let pitch = p.pitch;
     let last = [0, 1].map(|d| (p.plate[d] / pitch).round() as usize - 1);
     let thickened = move |x: Point| {
@@ -118,7 +121,7 @@ pub fn alternating_control_points(p: &ShieldParameters, kinematic_constraint: Ki
 }
 
 /// Every node of the surface alternates with its neighbours along both grid lines.
-pub fn alternating_nodes(p: &ShieldParameters, kinematic_constraint: KinematicConstraint) -> Case {
+pub(crate) fn alternating_nodes(p: &ShieldParameters, kinematic_constraint: KinematicConstraint) -> Case {
     let mesh = shield(p).expect("valid parameters");
     let lines: [Vec<f64>; 2] = [0, 1].map(|d| {
         let mut lines: Vec<f64> = plate_bottom(&mesh).iter().map(|&n| mesh.point(n)[d]).collect();

@@ -6,9 +6,9 @@ use std::path::Path;
 use fluxmorph_geometry::generate::ShieldParameters;
 use fluxmorph_remesh::{KinematicConstraint, StiffnessPolicy};
 
-use crate::case::{Case, Outcome};
-use crate::skin::{self, Kept};
-use crate::{ALL, arrived, cases};
+use super::case::{Case, Outcome};
+use super::skin::{self, Kept};
+use super::{ALL, arrived, cases};
 
 const MARKS: [[&str; 2]; 2] = [
     ["<!-- torture:begin -->\n", "<!-- torture:end -->\n"],
@@ -16,8 +16,8 @@ const MARKS: [[&str; 2]; 2] = [
 ];
 
 /// One line of the table of motions.
-pub fn row(case: &Case, o: &Outcome) -> String {
-    let (single, t) = (&o.single, &o.outcome);
+pub(crate) fn row(case: &Case, o: &Outcome) -> String {
+    let (single, t) = (&o.single, &o.travelled);
     format!(
         "| {} | {} | {:.4} | {:.4} | {} | {:.3} | {} | {} | {} | {:.3} |",
         case.name,
@@ -39,7 +39,7 @@ fn short(q: f64) -> String {
 }
 
 /// One line of the table of layers.
-pub fn skin_row(plate: &str, kept: &Kept) -> String {
+pub(crate) fn skin_row(plate: &str, kept: &Kept) -> String {
     let motion = match kept.kinematic_constraint {
         KinematicConstraint::Free => "free",
         KinematicConstraint::Axis(_) => "along z",

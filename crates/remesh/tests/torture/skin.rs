@@ -5,48 +5,48 @@ use fluxmorph_geometry::tet4::{norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{KinematicConstraint, StepLimits, StiffnessPolicy};
 
-use crate::cases::{alternating_control_points, shield_parameters};
+use super::cases::{alternating_control_points, shield_parameters};
 use crate::support::plate_columns;
 
 /// The layers of the moved face from outside to inside, and how much of their thickness they keep.
-pub struct Kept {
-    pub policy: StiffnessPolicy,
-    pub kinematic_constraint: KinematicConstraint,
-    pub layers: Vec<Layer>,
+pub(crate) struct Kept {
+    pub(crate) policy: StiffnessPolicy,
+    pub(crate) kinematic_constraint: KinematicConstraint,
+    pub(crate) layers: Vec<Layer>,
 }
 
 /// Shares of its thickness that a layer keeps: distance of its two nodes in a column, after and before.
 #[derive(Debug)]
-pub struct Layer {
+pub(crate) struct Layer {
     /// At first [m].
-    pub thickness: f64,
+    pub(crate) thickness: f64,
     /// Least share over the columns clear of the side layers.
-    pub clear: f64,
+    pub(crate) clear: f64,
     /// Least share over all columns.
-    pub least: f64,
+    pub(crate) least: f64,
     /// Mean share over all columns.
-    pub mean: f64,
+    pub(crate) mean: f64,
 }
 
 /// The plate of configs/shield.toml, whose ten layers fill it.
-pub fn filled() -> ShieldParameters {
+pub(crate) fn filled() -> ShieldParameters {
     shield_parameters()
 }
 
 /// The same plate with layers to two skin depths (1.74 mm) and a coarse core of two cells.
-pub fn cored() -> ShieldParameters {
+pub(crate) fn cored() -> ShieldParameters {
     ShieldParameters { skin: vec![0.3e-3, 0.8e-3, 1.6e-3, 5e-3], ..shield_parameters() }
 }
 
 /// What is left when the control points alternate between 5 and 30 mm.
-pub fn kept(
+pub(crate) fn kept(
     p: &ShieldParameters,
     policy: StiffnessPolicy,
     kinematic_constraint: KinematicConstraint,
 ) -> Kept {
     let case = alternating_control_points(p, kinematic_constraint);
     let outcome = case.outcome(policy, &StepLimits::default());
-    let moved = &outcome.outcome.moved.mesh;
+    let moved = &outcome.travelled.moved.mesh;
     let columns = plate_columns(&case.mesh);
     // On the side layers' innermost line a column is still as wide as the plate's other ones on one side.
     let inner = [0, 1].map(|d| p.plate[d] - p.side_skin.last().copied().unwrap_or(0.0) + 1e-9);

@@ -78,7 +78,7 @@ impl<T: PanelScalar> WithSimd for SmallFactor<'_, T> {
             let own = &mut column_mut(&mut right, 0)[j..];
             for k in 0..j {
                 let before = column(&left, k);
-                add_columns(simd, [&before[j..]], [[-(before[j] * before[k])]], [own]);
+                add_columns(simd, [&before[j..]], [[-(before[j] * before[k])]], &mut [&mut *own], 0);
             }
             let inverse = own[0].inverse().ok_or(j)?;
             own[1..].iter_mut().for_each(|entry| *entry *= inverse);
@@ -129,12 +129,13 @@ impl<T: PanelScalar> WithSimd for SmallDivision<'_, T> {
                 let known = |k: usize| &column(&left, k)[first..first + taken];
                 let mut k = 0;
                 while k + 4 <= j {
-                    let four = [k, k + 1, k + 2, k + 3];
-                    add_columns(simd, four.map(known), [four.map(factor)], [own]);
+                    let columns = [known(k), known(k + 1), known(k + 2), known(k + 3)];
+                    let factors = [factor(k), factor(k + 1), factor(k + 2), factor(k + 3)];
+                    add_columns(simd, columns, [factors], &mut [&mut *own], 0);
                     k += 4;
                 }
                 for k in k..j {
-                    add_columns(simd, [known(k)], [[factor(k)]], [own]);
+                    add_columns(simd, [known(k)], [[factor(k)]], &mut [&mut *own], 0);
                 }
             }
         }

@@ -8,14 +8,13 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use faer::mat::{MatMut, MatRef};
 use faer::prelude::{Reborrow, ReborrowMut};
-use rayon::prelude::*;
 
 use super::analysis::LdltAnalysis;
 use super::dense;
 use super::multiply::{Packing, Shape, Store, multiply};
 use super::panels::Update;
 use super::scalar::PanelScalar;
-use super::schedule::{Branch, Task};
+use super::schedule::{Branch, Task, for_each_in_parallel, indices_in_parallel};
 use crate::error::MeshError;
 
 /// Rows of a tile. Every tile reads the columns' rows of an update again, each from another page of memory: tiles of half the
@@ -113,9 +112,12 @@ enum Tiles {
 impl<T: PanelScalar> Factorisation<'_, T> {
     /// The error of the first task that fails, whatever finishes first.
     fn branch(&self, branch: &Branch) -> Result<(), MeshError> {
-        let done: Vec<Result<(), MeshError>> =
-            branch.tasks.par_iter().with_max_len(1).map(|task| self.task(task)).collect();
-        done.into_iter().collect::<Result<(), _>>()?;
+        let done: Vec<OnceLock<Result<(), MeshError>>> =
+            branch.tasks.iter().map(|_| OnceLock::new()).collect();
+        indices_in_parallel(done.len(), &|i| {
+            done[i].get_or_init(|| self.task(&branch.tasks[i]));
+        });
+        done.into_iter().filter_map(OnceLock::into_inner).collect::<Result<(), _>>()?;
         branch
             .chain
             .iter()
@@ -171,7 +173,7 @@ impl<T: PanelScalar> Factorisation<'_, T> {
         let position = &workspace.position;
         match tiles {
             Tiles::InParallel if height > TILE_ROWS => {
-                tiles_of(block.rb_mut(), 0).into_par_iter().with_max_len(1).for_each(|(first, tile)| {
+                for_each_in_parallel(tiles_of(block.rb_mut(), 0), |(first, tile)| {
                     self.with_workspace(|own| self.gather(p, first, tile, position, &mut own.tile));
                 });
             }
@@ -200,7 +202,7 @@ impl<T: PanelScalar> Factorisation<'_, T> {
         };
         match tiles {
             Tiles::InParallel if height > TILE_ROWS => {
-                tiles_of(below, width).into_par_iter().with_max_len(1).for_each(|(_, tile)| {
+                for_each_in_parallel(tiles_of(below, width), |(_, tile)| {
                     self.with_workspace(|own| divide(tile, &mut own.tile.packing));
                 });
             }

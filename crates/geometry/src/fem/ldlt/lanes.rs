@@ -126,39 +126,48 @@ lanes!(
     reduce_sum_c64s
 );
 
-/// `y_s += Σ_k a_sk x_k` over the columns `x` and the sides `s`; all of one length.
+// Arrays are filled by loops here and in the kernels that call this: `<[_; N]>::map` would be compiled anew, some three
+// hundred lines of it, for every closure, number type and set of instructions.
+
+/// `y_s += Σ_k a_sk x_k` over the columns `x` and the sides `s`, which begin at `from`; columns of one length.
 #[inline(always)]
 pub(super) fn add_columns<T: Lanes, S: Simd, const K: usize, const SIDES: usize>(
     simd: S,
     columns: [&[T]; K],
     factors: [[T; K]; SIDES],
-    sides: [&mut [T]; SIDES],
+    sides: &mut [&mut [T]; SIDES],
+    from: usize,
 ) {
     let length = columns[0].len();
-    let (heads, tails) = parts::<T, S, K>(columns.map(|column| &column[..length]));
-    let factors = factors.map(|factors| factors.map(|factor| T::splat(simd, factor)));
+    let (heads, tails) = parts::<T, S, K>(columns, length);
+    let mut splat = [[T::splat(simd, T::default()); K]; SIDES];
+    for s in 0..SIDES {
+        for k in 0..K {
+            splat[s][k] = T::splat(simd, factors[s][k]);
+        }
+    }
     let whole = heads[0].len();
-    let heads = heads.map(|head| &head[..whole]);
-    let sides = sides.map(|side| {
-        let (head, tail) = T::vectors_mut::<S>(&mut side[..length]);
-        (&mut head[..whole], tail)
-    });
+    let mut split: [SplitMut<'_, T, S>; SIDES] = std::array::from_fn(|_| Default::default());
+    for (split, side) in split.iter_mut().zip(sides) {
+        let (head, tail) = T::vectors_mut::<S>(&mut side[from..][..length]);
+        *split = (&mut head[..whole], tail);
+    }
     for i in 0..whole {
         for s in 0..SIDES {
-            let mut y = sides[s].0[i];
+            let mut y = split[s].0[i];
             for k in 0..K {
-                y = T::multiply_add(simd, factors[s][k], heads[k][i], y);
+                y = T::multiply_add(simd, splat[s][k], heads[k][i], y);
             }
-            sides[s].0[i] = y;
+            split[s].0[i] = y;
         }
     }
     if !tails[0].is_empty() {
         for s in 0..SIDES {
-            let mut y = T::load_part(simd, sides[s].1);
+            let mut y = T::load_part(simd, split[s].1);
             for k in 0..K {
-                y = T::multiply_add(simd, factors[s][k], T::load_part(simd, tails[k]), y);
+                y = T::multiply_add(simd, splat[s][k], T::load_part(simd, tails[k]), y);
             }
-            T::store_part(simd, sides[s].1, y);
+            T::store_part(simd, split[s].1, y);
         }
     }
 }
@@ -171,11 +180,9 @@ pub(super) fn products<T: Lanes, S: Simd, const K: usize, const SIDES: usize>(
     sides: [&[T]; SIDES],
 ) -> [[T; K]; SIDES] {
     let length = columns[0].len();
-    let (heads, tails) = parts::<T, S, K>(columns.map(|column| &column[..length]));
-    let (side_heads, side_tails) = parts::<T, S, SIDES>(sides.map(|side| &side[..length]));
+    let (heads, tails) = parts::<T, S, K>(columns, length);
+    let (side_heads, side_tails) = parts::<T, S, SIDES>(sides, length);
     let whole = heads[0].len();
-    let heads = heads.map(|head| &head[..whole]);
-    let side_heads = side_heads.map(|head| &head[..whole]);
     let mut sums = [[T::splat(simd, T::default()); K]; SIDES];
     for i in 0..whole {
         for s in 0..SIDES {
@@ -192,13 +199,32 @@ pub(super) fn products<T: Lanes, S: Simd, const K: usize, const SIDES: usize>(
             }
         }
     }
-    sums.map(|sums| sums.map(|sum| T::sum(simd, sum)))
+    let mut totals = [[T::default(); K]; SIDES];
+    for s in 0..SIDES {
+        for k in 0..K {
+            totals[s][k] = T::sum(simd, sums[s][k]);
+        }
+    }
+    totals
 }
 
 /// Whole vectors of several columns, and what is left of each.
 type Split<'a, T, S, const N: usize> = ([&'a [<T as Lanes>::Vector<S>]; N], [&'a [T]; N]);
 
+/// Whole vectors of a side, and what is left of it.
+type SplitMut<'a, T, S> = (&'a mut [<T as Lanes>::Vector<S>], &'a mut [T]);
+
+/// The first `length` numbers of several columns; all heads are as long as the first.
 #[inline(always)]
-fn parts<T: Lanes, S: Simd, const N: usize>(values: [&[T]; N]) -> Split<'_, T, S, N> {
-    (values.map(|values| T::vectors::<S>(values).0), values.map(|values| T::vectors::<S>(values).1))
+fn parts<T: Lanes, S: Simd, const N: usize>(values: [&[T]; N], length: usize) -> Split<'_, T, S, N> {
+    let mut heads: [&[T::Vector<S>]; N] = [&[]; N];
+    let mut tails = values;
+    for n in 0..N {
+        (heads[n], tails[n]) = T::vectors::<S>(&values[n][..length]);
+    }
+    let whole = heads[0].len();
+    for head in &mut heads {
+        *head = &head[..whole];
+    }
+    (heads, tails)
 }

@@ -26,10 +26,45 @@ impl<'a, T> Block<'a, T> {
         &self.entries[j * self.height + self.first_row..][..self.rows]
     }
 
+    /// The columns `j..j + K` from row `from` of the block on.
+    #[inline(always)]
+    fn columns<const K: usize>(&self, j: usize, from: usize) -> [&'a [T]; K] {
+        let mut columns: [&[T]; K] = [&[]; K];
+        for (k, column) in columns.iter_mut().enumerate() {
+            *column = &self.column(j + k)[from..];
+        }
+        columns
+    }
+
     #[inline(always)]
     fn width(&self) -> usize {
         self.entries.len() / self.height
     }
+}
+
+/// `−x_j` of `K` unknowns from `j` on, for every side.
+#[inline(always)]
+fn negated<T: PanelScalar, X: AsRef<[T]>, const K: usize, const SIDES: usize>(
+    x: &[X; SIDES],
+    j: usize,
+) -> [[T; K]; SIDES] {
+    let mut factors = [[T::default(); K]; SIDES];
+    for (factors, x) in factors.iter_mut().zip(x) {
+        for (k, factor) in factors.iter_mut().enumerate() {
+            *factor = -x.as_ref()[j + k];
+        }
+    }
+    factors
+}
+
+/// What every side holds from `from` on.
+#[inline(always)]
+fn shared<'a, T, const SIDES: usize>(sides: &'a [&mut [T]; SIDES], from: usize) -> [&'a [T]; SIDES] {
+    let mut shared: [&[T]; SIDES] = [&[]; SIDES];
+    for (shared, side) in shared.iter_mut().zip(sides) {
+        *shared = &side[from..];
+    }
+    shared
 }
 
 /// `y −= L x`, with the columns of a block that lies below the diagonal.
@@ -48,13 +83,10 @@ impl<T: PanelScalar, const SIDES: usize> WithSimd for Subtract<'_, T, SIDES> {
         let width = block.width();
         let grouped = width / GROUP * GROUP;
         for j in (0..grouped).step_by(GROUP) {
-            let four = [j, j + 1, j + 2, j + 3];
-            let factors = x.map(|x| four.map(|j| -x[j]));
-            add_columns(simd, four.map(|j| block.column(j)), factors, self.y.each_mut().map(|y| &mut **y));
+            add_columns::<T, S, GROUP, SIDES>(simd, block.columns(j, 0), negated(&x, j), &mut self.y, 0);
         }
         for j in grouped..width {
-            let factors = x.map(|x| [-x[j]]);
-            add_columns(simd, [block.column(j)], factors, self.y.each_mut().map(|y| &mut **y));
+            add_columns::<T, S, 1, SIDES>(simd, block.columns(j, 0), negated(&x, j), &mut self.y, 0);
         }
     }
 }
@@ -76,14 +108,13 @@ impl<T: PanelScalar, const SIDES: usize> WithSimd for SubtractTransposed<'_, T, 
         let width = self.x[0].len();
         let grouped = width / GROUP * GROUP;
         for j in (0..grouped).step_by(GROUP) {
-            let four = [0, 1, 2, 3].map(|k| block.column(first + j + k));
-            let sums = products(simd, four, y);
+            let sums = products::<T, S, GROUP, SIDES>(simd, block.columns(first + j, 0), y);
             for (x, sums) in self.x.iter_mut().zip(sums) {
                 x[j..j + GROUP].iter_mut().zip(sums).for_each(|(x, sum)| *x -= sum);
             }
         }
         for j in grouped..width {
-            let sums = products(simd, [block.column(first + j)], y);
+            let sums = products::<T, S, 1, SIDES>(simd, block.columns(first + j, 0), y);
             for (x, [sum]) in self.x.iter_mut().zip(sums) {
                 x[j] -= sum;
             }
@@ -116,16 +147,12 @@ impl<T: PanelScalar, const SIDES: usize> WithSimd for Forward<'_, T, SIDES> {
                     }
                 }
             }
-            let mut below = self.x.each_mut().map(|x| x.split_at_mut(next));
             if taken == GROUP {
-                let four = [j, j + 1, j + 2, j + 3];
-                let factors = below.each_ref().map(|(x, _)| four.map(|j| -x[j]));
-                let targets = below.each_mut().map(|(_, y)| &mut **y);
-                add_columns(simd, four.map(|j| &block.column(j)[next..]), factors, targets);
+                let (columns, factors) = (block.columns(j, next), negated(&self.x, j));
+                add_columns::<T, S, GROUP, SIDES>(simd, columns, factors, &mut self.x, next);
             } else {
-                let factors = below.each_ref().map(|(x, _)| [-x[j]]);
-                let targets = below.each_mut().map(|(_, y)| &mut **y);
-                add_columns(simd, [&block.column(j)[next..]], factors, targets);
+                let (columns, factors) = (block.columns(j, next), negated(&self.x, j));
+                add_columns::<T, S, 1, SIDES>(simd, columns, factors, &mut self.x, next);
             }
             j = next;
         }
@@ -147,15 +174,16 @@ impl<T: PanelScalar, const SIDES: usize> WithSimd for Backward<'_, T, SIDES> {
         let width = block.width();
         let grouped = width / GROUP * GROUP;
         for j in (grouped..width).rev() {
-            let sums = products(simd, [&block.column(j)[j + 1..]], self.x.each_ref().map(|x| &x[j + 1..]));
+            let columns = block.columns(j, j + 1);
+            let sums = products::<T, S, 1, SIDES>(simd, columns, shared(&self.x, j + 1));
             for (x, [sum]) in self.x.iter_mut().zip(sums) {
                 x[j] -= sum;
             }
         }
         for j in (0..grouped).step_by(GROUP).rev() {
             let next = j + GROUP;
-            let four = [j, j + 1, j + 2, j + 3].map(|j| &block.column(j)[next..]);
-            let sums = products(simd, four, self.x.each_ref().map(|x| &x[next..]));
+            let columns = block.columns(j, next);
+            let sums = products::<T, S, GROUP, SIDES>(simd, columns, shared(&self.x, next));
             for (x, sums) in self.x.iter_mut().zip(sums) {
                 for k in (0..GROUP).rev() {
                     let values = &block.column(j + k)[j..next];

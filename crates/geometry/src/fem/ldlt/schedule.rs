@@ -5,6 +5,9 @@
 //! pattern and never on the threads.
 
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+use rayon::prelude::*;
 
 use super::panels::Panels;
 
@@ -125,4 +128,20 @@ impl Tree {
         tasks.sort_by_key(|task| task.panels().start);
         tasks
     }
+}
+
+/// `work` of every item, each a task of its own.
+///
+/// The items are handed out by their numbers, so that the scheduler is compiled once and not for every kind of item.
+pub(super) fn for_each_in_parallel<I: Send>(items: Vec<I>, work: impl Fn(I) + Sync) {
+    let items: Vec<Mutex<Option<I>>> = items.into_iter().map(|item| Mutex::new(Some(item))).collect();
+    indices_in_parallel(items.len(), &|i| {
+        let item = items[i].lock().unwrap_or_else(PoisonError::into_inner).take();
+        item.into_iter().for_each(&work);
+    });
+}
+
+/// `work` of every index below `count`, each a task of its own.
+pub(super) fn indices_in_parallel(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count).into_par_iter().with_max_len(1).for_each(work);
 }

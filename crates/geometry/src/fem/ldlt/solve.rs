@@ -8,13 +8,11 @@
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
-
 use super::factor::Ldlt;
 use super::panel_solve::{Backward, Block, Forward, Subtract, SubtractTransposed, by_pairs};
 use super::panels::Panel;
 use super::scalar::PanelScalar;
-use super::schedule::{Branch, Task};
+use super::schedule::{Branch, Task, for_each_in_parallel};
 
 /// Entries above which the parts of a panel of a chain are parallel tasks: some 50 µs of memory traffic.
 const LARGE_PANEL: usize = 1 << 16;
@@ -134,8 +132,9 @@ impl<T: PanelScalar> Sweep<'_, T> {
 
     fn forward_branch(&self, branch: &Branch, x: &mut [T]) -> Vec<T> {
         let shares = self.shares(branch, x);
-        let contributions: Vec<Vec<T>> =
-            shares.into_par_iter().with_max_len(1).map(|(task, x)| self.forward(task, x)).collect();
+        let mut contributions: Vec<Vec<T>> = vec![Vec::new(); shares.len()];
+        let each = shares.into_iter().zip(&mut contributions).collect();
+        for_each_in_parallel(each, |((task, x), own)| *own = self.forward(task, x));
         let own = self.unknowns(&branch.panels);
         self.with_workspace(|workspace| {
             for (task, contribution) in branch.tasks.iter().zip(contributions) {
@@ -187,8 +186,8 @@ impl<T: PanelScalar> Sweep<'_, T> {
             let at = |row| self.at(row, x, &own, &workspace.outside).iter().copied();
             branch.tasks.iter().map(|task| self.outer_rows(task.panels()).flat_map(at).collect()).collect()
         });
-        let shares = self.shares(branch, x).into_par_iter().with_max_len(1);
-        shares.zip(known).for_each(|((task, x), known)| self.backward(task, x, &known));
+        let shares = self.shares(branch, x).into_iter().zip(known).collect();
+        for_each_in_parallel(shares, |((task, x), known): ((_, _), Vec<T>)| self.backward(task, x, &known));
     }
 
     fn put_outer(&self, panels: &Range<usize>, outer: &[T], workspace: &mut Workspace<T>) {
@@ -246,8 +245,10 @@ impl<T: PanelScalar> Sweep<'_, T> {
         by_pairs(
             sides,
             height,
-            |x| arch.dispatch(Forward { block, x: x.map(|x| &mut x[..block.rows]) }),
-            |x| arch.dispatch(Forward { block, x: x.map(|x| &mut x[..block.rows]) }),
+            |[one, other]| {
+                arch.dispatch(Forward { block, x: [&mut one[..block.rows], &mut other[..block.rows]] })
+            },
+            |[one]| arch.dispatch(Forward { block, x: [&mut one[..block.rows]] }),
         );
         if cut {
             subtract_in_parts(block, sides);
@@ -291,8 +292,10 @@ impl<T: PanelScalar> Sweep<'_, T> {
         by_pairs(
             sides,
             height,
-            |x| arch.dispatch(Backward { block, x: x.map(|x| &mut x[..block.rows]) }),
-            |x| arch.dispatch(Backward { block, x: x.map(|x| &mut x[..block.rows]) }),
+            |[one, other]| {
+                arch.dispatch(Backward { block, x: [&mut one[..block.rows], &mut other[..block.rows]] })
+            },
+            |[one]| arch.dispatch(Backward { block, x: [&mut one[..block.rows]] }),
         );
         for (side, values) in sides.chunks_exact(height).enumerate() {
             let own_unknowns = x[(panel.start - own.start) * count..].iter_mut().skip(side).step_by(count);
@@ -309,54 +312,51 @@ fn below<T>(block: Block<'_, T>, first_row: usize, rows: usize) -> Block<'_, T> 
 /// `x_R −= L_R x_J` for every side, by parts of the rows; `block` is the square on top of the panel.
 fn subtract_in_parts<T: PanelScalar>(block: Block<'_, T>, sides: &mut [T]) {
     let (arch, height, width) = (pulp::Arch::new(), block.height, block.rows);
-    for values in sides.chunks_mut(2 * height) {
-        match values.len() / height {
-            2 => {
-                let (one, other) = values.split_at_mut(height);
-                let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
-                let (x, parts) = ([&*x0, &*x1], y0.par_chunks_mut(PART_ROWS));
-                let parts = parts.zip(y1.par_chunks_mut(PART_ROWS)).enumerate();
-                parts.for_each(|(part, (y0, y1))| {
-                    let block = below(block, width + part * PART_ROWS, y0.len());
-                    arch.dispatch(Subtract { block, x, y: [y0, y1] });
-                });
-            }
-            _ => {
-                let (x, y) = values.split_at_mut(width);
-                let (x, parts) = ([&*x], y.par_chunks_mut(PART_ROWS).enumerate());
-                parts.for_each(|(part, y)| {
-                    let block = below(block, width + part * PART_ROWS, y.len());
-                    arch.dispatch(Subtract { block, x, y: [y] });
-                });
-            }
-        }
-    }
+    let rows_of = |part: usize, rows: usize| below(block, width + part * PART_ROWS, rows);
+    by_pairs(
+        sides,
+        height,
+        |[one, other]| {
+            let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+            let x = [&*x0, &*x1];
+            let parts = y0.chunks_mut(PART_ROWS).zip(y1.chunks_mut(PART_ROWS)).enumerate();
+            for_each_in_parallel(parts.collect(), |(part, (y0, y1)): (_, (&mut [T], _))| {
+                arch.dispatch(Subtract { block: rows_of(part, y0.len()), x, y: [y0, y1] });
+            });
+        },
+        |[one]| {
+            let (x, y) = one.split_at_mut(width);
+            let x = [&*x];
+            for_each_in_parallel(y.chunks_mut(PART_ROWS).enumerate().collect(), |(part, y)| {
+                arch.dispatch(Subtract { block: rows_of(part, y.len()), x, y: [y] });
+            });
+        },
+    );
 }
 
 /// `x_J −= L_Rᵀ x_R` for every side, by parts of the columns; `block` is the square on top of the panel.
 fn subtract_transposed_in_parts<T: PanelScalar>(block: Block<'_, T>, sides: &mut [T]) {
     let (arch, height, width) = (pulp::Arch::new(), block.height, block.rows);
     let outer = below(block, width, height - width);
-    for values in sides.chunks_mut(2 * height) {
-        match values.len() / height {
-            2 => {
-                let (one, other) = values.split_at_mut(height);
-                let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
-                let (y, parts) = ([&*y0, &*y1], x0.par_chunks_mut(PART_COLUMNS));
-                let parts = parts.zip(x1.par_chunks_mut(PART_COLUMNS)).enumerate();
-                parts.for_each(|(part, (x0, x1))| {
-                    let first = part * PART_COLUMNS;
-                    arch.dispatch(SubtractTransposed { block: outer, first, x: [x0, x1], y });
-                });
-            }
-            _ => {
-                let (x, y) = values.split_at_mut(width);
-                let (y, parts) = ([&*y], x.par_chunks_mut(PART_COLUMNS).enumerate());
-                parts.for_each(|(part, x)| {
-                    let first = part * PART_COLUMNS;
-                    arch.dispatch(SubtractTransposed { block: outer, first, x: [x], y });
-                });
-            }
-        }
-    }
+    by_pairs(
+        sides,
+        height,
+        |[one, other]| {
+            let ((x0, y0), (x1, y1)) = (one.split_at_mut(width), other.split_at_mut(width));
+            let y = [&*y0, &*y1];
+            let parts = x0.chunks_mut(PART_COLUMNS).zip(x1.chunks_mut(PART_COLUMNS)).enumerate();
+            for_each_in_parallel(parts.collect(), |(part, (x0, x1))| {
+                let first = part * PART_COLUMNS;
+                arch.dispatch(SubtractTransposed { block: outer, first, x: [x0, x1], y });
+            });
+        },
+        |[one]| {
+            let (x, y) = one.split_at_mut(width);
+            let y = [&*y];
+            for_each_in_parallel(x.chunks_mut(PART_COLUMNS).enumerate().collect(), |(part, x)| {
+                let first = part * PART_COLUMNS;
+                arch.dispatch(SubtractTransposed { block: outer, first, x: [x], y });
+            });
+        },
+    );
 }

@@ -1,19 +1,18 @@
 //! Motions that break a mesh in one step, and that rounds take without a single inverted element.
 //!
-//! `cargo test --release -p fluxmorph-remesh --test torture -- --nocapture` prints what is measured, `write_the_table`
+//! `cargo test --release -p fluxmorph-remesh --test remesh torture -- --nocapture` prints what is measured, `write_the_table`
 //! (`just torture`) puts all of it into docs/torture.md.
-#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 mod case;
 mod cases;
 mod page;
 mod skin;
-#[path = "../support/mod.rs"]
-mod support;
 
 use case::{Case, Outcome};
 use fluxmorph_geometry::quality::qualities;
 use fluxmorph_remesh::{KinematicConstraint, StepLimits, StiffnessPolicy};
+
+use crate::support;
 
 /// Outcomes of a case, with what holds for every one: the motion arrives, every element on the way is valid, and every
 /// round kept away from inversion.
@@ -22,14 +21,14 @@ fn arrived(case: &Case, policies: &[StiffnessPolicy]) -> Vec<Outcome> {
     for outcome in &outcomes {
         println!("{}", page::row(case, outcome));
         let place = format!("{}, {}", case.name, outcome.policy.name());
-        assert_eq!(outcome.outcome.reached, 1.0, "{place}");
-        let qualities = qualities(&outcome.outcome.moved.mesh);
+        assert_eq!(outcome.travelled.reached, 1.0, "{place}");
+        let qualities = qualities(&outcome.travelled.moved.mesh);
         assert!(qualities.iter().all(|q| *q > 0.0), "{place}");
         for share in outcome.shares() {
             assert!((0.0..=StepLimits::default().inversion_share).contains(&share), "{place}: {share}");
         }
-        let (moved, goal) = (&outcome.outcome.moved, (case.path)(1.0));
-        for (node, u) in outcome.outcome.motion.map().design_nodes().iter().zip(&goal) {
+        let (moved, goal) = (&outcome.travelled.moved, (case.path)(1.0));
+        for (node, u) in outcome.travelled.motion.map().design_nodes().iter().zip(&goal) {
             let off = support::largest_difference(&[moved.displacement[node.index()]], &[*u]);
             assert!(off <= 1e-15, "{place}: {off}"); // rounding of sums of centimetres
         }

@@ -1,0 +1,12 @@
+//! Tests of the crate from outside: the generators' meshes, the files, the sparse factors under injected failures.
+
+mod guards;
+mod msh;
+mod msh_damaged;
+mod msh_support;
+mod properties;
+mod regressions;
+mod shield;
+mod tet_counts;
+mod vtu;
+mod vtu_pieces;

@@ -1,0 +1,13 @@
+//! Tests of the crate from outside: the elastic map, boundaries, rounds and fallbacks, smoothing, steps to inversion.
+#![allow(clippy::unwrap_used)]
+
+mod boundaries;
+mod guards;
+mod inversion;
+mod mapping;
+mod rounds;
+mod skin;
+mod smoothing;
+mod support;
+mod torture;
+mod trends;
