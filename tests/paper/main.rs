@@ -9,9 +9,8 @@ mod support;
 
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
 use fluxmorph_optimizer::fresh_mesh::{Gain, Shapes};
-use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};

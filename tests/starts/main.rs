@@ -10,8 +10,7 @@ mod support;
 
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
-use fluxmorph_optimizer::driver::{Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
+use fluxmorph_optimizer::driver::{Record, Recorder, optimise};
 use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};

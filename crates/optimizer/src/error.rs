@@ -194,6 +194,7 @@ impl Error {
             Self::Config(ConfigError::Read { .. }) | Self::Design(DesignFileError::Read { .. }) => {
                 ExitCode::Files
             }
+            Self::Output(OutputError::OlderJournal { .. }) => ExitCode::Configuration,
             Self::Output(_)
             | Self::Pieces { .. }
             | Self::Replay { .. }

@@ -64,7 +64,7 @@ pub struct Problem {
 }
 
 /// Wall time of the parts of an evaluation [s].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Timings {
     /// Elastic solves, forward and transposed, and the mesh check.
     pub remesh: f64,

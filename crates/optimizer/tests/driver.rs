@@ -5,8 +5,7 @@ use std::path::Path;
 
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Algorithm, Config, Optimizer};
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
 use fluxmorph_optimizer::observer::{Evaluation, Observer, Silent};
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};

@@ -12,13 +12,14 @@
 //!   the best design, towards the same bounds.
 //! * Where nothing was gained the ladder of [`rescue`](fluxmorph_remesh::rescue) is climbed: a smaller box, another
 //!   stiffness policy, smoothing of the interior. Then the run ends with [`StopReason::MeshLimit`] and the best design.
-//! * A run that was broken off goes on by being told again: the recorder recalls its evaluations, and as long as the method
-//!   asks for the same designs to the last bit, in the same rounds on the same meshes, they are the answers. The method is
-//!   then in the state that it was in. Anything else is an error.
+//! * An interrupted run is resumed by a replay: the recorder gives its evaluations back, and as long as the method asks for
+//!   the same designs to the last bit, in the same rounds on the same meshes, they are the answers. The method is then in
+//!   the state that it was in. Anything else is an error.
 //! * Limits of evaluations and time are checked before each evaluation but the first, and before each remedy: what was
-//!   computed is kept, and there is a best design. A signal may come before the first evaluation, or while evaluations are
-//!   told again: then there is nothing new to keep.
+//!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during a
+//!   replay: then there is nothing new to keep.
 
+mod record;
 mod run;
 mod trust;
 
@@ -29,11 +30,11 @@ use crate::cli::ExitCode;
 use crate::config::Optimizer;
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::journal::Record;
 use crate::observer::Observer;
 use crate::output::StopReason;
 use crate::problem::{Analysis, Problem, Timings};
 use crate::rounds::{RoundEvent, RoundKind};
+pub use record::{Record, reference_hash};
 use run::Run;
 use trust::TrustRegion;
 
@@ -58,13 +59,13 @@ const MAX_RENEWALS: usize = 3;
 
 /// Keeps what is computed, and gives back what was kept before the run was broken off.
 pub trait Recorder {
-    /// The next evaluation kept before, in their order; `None` once all are told.
-    fn recall(&mut self) -> Option<Record> {
+    /// The next evaluation kept before, in their order; `None` behind the last one.
+    fn replay(&mut self) -> Option<Record> {
         None
     }
 
-    /// Whether what it gives back has the bits of one process.
-    fn is_exact(&self) -> bool {
+    /// Whether the same design gives the bits of what is replayed: not so where several ranks had a share in it.
+    fn is_bitwise_reproducible(&self) -> bool {
         true
     }
 

@@ -8,12 +8,11 @@ use std::time::Instant;
 use fluxmorph_geometry::ElementId;
 use fluxmorph_remesh::{Moved, RemeshError};
 
-use super::{Optimised, Recorder, Stop};
+use super::{Optimised, Record, Recorder, Stop, reference_hash};
 use crate::algorithm::{CONSTRAINT_TOLERANCE, Sample};
 use crate::config::Optimizer;
 use crate::constraint::Bound;
 use crate::error::Error;
-use crate::journal::{Record, reference_hash};
 use crate::memory::Memory;
 use crate::objective::Goal;
 use crate::observer::{Evaluation, Observer, column};
@@ -52,7 +51,7 @@ impl Standing {
 enum Field {
     Computed(Box<Analysis>),
     /// It was computed before the run was broken off.
-    Recalled(Box<Setting>),
+    Replayed(Box<Setting>),
 }
 
 /// The best design so far.
@@ -94,7 +93,7 @@ pub(super) struct Run<'a> {
     pub(super) rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
-    /// Whether ranks have a share in what is computed, or had one in what is recalled.
+    /// Whether ranks have a share in what is computed, or had one in what is replayed.
     is_shared_out: bool,
 }
 
@@ -107,7 +106,7 @@ impl<'a> Run<'a> {
         interrupted: &'a dyn Fn() -> bool,
     ) -> Self {
         let goal = problem.objective.as_ref().expect("an optimisation has an objective").goal;
-        let is_shared_out = problem.share.is_some() || !recorder.is_exact();
+        let is_shared_out = problem.share.is_some() || !recorder.is_bitwise_reproducible();
         let last = problem.shape.as_ref().expect("an optimisation has a shape").initial.clone();
         Self {
             problem,
@@ -167,7 +166,7 @@ impl<'a> Run<'a> {
                 let Analysis { mesh, displacement, .. } = &**analysis;
                 shape.next_round(&best.values, mesh.clone(), displacement.clone())?
             }
-            Field::Recalled(setting) => {
+            Field::Replayed(setting) => {
                 let moved = setting.motion.moved(&shape.displacement(&best.values))?;
                 shape.next_round(&best.values, moved.mesh, moved.displacement)?
             }
@@ -199,11 +198,11 @@ impl<'a> Run<'a> {
         {
             return Ok(best.sample.clone());
         }
-        if self.is_recalling() && (self.interrupted)() {
+        if self.is_replaying() && (self.interrupted)() {
             return Err(Stop::Limit(StopReason::Interrupted));
         }
         match self.next.take() {
-            Some(record) if self.is_of(&record, p) => self.recall(record),
+            Some(record) if self.is_of(&record, p) => self.replay(record),
             Some(record) => {
                 // A design that the mesh refused has left no record.
                 let difference = self.difference(&record, p);
@@ -374,9 +373,9 @@ impl<'a> Run<'a> {
             return Some(StopReason::Interrupted);
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
-        // Without a first evaluation there would be nothing to keep, and what was computed before is told to its end.
+        // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end.
         let is_over =
-            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_recalling();
+            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
     }
 
@@ -418,11 +417,11 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
-        let is_cut = stop_reason == StopReason::Interrupted && (self.is_recalling() || self.best.is_none());
+        let is_cut = stop_reason == StopReason::Interrupted && (self.is_replaying() || self.best.is_none());
         if is_cut {
             return Err(Error::InterruptedRun);
         }
-        if let Some(record) = self.next.take().or_else(|| self.recorder.recall()) {
+        if let Some(record) = self.next.take().or_else(|| self.recorder.replay()) {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }

@@ -1,6 +1,7 @@
 //! What a journal belongs to: the version of the program, the configuration, the mesh.
 
 use fluxmorph_geometry::Mesh;
+use serde::{Deserialize, Serialize};
 
 use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
 
@@ -8,14 +9,14 @@ use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What a journal belongs to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Version of the program.
     pub version: String,
     /// [`configuration_hash`].
-    pub configuration: [u8; 32],
+    pub configuration: String,
     /// [`mesh_hash`] of the undeformed mesh.
-    pub mesh: [u8; 32],
+    pub mesh: String,
     /// Number of design variables.
     pub variables: usize,
     /// Number of constraints.
@@ -77,18 +78,18 @@ impl Identity {
     /// # Errors
     /// The first difference.
     pub fn check(&self, now: &Self) -> Result<(), Mismatch> {
-        let hex = |hash: &[u8; 32]| hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<String>();
+        let short = |hash: &str| hash.chars().take(16).collect::<String>();
         let sizes = |identity: &Self| format!("{} and {}", identity.variables, identity.constraints);
         if self.version != now.version {
             let (journal, program) = (self.version.clone(), now.version.clone());
             return Err(Mismatch::Version { journal, program });
         }
         if self.configuration != now.configuration {
-            let (journal, now) = (hex(&self.configuration), hex(&now.configuration));
+            let (journal, now) = (short(&self.configuration), short(&now.configuration));
             return Err(Mismatch::Configuration { journal, now });
         }
         if self.mesh != now.mesh {
-            return Err(Mismatch::Mesh { journal: hex(&self.mesh), now: hex(&now.mesh) });
+            return Err(Mismatch::Mesh { journal: short(&self.mesh), now: short(&now.mesh) });
         }
         if sizes(self) != sizes(now) {
             return Err(Mismatch::Sizes { journal: sizes(self), now: sizes(now) });
@@ -97,11 +98,11 @@ impl Identity {
     }
 }
 
-/// BLAKE3 of everything in a configuration that an evaluation or the method depends on.
+/// BLAKE3 of everything in a configuration that an evaluation or the method depends on, hexadecimal.
 ///
-/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may go on. Nor is
+/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may be resumed. Nor is
 /// the path of a mesh file: its content is in [`mesh_hash`].
-pub fn configuration_hash(config: &Config) -> [u8; 32] {
+pub fn configuration_hash(config: &Config) -> String {
     let mut bare = config.clone();
     let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
     (bare.optimizer.max_evaluations, bare.optimizer.max_time) = (max_evaluations, max_time);
@@ -111,14 +112,16 @@ pub fn configuration_hash(config: &Config) -> [u8; 32] {
     if let MeshConfig::File { path, .. } = &mut bare.mesh {
         path.clear();
     }
-    *blake3::hash(resolved_toml(&bare).as_bytes()).as_bytes()
+    blake3::hash(resolved_toml(&bare).as_bytes()).to_hex().to_string()
 }
 
-/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles.
-pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
+/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles, hexadecimal.
+pub fn mesh_hash(mesh: &Mesh) -> String {
     let topology = mesh.topology();
     let mut hasher = blake3::Hasher::new();
-    hash_points(&mut hasher, mesh);
+    mesh.points().as_flattened().iter().for_each(|c| {
+        hasher.update(&c.to_le_bytes());
+    });
     let mut number = |n: usize| {
         hasher.update(&(n as u64).to_le_bytes());
     };
@@ -139,22 +142,5 @@ pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
         number(triangles.len());
         triangles.iter().flatten().for_each(|node| number(node.index()));
     }
-    *hasher.finalize().as_bytes()
-}
-
-/// BLAKE3 of the points of a mesh whose topology is known.
-pub fn reference_hash(mesh: &Mesh) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    hash_points(&mut hasher, mesh);
-    *hasher.finalize().as_bytes()
-}
-
-fn hash_points(hasher: &mut blake3::Hasher, mesh: &Mesh) {
-    for point in mesh.points() {
-        let mut bytes = [0; 24];
-        for (slot, c) in bytes.chunks_exact_mut(8).zip(point) {
-            slot.copy_from_slice(&c.to_le_bytes());
-        }
-        hasher.update(&bytes);
-    }
+    hasher.finalize().to_hex().to_string()
 }

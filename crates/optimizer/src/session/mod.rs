@@ -2,11 +2,13 @@
 //!
 //! The manifest is written first and completed last; journal, history and fields are written as evaluations come
 //! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
-//! final name is whole, and `resume` goes on with it.
+//! final name is whole, and it can be resumed.
 
 mod pieces;
+mod prepared;
 mod recorder;
 mod resume;
+mod solve;
 mod summary;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -23,23 +25,22 @@ use crate::exports;
 use crate::finite;
 use crate::fresh_mesh::{Check, Gain, Shapes};
 use crate::journal::{self, Identity};
-use crate::memory::Memory;
-use crate::memory_estimate::{of_evaluation, of_fresh_mesh};
-use crate::memory_limit;
+use crate::memory_estimate::of_fresh_mesh;
 use crate::observer::{Observer, Started};
 use crate::output::{
-    Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
-    StopReason, peak_memory_bytes, resume_command, surface_files,
+    Disk, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
+    peak_memory_bytes, resume_command,
 };
-use crate::problem::{Problem, Want};
+use crate::problem::Problem;
 use crate::rounds::RoundEvent;
 use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
-use crate::stage::Stage;
 use pieces::SharedPieces;
-use recorder::{DirectoryRecorder, write_collection, write_field};
+use prepared::Prepared;
+use recorder::DirectoryRecorder;
 pub(crate) use resume::configuration;
 pub use resume::{Limits, SavedRun, resume};
+pub use solve::solve;
 use summary::{constraints, linear_solver, terms};
 
 /// What a session is told beside the configuration.
@@ -67,25 +68,17 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
-    let clock = Instant::now();
-    observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Optimisation, options.team, told)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
-    Error::unless(options.interrupted)?;
+    let mut prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
     // A first design that the mesh cannot reach is refused before an earlier run is replaced.
-    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial, options.interrupted);
-    let approach = approach.map_err(|error| unreached(error, config, source))?;
-    let session = Session::open("run", config, source, options, (setup, clock), observer)?;
+    let approach = prepared.approach_initial()?;
+    let session = prepared.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
         let directory = session.directory.clone();
         let names = constraint_names(&session.setup.problem);
-        let pieces = session.pieces();
         let recorder =
-            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?
-                .written_by(pieces);
-        session.optimise(&approach, recorder, options.interrupted, observer)
+            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?;
+        let recorder = recorder.written_by(session.pieces());
+        session.optimise(&approach, recorder, observer)
     })
 }
 
@@ -102,86 +95,6 @@ pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
     team.follow(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
 }
 
-/// Analyses one design and writes its field and result.
-///
-/// # Errors
-/// As [`run`].
-pub fn solve(
-    config: &Config,
-    source: &Source,
-    design: Option<Vec<f64>>,
-    options: Options<'_>,
-    observer: &mut dyn Observer,
-) -> Result<RunResult, Error> {
-    let clock = Instant::now();
-    observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Analysis, options.team, told)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
-    Error::unless(options.interrupted)?;
-    let values = match (&setup.problem.shape, design) {
-        (Some(shape), given) => {
-            let values = given.unwrap_or_else(|| shape.initial.clone());
-            let outside = |k: usize| values[k] < shape.lower[k] || values[k] > shape.upper[k];
-            if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
-                observer.warning(&format!(
-                    "design variable {k} = {} mm lies outside its bounds",
-                    values[k] * 1e3
-                ));
-            }
-            Some(values)
-        }
-        (None, _) => None,
-    };
-    // A design that breaks the mesh is refused before an earlier run is replaced.
-    let p = values.as_deref().unwrap_or_default();
-    let approach = setup.problem.approach(p, options.interrupted)?;
-    let moved = setup.problem.moved(p)?;
-    let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
-    session.conclude(observer, |session, observer| {
-        let problem = &session.setup.problem;
-        approach.iter().for_each(|event| observer.round(event));
-        observer.phase("solving the field");
-        let p = values.as_deref().unwrap_or_default();
-        let told = &mut |stage| observer.stage(stage);
-        let analysis = problem.analyse_watched(&mut Memory::default(), p, moved, Want::Gradient, told)?;
-        observer.stage(Stage::Writing);
-        for event in &analysis.solver_events {
-            observer.notice(&event.to_string());
-        }
-        let bounds = problem.bounds(p, &analysis)?;
-        if config.output.fields != FieldsKept::Nothing {
-            write_field(&session.directory, session.pieces().as_ref(), 0, problem, &analysis)?;
-            write_collection(&session.directory, &[0])?;
-        }
-        exports::write(config, &session.directory, &analysis.mesh, observer)?;
-        let value = analysis.objective;
-        let initial_quality = problem.quality(&problem.original).worst;
-        Ok(RunResult {
-            evaluations: 1,
-            objective: value.map(|value| ObjectiveResult {
-                initial: value,
-                best: value,
-                ratio: 1.0,
-                best_evaluation: 0,
-                verified_ratio: None,
-                verification: None,
-                terms: terms(problem, &analysis),
-            }),
-            constraints: constraints(problem, &analysis, &bounds),
-            rounds: approach.clone(),
-            ..session.result(
-                StopReason::Done,
-                &analysis,
-                values.as_deref(),
-                initial_quality,
-                &analysis.timings,
-                observer,
-            )?
-        })
-    })
-}
-
 /// A run directory with its manifest, and the problem.
 struct Session<'a> {
     command: &'static str,
@@ -192,32 +105,11 @@ struct Session<'a> {
     manifest: Manifest,
     clock: Instant,
     setup_seconds: f64,
+    interrupted: &'a dyn Fn() -> bool,
 }
 
-impl<'a> Session<'a> {
-    /// Takes the output directory, and writes the manifest.
-    fn open(
-        command: &'static str,
-        config: &'a Config,
-        source: &'a Source,
-        options: Options<'_>,
-        (setup, clock): (Setup, Instant),
-        observer: &mut dyn Observer,
-    ) -> Result<Self, Error> {
-        let setup_seconds = clock.elapsed().as_secs_f64();
-        let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
-        let mut manifest = Manifest::started(command, options.threads).reading(source);
-        manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
-        manifest.ranks = options.team.map(Team::size);
-        manifest.surfaces = surface_files(&config.output.stl);
-        manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
-        manifest.write(&directory)?;
-        let session = Self { command, config, source, setup, directory, manifest, clock, setup_seconds };
-        session.announce(observer);
-        Ok(session)
-    }
-
-    /// Tells what is set up.
+impl Session<'_> {
+    /// Reports what is set up.
     fn announce(&self, observer: &mut dyn Observer) {
         let Self { command, config, setup, directory, .. } = self;
         let mesh = setup.problem.original.topology();
@@ -253,13 +145,13 @@ impl<'a> Session<'a> {
         &mut self,
         approach: &[RoundEvent],
         mut recorder: DirectoryRecorder<'_>,
-        interrupted: &dyn Fn() -> bool,
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         let config = self.config;
         approach.iter().for_each(|event| observer.round(event));
         let problem = &mut self.setup.problem;
-        let optimised = driver::optimise(problem, &config.optimizer, observer, &mut recorder, interrupted)?;
+        let optimised =
+            driver::optimise(problem, &config.optimizer, observer, &mut recorder, self.interrupted)?;
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, problem, &best.analysis)?;
@@ -294,7 +186,7 @@ impl<'a> Session<'a> {
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.verified(result, &shapes, interrupted, observer)
+        self.verified(result, &shapes, observer)
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
@@ -350,7 +242,6 @@ impl<'a> Session<'a> {
         &mut self,
         mut result: RunResult,
         shapes: &Shapes,
-        interrupted: &dyn Fn() -> bool,
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
@@ -362,7 +253,7 @@ impl<'a> Session<'a> {
         let (config, source) = (self.config, self.source);
         let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
         if let Some(objective) = &mut result.objective
-            && gain.verify(objective, interrupted, observer) == Check::CutShort
+            && gain.verify(objective, self.interrupted, observer) == Check::CutShort
         {
             // It can be made up for: the search is whole, the run is not.
             result.status = RunStatus::Interrupted;
@@ -372,14 +263,6 @@ impl<'a> Session<'a> {
         result.timings_s.insert("total".to_owned(), self.clock.elapsed().as_secs_f64());
         result.peak_memory_bytes = peak_memory_bytes();
         Ok(result)
-    }
-}
-
-/// A first design that the mesh cannot reach is a fault of the configuration.
-fn unreached(error: Error, config: &Config, source: &Source) -> Error {
-    match error {
-        Error::DesignUnreached { .. } => placed(error, config, source),
-        other => other,
     }
 }
 
@@ -398,6 +281,10 @@ pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
         MeshConfig::File { path, .. } => path.display().to_string(),
     };
     let topology = mesh.topology();
-    let hash = blake3::Hash::from_bytes(journal::mesh_hash(mesh)).to_hex().to_string();
-    MeshHash { origin, blake3: hash, nodes: topology.node_count(), tets: topology.tets().len() }
+    MeshHash {
+        origin,
+        blake3: journal::mesh_hash(mesh),
+        nodes: topology.node_count(),
+        tets: topology.tets().len(),
+    }
 }

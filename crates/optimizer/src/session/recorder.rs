@@ -1,7 +1,7 @@
 //! What a run keeps as its evaluations come: fields, journal, history.
 //!
 //! The order is that of what must be on the disk first: a field file and the collection that names it, then the record in
-//! the journal, which makes the evaluation one that a resumed run is told, then the rows of the history.
+//! the journal, which makes the evaluation one that a resumed run replays, then the row of the history.
 
 use std::collections::VecDeque;
 
@@ -9,10 +9,10 @@ use fluxmorph_geometry::io::pvd_text;
 
 use super::pieces::SharedPieces;
 use crate::config::FieldsKept;
-use crate::driver::Recorder;
+use crate::driver::{Record, Recorder};
 use crate::error::Error;
 use crate::fields::{self, FieldData};
-use crate::journal::{Contents, Identity, Journal, Record};
+use crate::journal::{Contents, Identity, Journal};
 use crate::observer::Evaluation;
 use crate::output::{History, RunDirectory};
 use crate::problem::{Analysis, Problem};
@@ -25,10 +25,10 @@ pub(super) struct DirectoryRecorder<'a> {
     kept: FieldsKept,
     /// Evaluations with a field file, ascending.
     written: Vec<usize>,
-    /// Evaluations of before that are still to be told.
-    recalled: VecDeque<Record>,
+    /// Evaluations of before that are still to be replayed.
+    replayed: VecDeque<Record>,
     /// Whether these have the bits of one process.
-    is_exact: bool,
+    is_bitwise_reproducible: bool,
     /// Where all ranks write the fields.
     pieces: Option<SharedPieces>,
 }
@@ -47,13 +47,13 @@ impl<'a> DirectoryRecorder<'a> {
             history: History::create(directory, constraints, &[])?,
             kept,
             written: Vec::new(),
-            recalled: VecDeque::new(),
-            is_exact: true,
+            replayed: VecDeque::new(),
+            is_bitwise_reproducible: true,
             pieces: None,
         })
     }
 
-    /// For a run that goes on behind what its journal holds: history, collection and field files are brought to that.
+    /// For a run that is resumed: history, collection and field files are brought to what its journal holds.
     /// `ranks` are the most that have computed it; `None` where one process has.
     pub(super) fn reopen(
         directory: &'a RunDirectory,
@@ -62,7 +62,6 @@ impl<'a> DirectoryRecorder<'a> {
         kept: FieldsKept,
         ranks: Option<usize>,
     ) -> Result<Self, Error> {
-        let is_exact = ranks.is_none();
         // The journal first: it holds the directory against other processes.
         let journal = Journal::reopen(directory, &contents)?;
         let records = contents.records;
@@ -83,8 +82,8 @@ impl<'a> DirectoryRecorder<'a> {
             history,
             kept,
             written,
-            recalled: records.into(),
-            is_exact,
+            replayed: records.into(),
+            is_bitwise_reproducible: ranks.is_none(),
             pieces: None,
         })
     }
@@ -112,12 +111,12 @@ impl<'a> DirectoryRecorder<'a> {
 }
 
 impl Recorder for DirectoryRecorder<'_> {
-    fn is_exact(&self) -> bool {
-        self.is_exact
+    fn is_bitwise_reproducible(&self) -> bool {
+        self.is_bitwise_reproducible
     }
 
-    fn recall(&mut self) -> Option<Record> {
-        self.recalled.pop_front()
+    fn replay(&mut self) -> Option<Record> {
+        self.replayed.pop_front()
     }
 
     fn record(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {

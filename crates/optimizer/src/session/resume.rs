@@ -1,24 +1,23 @@
-//! Going on with a run that was broken off: its directory holds all that is needed.
+//! Resuming an interrupted run: its directory holds all that is needed.
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use fluxmorph_geometry::ranks::Team;
 
+use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Options, Session, constraint_names, unreached};
+use super::{Options, Session, constraint_names};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
-use crate::memory_estimate::of_evaluation;
-use crate::memory_limit;
 use crate::observer::Observer;
 use crate::output::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::setup::{Purpose, set_up_watched};
+use crate::rounds::RoundEvent;
+use crate::setup::Purpose;
 
 /// Largest configuration and largest result that are read [bytes].
 const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
@@ -45,7 +44,7 @@ impl SavedRun {
     /// Reads manifest and configuration; nothing is written.
     ///
     /// # Errors
-    /// [`Error::NotResumable`] where there is no run to go on with, faults of the configuration, files that cannot be read.
+    /// [`Error::NotResumable`] where there is no run to resume, [`OutputError::OlderJournal`], faults of the configuration, files that cannot be read.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
         let directory = RunDirectory::open(disk, path)?;
         let manifest = Manifest::read(&directory)?;
@@ -53,6 +52,7 @@ impl SavedRun {
             let cause = format!("it holds a `{}`, which is done in one go: start it again", manifest.command);
             return Err(not_resumable(&directory, cause));
         }
+        directory.refuse_older_journal()?;
         let (mut config, source) = configuration(&directory, &manifest)?;
         config.output.directory = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         Ok(Self { directory, manifest, config, source })
@@ -64,8 +64,7 @@ impl SavedRun {
     }
 }
 
-/// Goes on with a run as if it had not been broken off: history, fields, journal and result are those of a run without a
-/// break, but for times.
+/// Resumes an interrupted run: history, fields, journal and result are those of a run without a break, but for times.
 ///
 /// A run that has ended by itself is left as it is, and its result returned; so is one that used up its evaluations, unless
 /// `limits` allows more.
@@ -79,7 +78,6 @@ pub fn resume(
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
-    let clock = Instant::now();
     let SavedRun { directory, manifest, mut config, source } = saved;
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
     config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
@@ -88,67 +86,69 @@ pub fn resume(
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(result);
     }
-    observer.phase("setting up mesh and matrices");
-    let told = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, options.team, told)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), &source, options.older_run)?;
-    if (options.interrupted)() {
-        return Err(Error::InterruptedRun);
-    }
-    let initial = setup.problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-    let approach = setup.problem.approach(&initial, options.interrupted).map_err(|error| match error {
+    let (prepared, approach) = prepare(&config, &source, options, observer).map_err(|error| match error {
         Error::Interrupted => Error::InterruptedRun,
-        other => unreached(other, &config, &source),
+        other => other,
     })?;
-    let setup_seconds = clock.elapsed().as_secs_f64();
-    let mut session = Session {
-        command: "run",
-        config: &config,
-        source: &source,
-        setup,
-        directory: directory.clone(),
-        manifest,
-        clock,
-        setup_seconds,
-    };
+    let mut session = prepared.session("run", directory.clone(), manifest);
+    let contents = journal(&directory, &session.identity(), observer)?;
     let ranks = session.manifest.ranks;
-    session.manifest.ranks = session.manifest.ranks.max(options.team.map(Team::size));
-    let identity = session.identity();
-    let contents = journal(&directory, &identity, observer)?;
-    session.manifest.resumed(Resumption::now(
-        contents.as_ref().map_or(0, |contents| contents.records.len()),
-        LimitsInForce::of(&config.optimizer),
-        options.threads,
-    ));
-    for file in surface_files(&config.output.stl) {
-        if !session.manifest.surfaces.contains(&file) {
-            session.manifest.surfaces.push(file);
-        }
-    }
+    session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;
     if contents.is_none() {
-        observer.warning("there is no journal.bin: all evaluations are computed anew");
+        observer.warning("there is no journal.jsonl: all evaluations are computed anew");
     }
-    let names: Vec<String> =
-        constraint_names(&session.setup.problem).into_iter().map(str::to_owned).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let kept = config.output.fields;
     // Before the manifest is touched: the journal holds the directory against other processes.
-    let recorder = match contents {
-        Some(contents) => DirectoryRecorder::reopen(&directory, contents, &names, kept, ranks)?,
-        None => {
-            directory.remove_leftovers(&[])?;
-            directory.remove(&directory.collection())?;
-            DirectoryRecorder::create(&directory, identity, &names, kept)?
-        }
-    };
-    let pieces = session.pieces();
-    let recorder = recorder.written_by(pieces);
+    let recorder = session.recorder(&directory, contents, ranks)?;
     session.manifest.write(&directory)?;
-    session.conclude(observer, |session, observer| {
-        session.optimise(&approach, recorder, options.interrupted, observer)
-    })
+    session.conclude(observer, |session, observer| session.optimise(&approach, recorder, observer))
+}
+
+/// The problem as the run began with it.
+fn prepare<'a>(
+    config: &'a Config,
+    source: &'a Source,
+    options: Options<'a>,
+    observer: &mut dyn Observer,
+) -> Result<(Prepared<'a>, Vec<RoundEvent>), Error> {
+    let mut prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
+    let approach = prepared.approach_initial()?;
+    Ok((prepared, approach))
+}
+
+impl Session<'_> {
+    /// Adds a resumption behind so many evaluations to the manifest, which is not written yet.
+    fn note_resumption(&mut self, evaluations: usize, options: Options<'_>) {
+        let Self { manifest, config, .. } = self;
+        manifest.ranks = manifest.ranks.max(options.team.map(Team::size));
+        manifest.resumed(Resumption::now(evaluations, LimitsInForce::of(&config.optimizer), options.threads));
+        for file in surface_files(&config.output.stl) {
+            if !manifest.surfaces.contains(&file) {
+                manifest.surfaces.push(file);
+            }
+        }
+    }
+
+    /// What records behind a journal, or from the start where there is none.
+    fn recorder<'d>(
+        &self,
+        directory: &'d RunDirectory,
+        contents: Option<Contents>,
+        ranks: Option<usize>,
+    ) -> Result<DirectoryRecorder<'d>, Error> {
+        let names = constraint_names(&self.setup.problem);
+        let kept = self.config.output.fields;
+        let recorder = match contents {
+            Some(contents) => DirectoryRecorder::reopen(directory, contents, &names, kept, ranks)?,
+            None => {
+                directory.remove_leftovers(&[])?;
+                directory.remove(&directory.collection())?;
+                DirectoryRecorder::create(directory, self.identity(), &names, kept)?
+            }
+        };
+        Ok(recorder.written_by(self.pieces()))
+    }
 }
 
 fn not_resumable(directory: &RunDirectory, cause: String) -> Error {

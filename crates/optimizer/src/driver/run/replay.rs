@@ -1,4 +1,5 @@
-//! What was computed before a run was broken off is told again, as long as the method asks for the same to the last bit.
+//! The replay: what was computed before a run was interrupted answers the method, as long as that asks for the same to the
+//! last bit.
 
 use std::time::Instant;
 
@@ -6,9 +7,8 @@ use fluxmorph_remesh::Motion;
 
 use super::{BestSoFar, Field, Run};
 use crate::algorithm::Sample;
-use crate::driver::{Best, Stop};
+use crate::driver::{Best, Record, Stop, reference_hash};
 use crate::error::Error;
-use crate::journal::{Record, reference_hash};
 use crate::memory::Memory;
 use crate::problem::Want;
 
@@ -59,7 +59,7 @@ impl Run<'_> {
     }
 
     /// The answer to a design that was computed before the run was broken off.
-    pub(super) fn recall(&mut self, record: Record) -> Result<Sample, Stop> {
+    pub(super) fn replay(&mut self, record: Record) -> Result<Sample, Stop> {
         let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
         let initial = self.initial(record.row.objective, record.row.worst_quality, &values)?;
         let sample = self.sample(&initial, &record);
@@ -75,25 +75,25 @@ impl Run<'_> {
         self.clock = Instant::now();
         self.observer.evaluation(&record.row);
         let field =
-            |run: &Self| Field::Recalled(Box::new(Setting { motion: run.shape().motion.clone(), memory }));
+            |run: &Self| Field::Replayed(Box::new(Setting { motion: run.shape().motion.clone(), memory }));
         self.keep(record, sample.clone(), standing, field);
         Ok(sample)
     }
 
-    /// Whether there are evaluations of before that are still to be told.
-    pub(super) fn is_recalling(&mut self) -> bool {
+    /// Whether there are evaluations of before that are still to be replayed.
+    pub(super) fn is_replaying(&mut self) -> bool {
         if self.next.is_none() {
-            self.next = self.recorder.recall();
+            self.next = self.recorder.replay();
         }
         self.next.is_some()
     }
 
-    /// The best design with its field: one that was recalled is computed in its own round, and comes out as it was.
+    /// The best design with its field: one that was replayed is computed in its own round, and comes out as it was.
     pub(super) fn analysed(&mut self, best: BestSoFar) -> Result<Best, Error> {
         let BestSoFar { evaluation, values, objective, violation, field, .. } = best;
         let analysis = match field {
             Field::Computed(analysis) => *analysis,
-            Field::Recalled(setting) => {
+            Field::Replayed(setting) => {
                 self.observer.phase("computing the field of the best design");
                 let Setting { motion, mut memory } = *setting;
                 let own = std::mem::replace(&mut self.shape_mut().motion, motion);

@@ -1,0 +1,65 @@
+//! One evaluation as a recorder keeps it: all that answers the method when a run is resumed.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_solver::linear::Method;
+use serde::{Deserialize, Serialize};
+
+use crate::observer::Evaluation;
+use crate::problem::Timings;
+
+/// One evaluation with everything that a resumed run needs of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Its row in the history; objective and round stand there.
+    pub row: Evaluation,
+    /// Whether it was the best until then.
+    pub improved: bool,
+    /// The design variables [m].
+    pub design: Vec<f64>,
+    /// dF/dp [unit of F per m].
+    pub gradient: Vec<f64>,
+    /// What the constraints measure, in SI, with the derivatives by the variables.
+    pub constraints: Vec<(f64, Vec<f64>)>,
+    /// [`reference_hash`] of the round's reference mesh.
+    pub reference: String,
+    /// The method of the linear solver that worked last, by state; `None` where it is the first one.
+    #[serde(with = "method_names")]
+    pub methods: Vec<Option<Method>>,
+    /// Largest relative residual of its linear solves.
+    pub worst_residual: f64,
+    /// Where its time went.
+    #[serde(rename = "timings_s")]
+    pub timings: Timings,
+}
+
+/// BLAKE3 of the points of a mesh whose topology is known, hexadecimal.
+pub fn reference_hash(mesh: &Mesh) -> String {
+    let bytes: Vec<u8> = mesh.points().as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
+    blake3::hash(&bytes).to_hex().to_string()
+}
+
+/// Methods by the names that they have in a configuration.
+mod method_names {
+    use fluxmorph_solver::linear::Method;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(
+        methods: &[Option<Method>],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let names: Vec<_> = methods.iter().map(|method| method.map(Method::name)).collect();
+        names.serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<Option<Method>>, D::Error> {
+        let method = |name: String| {
+            let known = Method::ALL.into_iter().find(|method| method.name() == name);
+            known.ok_or_else(|| D::Error::custom("an unknown method of solution"))
+        };
+        let names = Vec::<Option<String>>::deserialize(deserializer)?;
+        names.into_iter().map(|name| name.map(method).transpose()).collect()
+    }
+}

@@ -1,0 +1,100 @@
+//! One analysis with its directory: the field of a single design.
+
+use super::prepared::Prepared;
+use super::recorder::{write_collection, write_field};
+use super::summary::{constraints, terms};
+use super::{Options, Session};
+use crate::config::{Config, FieldsKept, Source};
+use crate::error::Error;
+use crate::exports;
+use crate::memory::Memory;
+use crate::observer::Observer;
+use crate::output::{ObjectiveResult, RunResult, StopReason};
+use crate::problem::{Analysis, Problem, Want};
+use crate::rounds::RoundEvent;
+use crate::setup::Purpose;
+use crate::stage::Stage;
+
+/// Analyses one design and writes its field and result.
+///
+/// # Errors
+/// As [`super::run`].
+pub fn solve(
+    config: &Config,
+    source: &Source,
+    design: Option<Vec<f64>>,
+    options: Options<'_>,
+    observer: &mut dyn Observer,
+) -> Result<RunResult, Error> {
+    let mut prepared = Prepared::new(config, source, Purpose::Analysis, options, observer)?;
+    let values = design_values(&prepared.setup.problem, design, observer);
+    // A design that breaks the mesh is refused before an earlier run is replaced.
+    let p = values.as_deref().unwrap_or_default();
+    let problem = &mut prepared.setup.problem;
+    let approach = problem.approach(p, options.interrupted)?;
+    let moved = problem.moved(p)?;
+    let session = prepared.begin("solve", observer)?;
+    session.conclude(observer, |session, observer| {
+        let problem = &session.setup.problem;
+        approach.iter().for_each(|event| observer.round(event));
+        observer.phase("solving the field");
+        let stages = &mut |stage| observer.stage(stage);
+        let analysis = problem.analyse_watched(&mut Memory::default(), p, moved, Want::Gradient, stages)?;
+        session.write_analysis(values.as_deref(), &analysis, approach, observer)
+    })
+}
+
+/// The design to analyse: the one given, or the initial one; `None` without a design surface.
+fn design_values(
+    problem: &Problem,
+    given: Option<Vec<f64>>,
+    observer: &mut dyn Observer,
+) -> Option<Vec<f64>> {
+    let shape = problem.shape.as_ref()?;
+    let values = given.unwrap_or_else(|| shape.initial.clone());
+    let outside = |k: usize| values[k] < shape.lower[k] || values[k] > shape.upper[k];
+    if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
+        observer.warning(&format!("design variable {k} = {} mm lies outside its bounds", values[k] * 1e3));
+    }
+    Some(values)
+}
+
+impl Session<'_> {
+    /// Writes the field and the exports of an analysis; returns its result.
+    fn write_analysis(
+        &self,
+        values: Option<&[f64]>,
+        analysis: &Analysis,
+        rounds: Vec<RoundEvent>,
+        observer: &mut dyn Observer,
+    ) -> Result<RunResult, Error> {
+        let (config, problem) = (self.config, &self.setup.problem);
+        observer.stage(Stage::Writing);
+        for event in &analysis.solver_events {
+            observer.notice(&event.to_string());
+        }
+        let bounds = problem.bounds(values.unwrap_or_default(), analysis)?;
+        if config.output.fields != FieldsKept::Nothing {
+            write_field(&self.directory, self.pieces().as_ref(), 0, problem, analysis)?;
+            write_collection(&self.directory, &[0])?;
+        }
+        exports::write(config, &self.directory, &analysis.mesh, observer)?;
+        let initial_quality = problem.quality(&problem.original).worst;
+        let (reason, timings) = (StopReason::Done, &analysis.timings);
+        Ok(RunResult {
+            evaluations: 1,
+            objective: analysis.objective.map(|value| ObjectiveResult {
+                initial: value,
+                best: value,
+                ratio: 1.0,
+                best_evaluation: 0,
+                verified_ratio: None,
+                verification: None,
+                terms: terms(problem, analysis),
+            }),
+            constraints: constraints(problem, analysis, &bounds),
+            rounds,
+            ..self.result(reason, analysis, values, initial_quality, timings, observer)?
+        })
+    }
+}
