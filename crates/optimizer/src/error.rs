@@ -11,7 +11,6 @@ use crate::cli::{ExitCode, InitError};
 use crate::config::ConfigError;
 use crate::design::Apart;
 use crate::geometric::GeometricError;
-use crate::journal::Mismatch;
 use crate::output::{DesignFileError, OutputError};
 use crate::sweep::SweepError;
 
@@ -113,7 +112,7 @@ pub enum Error {
         /// The journal.
         path: PathBuf,
         /// The first difference.
-        cause: Mismatch,
+        cause: String,
     },
     /// The run takes another way than its journal says.
     #[error(

@@ -23,49 +23,6 @@ pub struct Identity {
     pub constraints: usize,
 }
 
-/// In what two identities differ.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Mismatch {
-    /// The program.
-    #[error("it was written by version {journal} of fluxmorph, this is {program}: go on with that version")]
-    Version {
-        /// Version that wrote the journal.
-        journal: String,
-        /// This version.
-        program: String,
-    },
-    /// The configuration.
-    #[error(
-        "it belongs to another configuration (hash {journal}, of config.toml and its overrides {now}): restore the \
-         config.toml that the run was started with"
-    )]
-    Configuration {
-        /// Hash in the journal.
-        journal: String,
-        /// Hash now.
-        now: String,
-    },
-    /// The mesh.
-    #[error(
-        "it belongs to another mesh (hash {journal}, now {now}): restore the mesh file that the run was started with"
-    )]
-    Mesh {
-        /// Hash in the journal.
-        journal: String,
-        /// Hash now.
-        now: String,
-    },
-    /// The sizes, which follow from the configuration.
-    #[error("it has {journal} variables and constraints, the problem has {now}")]
-    Sizes {
-        /// In the journal.
-        journal: String,
-        /// Now.
-        now: String,
-    },
-}
-
 impl Identity {
     /// That of a problem with so many variables and constraints.
     pub fn new(config: &Config, mesh: &Mesh, variables: usize, constraints: usize) -> Self {
@@ -76,25 +33,33 @@ impl Identity {
     /// Whether a journal of this identity belongs to the problem that is there now.
     ///
     /// # Errors
-    /// The first difference.
-    pub fn check(&self, now: &Self) -> Result<(), Mismatch> {
+    /// The first difference, and what to do.
+    pub fn check(&self, now: &Self) -> Result<(), String> {
         let short = |hash: &str| hash.chars().take(16).collect::<String>();
         let sizes = |identity: &Self| format!("{} and {}", identity.variables, identity.constraints);
-        if self.version != now.version {
-            let (journal, program) = (self.version.clone(), now.version.clone());
-            return Err(Mismatch::Version { journal, program });
-        }
-        if self.configuration != now.configuration {
-            let (journal, now) = (short(&self.configuration), short(&now.configuration));
-            return Err(Mismatch::Configuration { journal, now });
-        }
-        if self.mesh != now.mesh {
-            return Err(Mismatch::Mesh { journal: short(&self.mesh), now: short(&now.mesh) });
-        }
-        if sizes(self) != sizes(now) {
-            return Err(Mismatch::Sizes { journal: sizes(self), now: sizes(now) });
-        }
-        Ok(())
+        Err(if self.version != now.version {
+            format!(
+                "it was written by version {} of fluxmorph, this is {}: resume it with that version",
+                self.version, now.version
+            )
+        } else if self.configuration != now.configuration {
+            format!(
+                "it belongs to another configuration (hash {}, of config.toml and its overrides {}): restore the \
+                 config.toml that the run was started with",
+                short(&self.configuration),
+                short(&now.configuration)
+            )
+        } else if self.mesh != now.mesh {
+            format!(
+                "it belongs to another mesh (hash {}, now {}): restore the mesh file that the run was started with",
+                short(&self.mesh),
+                short(&now.mesh)
+            )
+        } else if sizes(self) != sizes(now) {
+            format!("it has {} variables and constraints, the problem has {}", sizes(self), sizes(now))
+        } else {
+            return Ok(());
+        })
     }
 }
 

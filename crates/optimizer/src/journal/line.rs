@@ -81,8 +81,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Contents, JournalError> {
         records.push(record);
         (sum, whole) = (next, whole + line.len());
     }
-    let usual = (whole - header).checked_div(records.len());
-    let rest = rest(&bytes[whole..], usual.unwrap_or_else(|| likely_record(&identity)));
+    let rest = rest(&bytes[whole..], (whole - header).checked_div(records.len()));
     Ok(Contents { identity, records, length: whole as u64, rest, sum })
 }
 
@@ -128,29 +127,23 @@ fn sum_of(line: &[u8], before: &str) -> Option<String> {
     (own == tail(&sum).as_bytes()).then_some(sum)
 }
 
-fn numbers_in_record(identity: &Identity) -> usize {
-    identity.constraints.saturating_add(2).saturating_mul(identity.variables.saturating_add(1))
-}
-
-/// Bytes of a record, about: most numbers have 17 digits.
-fn likely_record(identity: &Identity) -> usize {
-    numbers_in_record(identity).saturating_mul(21).saturating_add(1000)
-}
-
 /// Bytes that no record of such sizes exceeds. The names in it come from a configuration of at most 1 MiB, and an escaped
 /// character has six bytes.
 fn longest_record(identity: &Identity) -> usize {
-    numbers_in_record(identity).saturating_mul(32).saturating_add(1 << 23)
+    let numbers = identity.constraints.saturating_add(2).saturating_mul(identity.variables.saturating_add(1));
+    numbers.saturating_mul(32).saturating_add(1 << 23)
 }
 
-/// What is behind the whole records. A record that was cut short is part of one line, and hardly longer than another.
-fn rest(rest: &[u8], usual: usize) -> Rest {
+/// What is behind the whole records. One that was cut short is a part of one line, and hardly longer than is usual.
+fn rest(rest: &[u8], usual: Option<usize>) -> Rest {
     let bytes = rest.len() as u64;
     let is_one_line = rest.iter().rev().skip(1).all(|&byte| byte != b'\n');
     let sums = rest.windows(SUM.len()).filter(|window| *window == SUM.as_bytes()).count();
     match bytes {
         0 => Rest::Nothing,
-        _ if is_one_line && sums <= 1 && rest.len() / 2 <= usual => Rest::Torn(bytes),
+        _ if is_one_line && sums <= 1 && usual.is_none_or(|usual| rest.len() / 2 <= usual) => {
+            Rest::Torn(bytes)
+        }
         _ => Rest::Damaged(bytes),
     }
 }

@@ -16,7 +16,7 @@ use crate::driver::Record;
 use crate::error::Error;
 use crate::output::{OutputError, RunDirectory, SyncedLog};
 
-pub use identity::{Identity, Mismatch, configuration_hash, mesh_hash};
+pub use identity::{Identity, configuration_hash, mesh_hash};
 
 /// Largest journal that is read [bytes]: four hundred thousand evaluations of a thousand variables.
 const LARGEST: u64 = 1 << 34;

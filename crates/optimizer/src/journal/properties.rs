@@ -6,7 +6,7 @@ use fluxmorph_solver::linear::Method;
 use proptest::collection::{btree_map, vec};
 use proptest::option::of;
 use proptest::prelude::*;
-use proptest::sample::Index;
+use proptest::sample::{Index, select};
 
 use super::tests::{Written, record as example_record};
 use super::*;
@@ -19,46 +19,31 @@ fn number() -> impl Strategy<Value = f64> {
     prop_oneof![any::<f64>(), any_bits, Just(0.0), Just(-0.0)].prop_filter("finite", |x| x.is_finite())
 }
 
-fn row() -> impl Strategy<Value = Evaluation> {
-    let counts = (0usize..1000, 0usize..1000, 0usize..5);
-    let numbers = (number(), number(), number(), number());
-    let rest = (of(number()), of("\\PC{0,12}"), btree_map("\\PC{1,8}", number(), 0..3));
-    (counts, numbers, rest).prop_map(|(counts, (objective, ratio, seconds, step), (least, region, c))| {
-        let (evaluation, linear_iterations, round) = counts;
-        Evaluation {
-            evaluation,
-            iteration: evaluation,
-            objective,
-            ratio,
-            gradient_norm: step.abs(),
-            step_norm: step,
-            min_thickness_m: least,
-            linear_iterations,
-            seconds,
-            step_to_inversion: least,
-            inversion_region: region,
-            round,
-            constraints: c.into_iter().map(|(name, value)| (format!("c_{name}"), value)).collect(),
-            ..example_record(0).row
-        }
-    })
-}
-
 fn record(variables: usize, constraints: usize) -> impl Strategy<Value = Record> {
-    let methods = prop_oneof![Just(None), (0..Method::ALL.len()).prop_map(|at| Some(Method::ALL[at]))];
-    let numbers = (vec(number(), variables), vec(number(), variables));
-    let limits = vec((number(), vec(number(), variables)), constraints);
-    (row(), any::<bool>(), numbers, limits, "[0-9a-f]{64}", vec(methods, 0..4), number()).prop_map(
-        |(row, improved, (design, gradient), constraints, reference, methods, worst_residual)| Record {
-            row,
+    let vectors = vec(vec(number(), variables), 2 + constraints);
+    let names = (btree_map("c_\\PC{1,8}", number(), 0..3), of("\\PC{0,12}"));
+    let methods = vec(of(select(&Method::ALL[..])), 0..4);
+    (0usize..1000, any::<bool>(), vec(number(), 6 + constraints), vectors, names, methods).prop_map(
+        |(count, improved, numbers, vectors, (row_constraints, inversion_region), methods)| Record {
+            row: Evaluation {
+                evaluation: count,
+                objective: numbers[0],
+                ratio: numbers[1],
+                step_norm: numbers[2],
+                min_thickness_m: Some(numbers[3]).filter(|_| improved),
+                linear_iterations: count,
+                inversion_region,
+                constraints: row_constraints,
+                ..example_record(0).row
+            },
             improved,
-            design,
-            gradient,
-            constraints,
-            reference,
+            design: vectors[0].clone(),
+            gradient: vectors[1].clone(),
+            constraints: numbers[6..].iter().copied().zip(vectors[2..].iter().cloned()).collect(),
             methods,
-            worst_residual,
-            timings: Timings { state: worst_residual, ..Timings::default() },
+            worst_residual: numbers[4],
+            timings: Timings { state: numbers[5], ..Timings::default() },
+            ..example_record(0)
         },
     )
 }

@@ -235,7 +235,7 @@ fn the_first_difference_between_identities_is_named() {
         (Identity { mesh: "9".repeat(64), ..identity() }, "another mesh"),
         (Identity { variables: 4, ..identity() }, "4 and 1 variables"),
     ] {
-        let message = other.check(&now).expect_err("different").to_string();
+        let message = other.check(&now).expect_err("different");
         assert!(message.contains(word), "{message}");
     }
 }

@@ -24,7 +24,7 @@ use crate::error::Error;
 use crate::exports;
 use crate::finite;
 use crate::fresh_mesh::{Check, Gain, Shapes};
-use crate::journal::{self, Identity};
+use crate::journal::{self, Identity, Journal};
 use crate::memory_estimate::of_fresh_mesh;
 use crate::observer::{Observer, Started};
 use crate::output::{
@@ -68,17 +68,12 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
-    let mut prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
-    // A first design that the mesh cannot reach is refused before an earlier run is replaced.
-    let approach = prepared.approach_initial()?;
-    let session = prepared.begin("run", observer)?;
+    let prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
+    let session = prepared.approach_initial()?.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
-        let directory = session.directory.clone();
-        let names = constraint_names(&session.setup.problem);
-        let recorder =
-            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?;
-        let recorder = recorder.written_by(session.pieces());
-        session.optimise(&approach, recorder, observer)
+        let journal = Journal::create(&session.directory, session.identity())?;
+        let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;
+        session.optimise(recorder, observer)
     })
 }
 
@@ -101,6 +96,8 @@ struct Session<'a> {
     config: &'a Config,
     source: &'a Source,
     setup: Setup,
+    /// Steps that took the mesh near the first design.
+    approach: Vec<RoundEvent>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
@@ -143,12 +140,11 @@ impl Session<'_> {
     /// Optimises, and writes what the best design leaves.
     fn optimise(
         &mut self,
-        approach: &[RoundEvent],
-        mut recorder: DirectoryRecorder<'_>,
+        mut recorder: DirectoryRecorder,
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        approach.iter().for_each(|event| observer.round(event));
+        self.approach.iter().for_each(|event| observer.round(event));
         let problem = &mut self.setup.problem;
         let optimised =
             driver::optimise(problem, &config.optimizer, observer, &mut recorder, self.interrupted)?;
@@ -171,7 +167,7 @@ impl Session<'_> {
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
+            rounds: self.approach.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
             ..self.result(
                 optimised.stop_reason,
@@ -264,11 +260,6 @@ impl Session<'_> {
         result.peak_memory_bytes = peak_memory_bytes();
         Ok(result)
     }
-}
-
-/// Names of the constraints in their order.
-fn constraint_names(problem: &Problem) -> Vec<&str> {
-    problem.constraints.iter().map(|constraint| constraint.name.as_str()).collect()
 }
 
 /// Origin and content hash of the mesh with all its regions.

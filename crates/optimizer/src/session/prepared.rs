@@ -1,4 +1,5 @@
-//! What `run`, `solve` and `resume` begin with: a problem that is set up, before anything is written.
+//! What `run`, `solve` and `resume` begin with: a problem that is set up and brought near its first design, before
+//! anything is written.
 
 use std::time::Instant;
 
@@ -17,10 +18,12 @@ use crate::setup::{Purpose, Setup, set_up_watched};
 
 /// A problem that is set up, and what its set-up was given.
 pub(super) struct Prepared<'a> {
-    pub(super) config: &'a Config,
-    pub(super) source: &'a Source,
-    pub(super) options: Options<'a>,
     pub(super) setup: Setup,
+    /// Steps that took the mesh near the first design.
+    pub(super) approach: Vec<RoundEvent>,
+    config: &'a Config,
+    source: &'a Source,
+    options: Options<'a>,
     clock: Instant,
 }
 
@@ -42,20 +45,23 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, purpose, options.team, stages)?;
         memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
         Error::unless(options.interrupted)?;
-        Ok(Self { config, source, options, setup, clock })
+        Ok(Self { setup, approach: Vec::new(), config, source, options, clock })
     }
 
-    /// Takes the mesh near the initial design.
+    /// Takes the mesh near the initial design. One that it cannot reach is a fault of the configuration, and is refused
+    /// before an earlier run is replaced.
     ///
     /// # Errors
-    /// A design that the mesh cannot reach is a fault of the configuration; [`Error::Interrupted`].
-    pub(super) fn approach_initial(&mut self) -> Result<Vec<RoundEvent>, Error> {
+    /// [`Error::DesignUnreached`] at its place, and [`Error::Interrupted`].
+    pub(super) fn approach_initial(mut self) -> Result<Self, Error> {
         let problem = &mut self.setup.problem;
         let initial = problem.shape.as_ref().map(|shape| shape.initial.clone()).unwrap_or_default();
-        problem.approach(&initial, self.options.interrupted).map_err(|error| match error {
+        let approach = problem.approach(&initial, self.options.interrupted);
+        self.approach = approach.map_err(|error| match error {
             Error::DesignUnreached { .. } => placed(error, self.config, self.source),
             other => other,
-        })
+        })?;
+        Ok(self)
     }
 
     /// Takes the output directory, and writes the manifest.
@@ -87,8 +93,19 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { config, source, options, setup, clock } = self;
+        let Self { setup, approach, config, source, options, clock } = self;
         let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
-        Session { command, config, source, setup, directory, manifest, clock, setup_seconds, interrupted }
+        Session {
+            command,
+            config,
+            source,
+            setup,
+            approach,
+            directory,
+            manifest,
+            clock,
+            setup_seconds,
+            interrupted,
+        }
     }
 }

@@ -7,19 +7,20 @@ use std::collections::VecDeque;
 
 use fluxmorph_geometry::io::pvd_text;
 
+use super::Session;
 use super::pieces::SharedPieces;
 use crate::config::FieldsKept;
 use crate::driver::{Record, Recorder};
 use crate::error::Error;
 use crate::fields::{self, FieldData};
-use crate::journal::{Contents, Identity, Journal};
+use crate::journal::Journal;
 use crate::observer::Evaluation;
 use crate::output::{History, RunDirectory};
 use crate::problem::{Analysis, Problem};
 
 /// Writes journal, history and fields into the run directory.
-pub(super) struct DirectoryRecorder<'a> {
-    directory: &'a RunDirectory,
+pub(super) struct DirectoryRecorder {
+    directory: RunDirectory,
     journal: Journal,
     history: History,
     kept: FieldsKept,
@@ -27,71 +28,33 @@ pub(super) struct DirectoryRecorder<'a> {
     written: Vec<usize>,
     /// Evaluations of before that are still to be replayed.
     replayed: VecDeque<Record>,
-    /// Whether these have the bits of one process.
-    is_bitwise_reproducible: bool,
+    /// The most ranks that had a share in these; `None` where one process computed them.
+    ranks: Option<usize>,
     /// Where all ranks write the fields.
     pieces: Option<SharedPieces>,
 }
 
-impl<'a> DirectoryRecorder<'a> {
-    /// For a run that begins; `constraints` are the names of its constraints.
-    pub(super) fn create(
-        directory: &'a RunDirectory,
-        identity: Identity,
-        constraints: &[&str],
-        kept: FieldsKept,
-    ) -> Result<Self, Error> {
-        Ok(Self {
-            directory,
-            journal: Journal::create(directory, identity)?,
-            history: History::create(directory, constraints, &[])?,
-            kept,
-            written: Vec::new(),
-            replayed: VecDeque::new(),
-            is_bitwise_reproducible: true,
-            pieces: None,
-        })
-    }
-
-    /// For a run that is resumed: history, collection and field files are brought to what its journal holds.
-    /// `ranks` are the most that have computed it; `None` where one process has.
-    pub(super) fn reopen(
-        directory: &'a RunDirectory,
-        contents: Contents,
-        constraints: &[&str],
-        kept: FieldsKept,
-        ranks: Option<usize>,
-    ) -> Result<Self, Error> {
-        // The journal first: it holds the directory against other processes.
-        let journal = Journal::reopen(directory, &contents)?;
-        let records = contents.records;
-        let rows: Vec<&Evaluation> = records.iter().map(|record| &record.row).collect();
-        let history = History::create(directory, constraints, &rows)?;
+impl DirectoryRecorder {
+    /// Behind the records that the journal holds: history, collection and field files are brought to these.
+    pub(super) fn new(session: &Session<'_>, journal: Journal, replayed: Vec<Record>) -> Result<Self, Error> {
+        let (directory, problem) = (session.directory.clone(), &session.setup.problem);
+        let kept = session.config.output.fields;
+        let names: Vec<&str> =
+            problem.constraints.iter().map(|constraint| constraint.name.as_str()).collect();
+        let rows: Vec<&Evaluation> = replayed.iter().map(|record| &record.row).collect();
+        let history = History::create(&directory, &names, &rows)?;
         let mut written = directory.evaluations_with_fields()?;
-        written.retain(|&evaluation| records.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
+        written.retain(|&evaluation| replayed.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
         // No collection names a file that is removed.
         if written.is_empty() {
             directory.remove(&directory.collection())?;
         } else {
-            write_collection(directory, &written)?;
+            write_collection(&directory, &written)?;
         }
         directory.remove_leftovers(&written)?;
-        Ok(Self {
-            directory,
-            journal,
-            history,
-            kept,
-            written,
-            replayed: records.into(),
-            is_bitwise_reproducible: ranks.is_none(),
-            pieces: None,
-        })
-    }
-
-    /// The same with fields that all ranks write.
-    pub(super) fn written_by(mut self, pieces: Option<SharedPieces>) -> Self {
-        self.pieces = pieces;
-        self
+        let (pieces, ranks) = (session.pieces(), session.manifest.ranks);
+        let replayed = replayed.into();
+        Ok(Self { directory, journal, history, kept, written, replayed, ranks, pieces })
     }
 
     /// Writes the field of an evaluation, and the collection of all.
@@ -104,15 +67,15 @@ impl<'a> DirectoryRecorder<'a> {
         if self.written.last() == Some(&evaluation) {
             return Ok(());
         }
-        write_field(self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
+        write_field(&self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
         self.written.push(evaluation);
-        write_collection(self.directory, &self.written)
+        write_collection(&self.directory, &self.written)
     }
 }
 
-impl Recorder for DirectoryRecorder<'_> {
+impl Recorder for DirectoryRecorder {
     fn is_bitwise_reproducible(&self) -> bool {
-        self.is_bitwise_reproducible
+        self.ranks.is_none()
     }
 
     fn replay(&mut self) -> Option<Record> {

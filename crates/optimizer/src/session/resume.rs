@@ -7,7 +7,7 @@ use fluxmorph_geometry::ranks::Team;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Options, Session, constraint_names};
+use super::{Options, Session};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
@@ -16,7 +16,6 @@ use crate::output::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::rounds::RoundEvent;
 use crate::setup::Purpose;
 
 /// Largest configuration and largest result that are read [bytes].
@@ -86,35 +85,28 @@ pub fn resume(
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(result);
     }
-    let (prepared, approach) = prepare(&config, &source, options, observer).map_err(|error| match error {
-        Error::Interrupted => Error::InterruptedRun,
-        other => other,
-    })?;
+    let prepared = Prepared::new(&config, &source, Purpose::Optimisation, options, observer)
+        .and_then(Prepared::approach_initial)
+        .map_err(|error| match error {
+            Error::Interrupted => Error::InterruptedRun,
+            other => other,
+        })?;
     let mut session = prepared.session("run", directory.clone(), manifest);
     let contents = journal(&directory, &session.identity(), observer)?;
-    let ranks = session.manifest.ranks;
     session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;
-    if contents.is_none() {
-        observer.warning("there is no journal.jsonl: all evaluations are computed anew");
-    }
     // Before the manifest is touched: the journal holds the directory against other processes.
-    let recorder = session.recorder(&directory, contents, ranks)?;
+    let (journal, records) = match contents {
+        Some(contents) => (Journal::reopen(&directory, &contents)?, contents.records),
+        None => {
+            observer.warning("there is no journal.jsonl: all evaluations are computed anew");
+            (Journal::create(&directory, session.identity())?, Vec::new())
+        }
+    };
+    let recorder = DirectoryRecorder::new(&session, journal, records)?;
     session.manifest.write(&directory)?;
-    session.conclude(observer, |session, observer| session.optimise(&approach, recorder, observer))
-}
-
-/// The problem as the run began with it.
-fn prepare<'a>(
-    config: &'a Config,
-    source: &'a Source,
-    options: Options<'a>,
-    observer: &mut dyn Observer,
-) -> Result<(Prepared<'a>, Vec<RoundEvent>), Error> {
-    let mut prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
-    let approach = prepared.approach_initial()?;
-    Ok((prepared, approach))
+    session.conclude(observer, |session, observer| session.optimise(recorder, observer))
 }
 
 impl Session<'_> {
@@ -128,26 +120,6 @@ impl Session<'_> {
                 manifest.surfaces.push(file);
             }
         }
-    }
-
-    /// What records behind a journal, or from the start where there is none.
-    fn recorder<'d>(
-        &self,
-        directory: &'d RunDirectory,
-        contents: Option<Contents>,
-        ranks: Option<usize>,
-    ) -> Result<DirectoryRecorder<'d>, Error> {
-        let names = constraint_names(&self.setup.problem);
-        let kept = self.config.output.fields;
-        let recorder = match contents {
-            Some(contents) => DirectoryRecorder::reopen(directory, contents, &names, kept, ranks)?,
-            None => {
-                directory.remove_leftovers(&[])?;
-                directory.remove(&directory.collection())?;
-                DirectoryRecorder::create(directory, self.identity(), &names, kept)?
-            }
-        };
-        Ok(recorder.written_by(self.pieces()))
     }
 }
 

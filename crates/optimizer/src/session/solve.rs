@@ -11,7 +11,6 @@ use crate::memory::Memory;
 use crate::observer::Observer;
 use crate::output::{ObjectiveResult, RunResult, StopReason};
 use crate::problem::{Analysis, Problem, Want};
-use crate::rounds::RoundEvent;
 use crate::setup::Purpose;
 use crate::stage::Stage;
 
@@ -31,16 +30,16 @@ pub fn solve(
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
     let problem = &mut prepared.setup.problem;
-    let approach = problem.approach(p, options.interrupted)?;
+    prepared.approach = problem.approach(p, options.interrupted)?;
     let moved = problem.moved(p)?;
     let session = prepared.begin("solve", observer)?;
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
-        approach.iter().for_each(|event| observer.round(event));
+        session.approach.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let stages = &mut |stage| observer.stage(stage);
         let analysis = problem.analyse_watched(&mut Memory::default(), p, moved, Want::Gradient, stages)?;
-        session.write_analysis(values.as_deref(), &analysis, approach, observer)
+        session.write_analysis(values.as_deref(), &analysis, observer)
     })
 }
 
@@ -65,7 +64,6 @@ impl Session<'_> {
         &self,
         values: Option<&[f64]>,
         analysis: &Analysis,
-        rounds: Vec<RoundEvent>,
         observer: &mut dyn Observer,
     ) -> Result<RunResult, Error> {
         let (config, problem) = (self.config, &self.setup.problem);
@@ -93,7 +91,7 @@ impl Session<'_> {
                 terms: terms(problem, analysis),
             }),
             constraints: constraints(problem, analysis, &bounds),
-            rounds,
+            rounds: self.approach.clone(),
             ..self.result(reason, analysis, values, initial_quality, timings, observer)?
         })
     }
