@@ -9,7 +9,6 @@ use fluxmorph_solver::SolverError;
 
 use crate::config::ConfigError;
 use crate::exit_code::ExitCode;
-use crate::journal::Mismatch;
 use crate::output::{DesignFileError, OutputError};
 use crate::sweep::SweepError;
 
@@ -60,7 +59,7 @@ pub enum Error {
         /// The journal.
         path: PathBuf,
         /// The first difference.
-        cause: Mismatch,
+        cause: String,
     },
     /// A run directory that there is nothing to go on with in.
     #[error("`{}` cannot be resumed: {cause}", path.display())]
@@ -114,6 +113,7 @@ impl Error {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Optimizer(error) => exit_code_of_optimizer(error),
+            Self::Output(OutputError::OlderJournal { .. }) => ExitCode::Configuration,
             Self::Config(ConfigError::Read { .. })
             | Self::Design(DesignFileError::Read { .. })
             | Self::Output(_)

@@ -1,29 +1,27 @@
 //! Journals whose checksums are right: no mutation would ever find one by itself.
 
-/// Bytes of the mark and of the version of the form, before the header's length.
-const HEAD: usize = 12;
+/// What stands before the checksum of a line.
+const SUM: &[u8] = b",\"sum\":\"";
 
-/// Bytes of a checksum: the first of BLAKE3 over the checksum before it and what lies between.
-const CHECKSUM: usize = 16;
+/// Hexadecimal digits of a checksum: the first of BLAKE3 over the checksum before it and the line up to [`SUM`].
+const DIGITS: usize = 32;
 
-/// The end of the part that starts at `start`, whose length stands behind `before` bytes, without its checksum; `None`
-/// where the bytes end earlier.
-fn end(bytes: &[u8], start: usize, before: usize) -> Option<usize> {
-    let at = start.checked_add(before)?;
-    let length = u32::from_le_bytes(bytes.get(at..at.checked_add(4)?)?.try_into().ok()?) as usize;
-    let end = at.checked_add(4)?.checked_add(length)?;
-    (end.checked_add(CHECKSUM)? <= bytes.len()).then_some(end)
-}
-
-/// Replaces the checksums of header and records, as far as their lengths fit into the bytes.
-pub fn sign(bytes: &mut [u8]) {
-    let mut chain = [0; CHECKSUM];
-    let (mut start, mut before) = (0, HEAD);
-    while let Some(end) = end(bytes, start, before) {
+/// Gives every line its checksum, in place of one that it may have at its end.
+pub fn sign(bytes: &[u8]) -> Vec<u8> {
+    let mut signed = Vec::new();
+    let mut before = String::new();
+    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+        let Some(line) = line.strip_suffix(b"\n") else {
+            signed.extend(line);
+            break;
+        };
+        let tail = line.len().saturating_sub(SUM.len() + DIGITS + 2);
+        let has_sum = line[tail..].starts_with(SUM);
+        let body = if has_sum { &line[..tail] } else { line.strip_suffix(b"}").unwrap_or(line) };
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&chain).update(&bytes[start..end]);
-        chain.copy_from_slice(&hasher.finalize().as_bytes()[..CHECKSUM]);
-        bytes[end..end + CHECKSUM].copy_from_slice(&chain);
-        (start, before) = (end + CHECKSUM, 0);
+        hasher.update(before.as_bytes()).update(body);
+        before = hasher.finalize().to_hex()[..DIGITS].to_owned();
+        signed.extend([body, SUM, before.as_bytes(), b"\"}\n"].concat());
     }
+    signed
 }

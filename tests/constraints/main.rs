@@ -10,8 +10,10 @@ use fluxmorph::session::{self, Options};
 use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_geometry::io::read_vtu;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, Source};
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
+use fluxmorph_optimizer::observer::{Evaluation, Silent};
+use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use support::{config, repository, setup};
 

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph::journal;
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::journal;
 use fluxmorph_optimizer::problem::Timings;
 use serde_json::Value;
 
@@ -16,11 +17,10 @@ pub(crate) fn essence(files: &BTreeMap<PathBuf, Vec<u8>>) -> Essence {
         let name = path.file_name()?.to_str()?;
         let bytes = match name {
             // The report shows times, memory, the manifest and the directory; tests/report compares it.
-            "manifest.json" | "journal.damaged.bin" | "report.html" => return None,
+            "manifest.json" | "journal.damaged.jsonl" | "report.html" => return None,
             "result.json" => result(bytes),
-            "history.jsonl" => lines(bytes),
             "history.csv" => table(bytes),
-            "journal.bin" => format!("{:?}", records(bytes)).into_bytes(),
+            "journal.jsonl" => format!("{:?}", records(bytes)).into_bytes(),
             "resolved.toml" => without_own_keys(bytes),
             _ => bytes.clone(),
         };
@@ -65,16 +65,6 @@ fn result(bytes: &[u8]) -> Vec<u8> {
     value.to_string().into_bytes()
 }
 
-fn lines(bytes: &[u8]) -> Vec<u8> {
-    let text = std::str::from_utf8(bytes).expect("text");
-    let line = |line: &str| {
-        let mut value: Value = serde_json::from_str(line).expect("a row");
-        value.as_object_mut().expect("an object").remove("seconds");
-        format!("{value}\n")
-    };
-    text.lines().map(line).collect::<String>().into_bytes()
-}
-
 fn table(bytes: &[u8]) -> Vec<u8> {
     let text = std::str::from_utf8(bytes).expect("text");
     let header: Vec<&str> = text.lines().next().expect("a header").split(',').collect();
@@ -88,10 +78,10 @@ fn table(bytes: &[u8]) -> Vec<u8> {
     text.lines().map(line).collect::<String>().into_bytes()
 }
 
-fn records(bytes: &[u8]) -> Vec<journal::Record> {
+fn records(bytes: &[u8]) -> Vec<Record> {
     let contents = journal::parse(bytes).expect("a journal");
     assert_eq!(contents.rest.bytes(), 0);
-    let strip = |mut record: journal::Record| {
+    let strip = |mut record: Record| {
         record.row.seconds = 0.0;
         record.timings = Timings::default();
         record

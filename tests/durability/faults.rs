@@ -89,7 +89,7 @@ impl Trial<'_> {
                 Ok(_) => tally.resumed = 1,
                 // So early that there is nothing to go on with.
                 Err(Error::NotResumable { .. } | Error::Output(OutputError::NoRun { .. })) => {
-                    let journal = disk.files(FOLDER.as_ref()).remove(Path::new("journal.bin"));
+                    let journal = disk.files(FOLDER.as_ref()).remove(Path::new("journal.jsonl"));
                     assert!(
                         journal.is_none(),
                         "{context}: evaluations are there, and cannot be gone on with"

@@ -23,7 +23,7 @@ fn cut_behind(files: &BTreeMap<PathBuf, Vec<u8>>, evaluations: usize) -> Simulat
             continue;
         }
         let bytes = match name.as_ref() {
-            "journal.bin" => cut_journal(bytes, evaluations),
+            "journal.jsonl" => cut_journal(bytes, evaluations),
             "manifest.json" => {
                 String::from_utf8_lossy(bytes).replace("\"stopped\"", "\"running\"").into_bytes()
             }
@@ -35,22 +35,12 @@ fn cut_behind(files: &BTreeMap<PathBuf, Vec<u8>>, evaluations: usize) -> Simulat
     disk
 }
 
-/// The first records of a journal, and half of the next.
+/// The header and so many records of a journal, and half of the next.
 fn cut_journal(bytes: &[u8], records: usize) -> Vec<u8> {
-    let first = end_of(bytes, records);
-    let next = if records < count(bytes) { end_of(bytes, records + 1) } else { bytes.len() };
-    bytes[..first.midpoint(next)].to_vec()
-}
-
-/// Bytes of the header and so many records.
-fn end_of(bytes: &[u8], records: usize) -> usize {
-    let (mut without, mut with) = (0, bytes.len());
-    while with - without > 1 {
-        let middle = without.midpoint(with);
-        let has = journal::parse(&bytes[..middle]).is_ok_and(|contents| contents.records.len() >= records);
-        if has { with = middle } else { without = middle }
-    }
-    with
+    let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
+    let mut kept: Vec<u8> = lines.by_ref().take(1 + records).flatten().copied().collect();
+    kept.extend(lines.next().map_or(&[][..], |next| &next[..next.len() / 2]));
+    kept
 }
 
 fn count(bytes: &[u8]) -> usize {
@@ -79,7 +69,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("shield", shipped("shield_quick.toml")),
     ] {
         let (files, expected) = whole_run(&device);
-        let count = count(&files[Path::new("journal.bin")]);
+        let count = count(&files[Path::new("journal.jsonl")]);
         assert!(count >= 5, "{name}: {count}");
         for cut in 0..=count {
             let disk = cut_behind(&files, cut);
@@ -99,7 +89,7 @@ fn shipped_with(evaluations: usize) -> (Config, Source) {
 #[test]
 fn the_rounds_of_the_device_are_there_to_be_tested() {
     let (files, _) = whole_run(&with_rounds());
-    let records = journal::parse(&files[Path::new("journal.bin")]).expect("a journal").records;
+    let records = journal::parse(&files[Path::new("journal.jsonl")]).expect("a journal").records;
     let rounds: Vec<usize> = records.iter().map(|record| record.row.round).collect();
     assert!(rounds.last() > Some(&1), "{rounds:?}");
 }
@@ -108,7 +98,7 @@ fn the_rounds_of_the_device_are_there_to_be_tested() {
 fn a_run_may_be_cut_again_and_again() {
     for device in [constrained(), with_rounds(), shipped_with(8)] {
         let (files, expected) = whole_run(&device);
-        let count = count(&files[Path::new("journal.bin")]);
+        let count = count(&files[Path::new("journal.jsonl")]);
         let mut disk = cut_behind(&files, 0);
         for depth in 1..=5 {
             // Each time one evaluation more, then it is cut within the next.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use fluxmorph::journal;
 use fluxmorph_geometry::io::read_vtu;
+use fluxmorph_optimizer::journal::{self, Rest};
 
 /// What the ends of logs may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +38,12 @@ pub(crate) fn torn(files: &BTreeMap<PathBuf, Vec<u8>>, logs: Logs) -> Vec<String
             "msh" => text.ends_with("$EndElements\n"),
             "stl" => bytes.len() > 84,
             "html" => text.ends_with("</html>\n"),
-            "csv" | "jsonl" => logs == Logs::MayBeCut || text.is_empty() || text.ends_with('\n'),
-            "bin" => journal::parse(bytes).is_ok(),
+            "csv" => logs == Logs::MayBeCut || text.is_empty() || text.ends_with('\n'),
+            "jsonl" => journal::parse(bytes).is_ok_and(|contents| match contents.rest {
+                Rest::Nothing => true,
+                Rest::Torn(_) => logs == Logs::MayBeCut,
+                _ => false,
+            }),
             _ => false,
         }
     };

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use fluxmorph::journal::{Journal, Record};
-use fluxmorph::output::{RunDirectory, system_disk};
+use fluxmorph_optimizer::driver::Record;
+use fluxmorph_optimizer::journal::Journal;
+use fluxmorph_optimizer::output::{RunDirectory, system_disk};
 
 use crate::support;
 
@@ -70,7 +71,7 @@ pub(crate) fn completed(command: &mut Command) {
 /// The evaluations of a run.
 pub(crate) fn records(directory: &Path) -> Vec<Record> {
     let directory = RunDirectory::open(&system_disk(), directory).expect("a run directory");
-    Journal::read(&directory).expect("it is read").expect("there is one").records
+    Journal::read_records(&directory).expect("it is read")
 }
 
 /// `result.json` of a run.

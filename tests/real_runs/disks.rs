@@ -146,15 +146,15 @@ fn a_link_to_a_full_device_is_replaced_and_not_written_to() {
     let home = tempfile::tempdir().expect("a temporary folder");
     let device = block(home.path(), 12);
     let (expected, _) = device.undisturbed(home.path());
-    for name in ["history.csv", "history.jsonl", "fields.pvd", "fields/eval_0001.vtu", "journal.bin"] {
+    for name in ["history.csv", "fields.pvd", "fields/eval_0001.vtu", "journal.jsonl"] {
         let out = home.path().join("out");
         ended(device.command("run", &out).args(["--max-evaluations", "3"])).completed();
         std::fs::remove_file(out.join(name)).expect("there");
         std::os::unix::fs::symlink("/dev/full", out.join(name)).expect("linked");
         let again = ended(resume(&out).args(["--max-evaluations", "12"]));
-        if name == "journal.bin" {
+        if name == "journal.jsonl" {
             // What it held is gone; to read the device would take all memory.
-            again.with(5, &["journal.bin", "no plain file"]);
+            again.with(5, &["journal.jsonl", "no plain file"]);
         } else if name.ends_with(".vtu") {
             again.completed();
         } else {

@@ -51,7 +51,7 @@ impl Begun {
     }
 
     fn journal(&self) -> PathBuf {
-        self.out.join("journal.bin")
+        self.out.join("journal.jsonl")
     }
 
     fn edit(&self, name: &str, from: &str, to: &str) {
@@ -66,22 +66,21 @@ impl Begun {
 fn a_damaged_journal_goes_on_with_what_is_whole_or_is_refused() {
     let run = begun("out");
     let whole = std::fs::read(run.journal()).expect("a journal");
-    let header = (0..whole.len()).find(|&n| fluxmorph::journal::parse(&whole[..n]).is_ok());
-    let header = header.expect("a header");
+    let header = 1 + whole.iter().position(|&byte| byte == b'\n').expect("a header");
     let restored = |bytes: &[u8]| std::fs::write(run.journal(), bytes).expect("written");
     restored(&[]);
-    run.is_refused(5, &["journal.bin` is damaged", "does not begin as a journal"]);
+    run.is_refused(5, &["journal.jsonl` is damaged", "does not begin as a journal"]);
     restored(&whole[..header - 1]);
-    run.is_refused(5, &["journal.bin` is damaged", "header"]);
+    run.is_refused(5, &["journal.jsonl` is damaged", "header"]);
     // Another version of the program, of which the checksum knows nothing.
     let version = env!("CARGO_PKG_VERSION").as_bytes();
     let at = whole.windows(version.len()).position(|bytes| bytes == version).expect("a version");
     let mut other = whole.clone();
     other[at] = b'9';
     restored(&other);
-    run.is_refused(5, &["journal.bin` is damaged", "header"]);
+    run.is_refused(5, &["journal.jsonl` is damaged", "header"]);
     restored(b"PK\x03\x04 and so on");
-    run.is_refused(5, &["journal.bin` is damaged"]);
+    run.is_refused(5, &["journal.jsonl` is damaged"]);
     let mut random = fastrand::Rng::with_seed(3);
     let garbage: Vec<u8> = (0..5000).map(|_| random.u8(..)).collect();
     let cases: [(&str, Vec<u8>, &str); 4] = [
@@ -94,7 +93,7 @@ fn a_damaged_journal_goes_on_with_what_is_whole_or_is_refused() {
         restored(&bytes);
         let said = run.goes_on(name).said;
         assert!(said.contains(words), "{name}: {said}");
-        let kept = std::fs::read(run.out.join("journal.damaged.bin")).ok();
+        let kept = std::fs::read(run.out.join("journal.damaged.jsonl")).ok();
         assert_eq!(kept, words.starts_with("is damaged").then_some(bytes), "{name}");
         std::fs::remove_dir_all(&run.out).expect("removed");
         ended(run.device.command("run", &run.out).args(["--max-evaluations", "3"])).completed();
@@ -104,10 +103,21 @@ fn a_damaged_journal_goes_on_with_what_is_whole_or_is_refused() {
 }
 
 #[test]
+fn a_run_of_an_earlier_version_is_refused_and_may_be_replaced() {
+    let run = begun("out");
+    std::fs::rename(run.journal(), run.out.join("journal.bin")).expect("renamed");
+    std::fs::write(run.out.join("history.jsonl"), "{}\n").expect("written");
+    run.is_refused(3, &["journal.bin` is the journal of version", "start the run again with --force"]);
+    ended(&mut fluxmorph(&[&"report", &run.out])).with(3, &["journal.bin` is the journal of version"]);
+    ended(run.device.command("run", &run.out).arg("--force")).completed();
+    assert_same(&essence(&files(&run.out)), &run.expected, "replaced");
+}
+
+#[test]
 fn another_configuration_is_refused_and_what_does_not_matter_is_not() {
     let run = begun("out");
     run.edit("config.toml", "b = [0.0, 0.0, 0.1]", "b = [0.0, 0.0, 0.2]");
-    run.is_refused(3, &["journal.bin", "another configuration", "restore the config.toml"]);
+    run.is_refused(3, &["journal.jsonl", "another configuration", "restore the config.toml"]);
     run.edit("config.toml", "b = [0.0, 0.0, 0.2]", "b = [0.0, 0.0,");
     run.is_refused(3, &["config.toml"]);
     run.edit("config.toml", "b = [0.0, 0.0,", "b = [0.0, 0.0, 0.1]");

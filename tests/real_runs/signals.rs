@@ -155,7 +155,7 @@ fn the_second_signal_ends_a_run_at_once_and_it_can_be_gone_on_with() {
     let mut out = home.path().to_owned();
     let (answer, end) = best(&(MESSAGE, SECOND), |trial| {
         out = home.path().join(format!("out_{trial}"));
-        second_signal(&mut device.command("run", &out), || out.join("journal.bin").exists())
+        second_signal(&mut device.command("run", &out), || out.join("journal.jsonl").exists())
     });
     assert!(answer <= MESSAGE && end <= SECOND, "{answer:?}, {end:?}");
     assert_eq!(torn(&files(&out), Logs::MayBeCut), Vec::<String>::new());

@@ -27,7 +27,7 @@ fn a_damaged_file_is_named_and_the_older_page_stays() {
     let out = block("run", home.path(), &[]);
     let page = std::fs::read(out.join("report.html")).expect("a page");
     let field = "fields/eval_0000.vtu";
-    for name in ["result.json", "history.jsonl", field, "config.toml", "manifest.json"] {
+    for name in ["result.json", "journal.jsonl", field, "config.toml", "manifest.json"] {
         let path = out.join(name);
         let whole = std::fs::read(&path).expect("a file");
         let halved = whole[..whole.len() / 2].to_vec();
@@ -35,8 +35,8 @@ fn a_damaged_file_is_named_and_the_older_page_stays() {
             whole.iter().enumerate().map(|(i, b)| if i % 7 == 3 { b ^ 0x15 } else { *b }).collect();
         let hollow = b"{}\n".to_vec();
         for damaged in [halved, garbled, hollow] {
-            // A history that ends early is what a crash leaves: it is no damage.
-            if name == "history.jsonl" && whole.starts_with(&damaged) {
+            // A journal that ends early is what a crash leaves: it is no damage.
+            if name == "journal.jsonl" && whole.starts_with(&damaged) {
                 continue;
             }
             std::fs::write(&path, damaged).expect("written");

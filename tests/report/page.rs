@@ -171,15 +171,15 @@ fn a_run_that_was_broken_off_is_reported_as_far_as_it_went() {
     let out = home.path().join("out");
     shield(&out, &["--set", "output.fields=every"]);
     std::fs::remove_file(out.join("result.json")).expect("removed");
-    // As after a loss of power: the last row is cut short.
-    let rows = read(&out.join("history.jsonl"));
-    std::fs::write(out.join("history.jsonl"), &rows[..rows.len() - 20]).expect("written");
+    // As after a loss of power: the last record is cut short.
+    let records = read(&out.join("journal.jsonl"));
+    std::fs::write(out.join("journal.jsonl"), &records[..records.len() - 20]).expect("written");
     let page = report(&out);
     assert!(page.contains("there is no result") && page.contains("fluxmorph resume"));
     let elements_of = elements(&page);
     assert!(has_id(&elements_of, "shape-map") && has_id(&elements_of, "field-cut"));
     // Nothing but the beginning.
-    for file in ["history.jsonl", "history.csv", "journal.bin", "fields.pvd", "resolved.toml"] {
+    for file in ["history.csv", "journal.jsonl", "fields.pvd", "resolved.toml"] {
         std::fs::remove_file(out.join(file)).expect("removed");
     }
     std::fs::remove_dir_all(out.join("fields")).expect("removed");

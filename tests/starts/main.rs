@@ -13,8 +13,10 @@ use fluxmorph::observer::Silent;
 use fluxmorph::output::StopReason;
 use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::driver::{Recorder, optimise};
+use fluxmorph_optimizer::config::Optimizer;
+use fluxmorph_optimizer::driver::{Record, Recorder, optimise};
+use fluxmorph_optimizer::observer::Silent;
+use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use support::setup;
 

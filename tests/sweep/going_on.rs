@@ -29,7 +29,7 @@ fn finished_runs_are_skipped_and_further_values_begun() {
     let home = Home::new();
     let limit = ["--max-evaluations", "2"];
     home.sweep("out", &[&["--set", "design.upper=2 mm,4 mm"], &limit[..]].concat()).with(1, &[]);
-    let journal = home.path("out/design.upper=2mm/journal.bin");
+    let journal = home.path("out/design.upper=2mm/journal.jsonl");
     let before = std::fs::metadata(&journal).and_then(|file| file.modified()).expect("a file");
     // The program finds finished ones whatever they are called in the configuration, and with comments beside them.
     let text = home.text("block.toml").replace("title = ", "# A comment.\ntitle = ");

@@ -1,8 +1,7 @@
 //! What a journal belongs to: the version of the program, the configuration, the mesh.
 
 use fluxmorph_geometry::Mesh;
-
-use fluxmorph_optimizer::driver::hash_points;
+use serde::{Deserialize, Serialize};
 
 use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
 
@@ -10,61 +9,18 @@ use crate::config::{Config, MeshConfig, Optimizer, Output, resolved_toml};
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What a journal belongs to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Version of the program.
     pub version: String,
     /// [`configuration_hash`].
-    pub configuration: [u8; 32],
+    pub configuration: String,
     /// [`mesh_hash`] of the undeformed mesh.
-    pub mesh: [u8; 32],
+    pub mesh: String,
     /// Number of design variables.
     pub variables: usize,
     /// Number of constraints.
     pub constraints: usize,
-}
-
-/// In what two identities differ.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Mismatch {
-    /// The program.
-    #[error("it was written by version {journal} of fluxmorph, this is {program}: go on with that version")]
-    Version {
-        /// Version that wrote the journal.
-        journal: String,
-        /// This version.
-        program: String,
-    },
-    /// The configuration.
-    #[error(
-        "it belongs to another configuration (hash {journal}, of config.toml and its overrides {now}): restore the \
-         config.toml that the run was started with"
-    )]
-    Configuration {
-        /// Hash in the journal.
-        journal: String,
-        /// Hash now.
-        now: String,
-    },
-    /// The mesh.
-    #[error(
-        "it belongs to another mesh (hash {journal}, now {now}): restore the mesh file that the run was started with"
-    )]
-    Mesh {
-        /// Hash in the journal.
-        journal: String,
-        /// Hash now.
-        now: String,
-    },
-    /// The sizes, which follow from the configuration.
-    #[error("it has {journal} variables and constraints, the problem has {now}")]
-    Sizes {
-        /// In the journal.
-        journal: String,
-        /// Now.
-        now: String,
-    },
 }
 
 impl Identity {
@@ -77,33 +33,41 @@ impl Identity {
     /// Whether a journal of this identity belongs to the problem that is there now.
     ///
     /// # Errors
-    /// The first difference.
-    pub fn check(&self, now: &Self) -> Result<(), Mismatch> {
-        let hex = |hash: &[u8; 32]| hash.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<String>();
+    /// The first difference, and what to do.
+    pub fn check(&self, now: &Self) -> Result<(), String> {
+        let short = |hash: &str| hash.chars().take(16).collect::<String>();
         let sizes = |identity: &Self| format!("{} and {}", identity.variables, identity.constraints);
-        if self.version != now.version {
-            let (journal, program) = (self.version.clone(), now.version.clone());
-            return Err(Mismatch::Version { journal, program });
-        }
-        if self.configuration != now.configuration {
-            let (journal, now) = (hex(&self.configuration), hex(&now.configuration));
-            return Err(Mismatch::Configuration { journal, now });
-        }
-        if self.mesh != now.mesh {
-            return Err(Mismatch::Mesh { journal: hex(&self.mesh), now: hex(&now.mesh) });
-        }
-        if sizes(self) != sizes(now) {
-            return Err(Mismatch::Sizes { journal: sizes(self), now: sizes(now) });
-        }
-        Ok(())
+        Err(if self.version != now.version {
+            format!(
+                "it was written by version {} of fluxmorph, this is {}: resume it with that version",
+                self.version, now.version
+            )
+        } else if self.configuration != now.configuration {
+            format!(
+                "it belongs to another configuration (hash {}, of config.toml and its overrides {}): restore the \
+                 config.toml that the run was started with",
+                short(&self.configuration),
+                short(&now.configuration)
+            )
+        } else if self.mesh != now.mesh {
+            format!(
+                "it belongs to another mesh (hash {}, now {}): restore the mesh file that the run was started with",
+                short(&self.mesh),
+                short(&now.mesh)
+            )
+        } else if sizes(self) != sizes(now) {
+            format!("it has {} variables and constraints, the problem has {}", sizes(self), sizes(now))
+        } else {
+            return Ok(());
+        })
     }
 }
 
-/// BLAKE3 of everything in a configuration that an evaluation or the method depends on.
+/// BLAKE3 of everything in a configuration that an evaluation or the method depends on, hexadecimal.
 ///
-/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may go on. Nor is
+/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may be resumed. Nor is
 /// the path of a mesh file: its content is in [`mesh_hash`].
-pub fn configuration_hash(config: &Config) -> [u8; 32] {
+pub fn configuration_hash(config: &Config) -> String {
     let mut bare = config.clone();
     let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
     (bare.optimizer.max_evaluations, bare.optimizer.max_time) = (max_evaluations, max_time);
@@ -113,14 +77,16 @@ pub fn configuration_hash(config: &Config) -> [u8; 32] {
     if let MeshConfig::File { path, .. } = &mut bare.mesh {
         path.clear();
     }
-    *blake3::hash(resolved_toml(&bare).as_bytes()).as_bytes()
+    blake3::hash(resolved_toml(&bare).as_bytes()).to_hex().to_string()
 }
 
-/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles.
-pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
+/// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles, hexadecimal.
+pub fn mesh_hash(mesh: &Mesh) -> String {
     let topology = mesh.topology();
     let mut hasher = blake3::Hasher::new();
-    hash_points(&mut hasher, mesh);
+    mesh.points().as_flattened().iter().for_each(|c| {
+        hasher.update(&c.to_le_bytes());
+    });
     let mut number = |n: usize| {
         hasher.update(&(n as u64).to_le_bytes());
     };
@@ -141,5 +107,5 @@ pub fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
         number(triangles.len());
         triangles.iter().flatten().for_each(|node| number(node.index()));
     }
-    *hasher.finalize().as_bytes()
+    hasher.finalize().to_hex().to_string()
 }

@@ -1,128 +1,63 @@
 //! Journals by chance: any bytes, any records, cut at any byte, with any bit changed.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use proptest::collection::vec;
+use fluxmorph_solver::linear::Method;
+use proptest::collection::{btree_map, vec};
+use proptest::option::of;
 use proptest::prelude::*;
-use proptest::sample::Index;
+use proptest::sample::{Index, select};
 
+use super::tests::{Written, record as example_record};
 use super::*;
+use crate::observer::Evaluation;
+use fluxmorph_optimizer::problem::Timings;
 
-/// Any number with its bits, those that are none included.
+/// Any number, by its value or its bits.
 fn number() -> impl Strategy<Value = f64> {
-    prop_oneof![any::<f64>(), any::<u64>().prop_map(f64::from_bits), Just(0.0), Just(-0.0)]
-}
-
-/// A number that the history takes.
-fn finite() -> impl Strategy<Value = f64> {
-    any::<f64>().prop_filter("finite", |x| x.is_finite())
-}
-
-fn row() -> impl Strategy<Value = Evaluation> {
-    let counts = (0usize..1000, 0usize..1000, 0usize..5);
-    let numbers = (finite(), finite(), finite(), finite());
-    let rest = (proptest::option::of(finite()), proptest::option::of("\\PC{0,12}"));
-    (counts, numbers, rest, proptest::collection::btree_map("\\PC{1,8}", finite(), 0..3)).prop_map(
-        |(
-            (evaluation, linear_iterations, round),
-            (objective, ratio, seconds, step),
-            (least, region),
-            constraints,
-        )| {
-            let constraints: BTreeMap<String, f64> = constraints;
-            Evaluation {
-                evaluation,
-                iteration: evaluation,
-                objective,
-                ratio,
-                gradient_norm: step.abs(),
-                step_norm: step,
-                worst_quality: 0.5,
-                min_thickness_m: least,
-                max_thickness_m: None,
-                linear_iterations,
-                seconds,
-                step_to_inversion: least,
-                inversion_element: None,
-                inversion_region: region,
-                round,
-                constraints,
-            }
-        },
-    )
+    let any_bits = any::<u64>().prop_map(f64::from_bits);
+    prop_oneof![any::<f64>(), any_bits, Just(0.0), Just(-0.0)].prop_filter("finite", |x| x.is_finite())
 }
 
 fn record(variables: usize, constraints: usize) -> impl Strategy<Value = Record> {
-    let methods = prop_oneof![Just(None), (0..Method::ALL.len()).prop_map(|at| Some(Method::ALL[at]))];
-    let numbers = (vec(number(), variables), vec(number(), variables));
-    let limits = vec((number(), vec(number(), variables)), constraints);
-    (row(), any::<bool>(), numbers, limits, any::<[u8; 32]>(), vec(methods, 0..4), number()).prop_map(
-        |(row, improved, (design, gradient), constraints, reference, methods, worst_residual)| Record {
-            row,
+    let vectors = vec(vec(number(), variables), 2 + constraints);
+    let names = (btree_map("c_\\PC{1,8}", number(), 0..3), of("\\PC{0,12}"));
+    let methods = vec(of(select(&Method::ALL[..])), 0..4);
+    (0usize..1000, any::<bool>(), vec(number(), 6 + constraints), vectors, names, methods).prop_map(
+        |(count, improved, numbers, vectors, (row_constraints, inversion_region), methods)| Record {
+            row: Evaluation {
+                evaluation: count,
+                objective: numbers[0],
+                ratio: numbers[1],
+                step_norm: numbers[2],
+                min_thickness_m: Some(numbers[3]).filter(|_| improved),
+                linear_iterations: count,
+                inversion_region,
+                constraints: row_constraints,
+                ..example_record(0).row
+            },
             improved,
-            design,
-            gradient,
-            constraints,
-            reference,
+            design: vectors[0].clone(),
+            gradient: vectors[1].clone(),
+            constraints: numbers[6..].iter().copied().zip(vectors[2..].iter().cloned()).collect(),
             methods,
-            worst_residual,
-            timings: Timings { state: worst_residual, ..Timings::default() },
+            worst_residual: numbers[4],
+            timings: Timings { state: numbers[5], ..Timings::default() },
+            ..example_record(0)
         },
     )
-}
-
-/// Bytes of a journal with the ends of its header and records, and the records.
-#[derive(Clone, Debug)]
-struct Written {
-    bytes: Vec<u8>,
-    ends: Vec<usize>,
-    identity: Identity,
-    records: Vec<Record>,
 }
 
 fn written() -> impl Strategy<Value = Written> {
     (0usize..5, 0usize..3).prop_flat_map(|(variables, constraints)| {
-        let hashes = (any::<[u8; 32]>(), any::<[u8; 32]>(), "[0-9.a-z]{0,10}");
-        (hashes, vec(record(variables, constraints), 0..4)).prop_map(
+        let texts = ("[0-9a-f]{64}", "[0-9a-f]{64}", "[0-9.a-z]{0,10}");
+        (texts, vec(record(variables, constraints), 0..4)).prop_map(
             move |((configuration, mesh, version), records)| {
                 let identity = Identity { version, configuration, mesh, variables, constraints };
-                write(identity, records)
+                Written::new(identity, records)
             },
         )
     })
-}
-
-fn write(identity: Identity, records: Vec<Record>) -> Written {
-    let (mut bytes, mut chain) = codec::header(&identity);
-    let mut ends = vec![bytes.len()];
-    for record in &records {
-        let (own, next) = codec::record(record, &identity, &chain);
-        bytes.extend(own);
-        ends.push(bytes.len());
-        chain = next;
-    }
-    Written { bytes, ends, identity, records }
-}
-
-/// All bits of records, which may hold numbers that are not equal to themselves.
-fn bits(records: &[Record], identity: &Identity) -> Vec<Vec<u8>> {
-    let chain = [0; codec::CHECKSUM];
-    records.iter().map(|record| codec::record(record, identity, &chain).0).collect()
-}
-
-impl Written {
-    /// Whole records before a byte; `None` where the header is not whole.
-    fn whole_before(&self, at: usize) -> Option<usize> {
-        self.ends.iter().filter(|&&end| end <= at).count().checked_sub(1)
-    }
-
-    #[track_caller]
-    fn assert_holds(&self, contents: &Contents, count: usize) {
-        assert_eq!(contents.identity, self.identity);
-        assert_eq!(bits(&contents.records, &self.identity), bits(&self.records[..count], &self.identity));
-        assert_eq!(contents.length as usize, self.ends[count]);
-    }
 }
 
 proptest! {
@@ -131,32 +66,26 @@ proptest! {
     #[test]
     fn any_bytes_are_read_or_refused(bytes in vec(any::<u8>(), 0..300)) {
         prop_assert!(parse(&bytes).is_err());
-        let behind_a_mark = [b"FLXMJRNL\x01\0\0\0", &bytes[..]].concat();
+        let behind_a_mark = [b"{\"fluxmorph_journal\":2,", &bytes[..]].concat();
         prop_assert!(parse(&behind_a_mark).is_err());
     }
 
     #[test]
     fn any_records_are_read_back_to_the_bit(written in written()) {
-        let contents = parse(&written.bytes).expect("as written");
-        written.assert_holds(&contents, written.records.len());
-        prop_assert_eq!(contents.rest.bytes(), 0);
+        let rest = written.assert_prefix(&written.bytes, written.bytes.len());
+        prop_assert_eq!(rest, Some(Rest::Nothing));
     }
 
     #[test]
     fn any_bytes_behind_records_are_dropped(written in written(), tail in vec(any::<u8>(), 0..200)) {
-        let contents = parse(&[&written.bytes[..], &tail].concat()).expect("the header is whole");
-        written.assert_holds(&contents, written.records.len());
-        prop_assert_eq!(contents.rest.bytes() as usize, tail.len());
+        let whole = written.bytes.len();
+        written.assert_prefix(&[&written.bytes[..], &tail].concat(), whole);
     }
 
     #[test]
     fn cut_at_any_byte_a_journal_is_a_prefix_of_its_records(written in written(), cut in any::<Index>()) {
         let cut = cut.index(written.bytes.len());
-        match (parse(&written.bytes[..cut]), written.whole_before(cut)) {
-            (Ok(contents), Some(whole)) => written.assert_holds(&contents, whole),
-            (Err(_), None) => {}
-            (other, whole) => prop_assert!(false, "{whole:?}: {other:?}"),
-        }
+        written.assert_prefix(&written.bytes[..cut], cut);
     }
 
     #[test]
@@ -171,86 +100,54 @@ proptest! {
         }
         // Two of the changes may undo one another.
         let Some(first) = (0..bytes.len()).find(|&at| bytes[at] != written.bytes[at]) else { return Ok(()) };
-        match (parse(&bytes), written.whole_before(first)) {
-            (Ok(contents), Some(whole)) => written.assert_holds(&contents, whole),
-            (Err(_), None) => {}
-            (other, whole) => prop_assert!(false, "{whole:?}: {other:?}"),
+        written.assert_prefix(&bytes, first);
+    }
+
+    /// As an attacker writes it, who knows the checksum.
+    #[test]
+    fn a_changed_record_with_a_right_sum_has_the_sizes_of_the_header_or_is_none(
+        changes in vec((any::<Index>(), prop_oneof!["[\\[\\]{},:\"]", "[0-9.eE-]{1,3}", "null|true|\\PC"]), 1..4),
+    ) {
+        let (identity, record) = (super::tests::identity(), example_record(1));
+        let (header, sum) = line::header(&identity);
+        let mut body = serde_json::to_string(&record).expect("JSON");
+        for (at, text) in changes {
+            let at = at.index(body.len());
+            let next = (at + 1..).find(|&next| body.is_char_boundary(next)).expect("the end is one");
+            if body.is_char_boundary(at) {
+                body.replace_range(at..next, &text);
+            }
+        }
+        body.pop();
+        let bytes = format!("{header}{body}{}", line::tail(&line::checksum(&sum, body.as_bytes())));
+        let contents = parse(bytes.as_bytes()).expect("the header is whole");
+        prop_assert_eq!(contents.length + contents.rest.bytes(), bytes.len() as u64);
+        for record in &contents.records {
+            prop_assert_eq!((record.design.len(), record.gradient.len(), record.constraints.len()), (3, 3, 1));
         }
     }
 }
 
-fn example() -> Written {
-    let identity = Identity {
-        version: "0.1.0".into(),
-        configuration: [1; 32],
-        mesh: [2; 32],
-        variables: 2,
-        constraints: 1,
-    };
-    let row = |evaluation: usize| Evaluation {
-        evaluation,
-        iteration: evaluation,
-        objective: 0.5 + evaluation as f64,
-        ratio: 1.0,
-        gradient_norm: 1.0,
-        step_norm: 0.0,
-        worst_quality: 0.25,
-        min_thickness_m: None,
-        max_thickness_m: Some(0.02),
-        linear_iterations: 7,
-        seconds: 0.25,
-        step_to_inversion: None,
-        inversion_element: None,
-        inversion_region: Some("air".to_owned()),
-        round: 1,
-        constraints: BTreeMap::from([("volume".to_owned(), -0.5)]),
-    };
-    let record = |evaluation: usize| Record {
-        row: row(evaluation),
-        improved: evaluation.is_multiple_of(2),
-        design: vec![0.25, -0.0],
-        gradient: vec![1.0, f64::NAN],
-        constraints: vec![(-0.5, vec![0.1, 0.2])],
-        reference: [3; 32],
-        methods: vec![None, Some(Method::ALL[0])],
-        worst_residual: 1e-12,
-        timings: Timings::default(),
-    };
-    write(identity, (0..3).map(record).collect())
-}
-
-#[test]
-fn every_changed_bit_of_a_journal_is_found() {
-    let written = example();
-    for bit in 0..8 * written.bytes.len() {
-        let mut bytes = written.bytes.clone();
-        bytes[bit / 8] ^= 1 << (bit % 8);
-        match (parse(&bytes), written.whole_before(bit / 8)) {
-            (Ok(contents), Some(whole)) => written.assert_holds(&contents, whole),
-            (Err(_), None) => {}
-            (other, whole) => panic!("bit {bit}, {whole:?}: {other:?}"),
-        }
-    }
+fn seeds() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/journal")
 }
 
 /// Writes the seeds of the fuzz target: `cargo test --release -p fluxmorph-optimizer --lib -- --ignored write_the_journals`.
 #[test]
 #[ignore = "writes fuzz/seeds"]
 fn write_the_journals() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/journal");
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let written = example();
+    std::fs::create_dir_all(seeds()).expect("a folder");
+    let written = Written::example();
     // The target makes the checksums right where the first byte is odd.
     for (name, choice, end) in [("whole", 0, 3), ("signed", 1, 3), ("one", 1, 1), ("header", 1, 0)] {
         let bytes = [&[choice], &written.bytes[..written.ends[end]]].concat();
-        std::fs::write(folder.join(name), bytes).expect("a file");
+        std::fs::write(seeds().join(name), bytes).expect("a file");
     }
 }
 
 #[test]
 fn every_seed_of_the_fuzz_target_is_a_journal() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/journal");
-    for entry in std::fs::read_dir(folder).expect("a folder") {
+    for entry in std::fs::read_dir(seeds()).expect("a folder") {
         let path = entry.expect("readable").path();
         let bytes = std::fs::read(&path).expect("readable");
         let contents = parse(&bytes[1..]).unwrap_or_else(|error| panic!("{}: {error}", path.display()));

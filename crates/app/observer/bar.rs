@@ -194,7 +194,7 @@ impl<W: Write> Observer for Bar<W> {
         self.line(&table::row(row, Columns::Compact));
         self.tell(|shown| {
             let now = Instant::now();
-            // An evaluation that is recalled from a journal takes no time now.
+            // An evaluation that is replayed from a journal takes no time now.
             let since = shown.last.or(shown.began).map_or(0.0, |last| (now - last).as_secs_f64());
             if since > 0.5 * row.seconds {
                 shown.timed += 1;

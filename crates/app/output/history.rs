@@ -1,20 +1,19 @@
-//! `history.csv` and `history.jsonl`: one row an evaluation, on the disk before the next evaluation starts.
+//! `history.csv`: one row an evaluation, on the disk before the next evaluation starts.
 
 use serde_json::Value;
 
 use super::{OutputError, RunDirectory, SyncedLog, csv_text};
 use crate::observer::{Evaluation, column};
 
-/// Both history files of a run.
+/// The history of a run, for people; all that is in it is in the journal as well.
 #[derive(Debug)]
 pub struct History {
     csv: SyncedLog,
-    jsonl: SyncedLog,
     columns: Vec<String>,
 }
 
 impl History {
-    /// Starts both files with the rows so far; `constraints` are the names of the constraints in their order.
+    /// Starts the file with the rows so far; `constraints` are the names of the constraints in their order.
     ///
     /// # Errors
     /// When the operating system refuses.
@@ -26,21 +25,15 @@ impl History {
         let columns = columns(constraints);
         let mut table = format!("{}\n", columns.join(","));
         table.extend(rows.iter().map(|row| csv_line(row, &columns)));
-        let lines: String = rows.iter().map(|row| json_line(row)).collect();
-        Ok(Self {
-            csv: directory.log(&directory.history_csv(), table.as_bytes())?,
-            jsonl: directory.log(&directory.history_jsonl(), lines.as_bytes())?,
-            columns,
-        })
+        Ok(Self { csv: directory.log(&directory.history_csv(), table.as_bytes())?, columns })
     }
 
-    /// Appends one evaluation to both files, and waits until it is on the disk.
+    /// Appends one evaluation, and waits until it is on the disk.
     ///
     /// # Errors
     /// When the operating system refuses.
     pub fn append(&mut self, evaluation: &Evaluation) -> Result<(), OutputError> {
-        self.csv.append(csv_line(evaluation, &self.columns).as_bytes())?;
-        self.jsonl.append(json_line(evaluation).as_bytes())
+        self.csv.append(csv_line(evaluation, &self.columns).as_bytes())
     }
 }
 
@@ -60,12 +53,6 @@ fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
         other => other.to_string(),
     };
     format!("{}\n", columns.iter().map(cell).collect::<Vec<_>>().join(","))
-}
-
-/// The line of an evaluation in `history.jsonl`.
-fn json_line(evaluation: &Evaluation) -> String {
-    let object = serde_json::to_string(evaluation).expect("numbers and text have a JSON form");
-    format!("{object}\n")
 }
 
 #[cfg(test)]
@@ -109,12 +96,6 @@ mod tests {
                       round,c_volume\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));
-
-        let jsonl = std::fs::read_to_string(run.history_jsonl()).expect("read");
-        assert_eq!(jsonl.lines().count(), 2);
-        for line in jsonl.lines() {
-            assert_eq!(serde_json::from_str::<Evaluation>(line).expect("an evaluation"), evaluation());
-        }
     }
 
     #[test]

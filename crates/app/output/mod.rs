@@ -96,6 +96,17 @@ pub enum OutputError {
         /// What is wrong with it.
         message: String,
     },
+    /// The run is one of an earlier version.
+    #[error(
+        "`{path}` is the journal of version {version:?} of fluxmorph in a form that this version does not read: go on with the \
+         program that wrote it, or start the run again with --force"
+    )]
+    OlderJournal {
+        /// The journal.
+        path: PathBuf,
+        /// The version that wrote it.
+        version: String,
+    },
     /// The operating system refused.
     #[error("cannot {action} `{path}`: {source}; {}", advice(.source))]
     Io {

@@ -29,18 +29,20 @@ pub struct RunDirectory {
 }
 
 const MANIFEST: &str = "manifest.json";
-const JOURNAL: &str = "journal.bin";
+const JOURNAL: &str = "journal.jsonl";
 const CONFIG: &str = "config.toml";
 /// What a damaged journal is kept as.
-const DAMAGED_JOURNAL: &str = "journal.damaged.bin";
-/// The files of a run beside its manifest. The journal goes first: it must not be taken for that of a new run.
+const DAMAGED_JOURNAL: &str = "journal.damaged.jsonl";
+/// The journal of earlier versions.
+const OLDER_JOURNAL: &str = "journal.bin";
+/// The files of a run beside its manifest, at last those of earlier versions. The journal goes first: it must not be taken
+/// for that of a new run.
 const FILES: &[&str] = &[
     JOURNAL,
     DAMAGED_JOURNAL,
     CONFIG,
     "resolved.toml",
     "history.csv",
-    "history.jsonl",
     "fields.pvd",
     "result.json",
     "before.vtu",
@@ -49,6 +51,9 @@ const FILES: &[&str] = &[
     "tuned.toml",
     OPTIMUM,
     REPORT,
+    OLDER_JOURNAL,
+    "journal.damaged.bin",
+    "history.jsonl",
 ];
 const OPTIMUM: &str = "optimum.msh";
 const REPORT: &str = "report.html";
@@ -76,9 +81,25 @@ impl RunDirectory {
         self.make(&self.fields())
     }
 
-    /// Whether the configuration of a run has been saved, without which it cannot be gone on with.
+    /// Whether the configuration of a run has been saved, without which it cannot be resumed.
     pub fn holds_configuration(&self) -> bool {
-        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| name == CONFIG))
+        self.holds(CONFIG)
+    }
+
+    /// Refuses a run whose journal has the form of earlier versions.
+    ///
+    /// # Errors
+    /// [`OutputError::OlderJournal`].
+    pub fn refuse_older_journal(&self) -> Result<(), OutputError> {
+        if self.holds(JOURNAL) || !self.holds(OLDER_JOURNAL) {
+            return Ok(());
+        }
+        let version = Manifest::read(self).map(|manifest| manifest.version).unwrap_or_default();
+        Err(OutputError::OlderJournal { path: self.path.join(OLDER_JOURNAL), version })
+    }
+
+    fn holds(&self, file: &str) -> bool {
+        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| name == file))
     }
 
     /// The same without a folder for fields.
@@ -290,17 +311,12 @@ impl RunDirectory {
         self.path.join("history.csv")
     }
 
-    /// `history.jsonl`.
-    pub fn history_jsonl(&self) -> PathBuf {
-        self.path.join("history.jsonl")
-    }
-
-    /// `journal.bin`, all evaluations with their raw bits.
+    /// `journal.jsonl`, all evaluations to the last bit.
     pub fn journal(&self) -> PathBuf {
         self.path.join(JOURNAL)
     }
 
-    /// `journal.damaged.bin`, what a damaged journal is kept as.
+    /// `journal.damaged.jsonl`, what a damaged journal is kept as.
     pub fn damaged_journal(&self) -> PathBuf {
         self.path.join(DAMAGED_JOURNAL)
     }

@@ -13,8 +13,9 @@ use crate::journal::Journal;
 use crate::observer::Evaluation;
 use crate::output::{Manifest, OutputError, RunDirectory, RunResult};
 use crate::setup::{Outline, outline};
+use fluxmorph_optimizer::driver::Record;
 
-/// Largest history, result and configuration that are read [bytes].
+/// Largest result and configuration that are read [bytes].
 const LARGEST_TEXT: u64 = 1 << 28;
 
 /// A run as its directory tells it.
@@ -63,7 +64,8 @@ impl RunData {
             Some(text) => Some(serde_json::from_str(&text).map_err(damaged(&directory.result()))?),
             None => None,
         };
-        let history = history(&directory)?;
+        let records = Journal::read_records(&directory)?;
+        let history: Vec<Evaluation> = records.iter().map(|record| record.row.clone()).collect();
         let best = match &result {
             Some(RunResult { objective: Some(objective), .. }) => Some(objective.best_evaluation),
             Some(_) => Some(0),
@@ -91,7 +93,7 @@ impl RunData {
             // However the path is typed, the page is the same.
             directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
             resolved: text(&directory, &directory.resolved())?,
-            designs: designs(&directory, &config, result.as_ref(), best, &outline),
+            designs: designs(&records, &config, result.as_ref(), best, &outline),
             fields: [before?, after?],
             manifest,
             config,
@@ -152,15 +154,6 @@ pub(super) fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Ou
     move |error| OutputError::Damaged { path, message: error.to_string() }
 }
 
-/// The rows of the history; a last one that a crash cut short is dropped.
-fn history(directory: &RunDirectory) -> Result<Vec<Evaluation>, OutputError> {
-    let path = directory.history_jsonl();
-    let Some(text) = text(directory, &path)? else { return Ok(Vec::new()) };
-    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let row = |line: &str| serde_json::from_str(line).map_err(damaged(&path));
-    whole.lines().map(row).collect()
-}
-
 /// The last evaluation that was better than all before it.
 fn last_improved(history: &[Evaluation]) -> Option<usize> {
     let mut best: Option<&Evaluation> = None;
@@ -174,7 +167,7 @@ fn last_improved(history: &[Evaluation]) -> Option<usize> {
 
 /// The variables before and after: of the configuration and the result, else of the journal.
 fn designs(
-    directory: &RunDirectory,
+    records: &[Record],
     config: &Config,
     result: Option<&RunResult>,
     best: Option<usize>,
@@ -187,8 +180,7 @@ fn designs(
     let variables = outlined.surface.variable_count();
     let before = design.initial.values(variables, design.lower, design.upper);
     let of_result = result.and_then(|result| result.design.as_ref()).map(|design| design.values_m.clone());
-    // A journal that cannot be read is the business of `resume`.
-    let of_journal = || Some(Journal::read(directory).ok()??.records.into_iter().nth(best?)?.design);
+    let of_journal = || Some(records.get(best?)?.design.clone());
     let after = of_result.or_else(of_journal);
     let fits = |values: &Vec<f64>| values.len() == variables && values.iter().all(|v| v.is_finite());
     // A single analysis begins at the undeformed surface.

@@ -2,11 +2,13 @@
 //!
 //! The manifest is written first and completed last; journal, history and fields are written as evaluations come
 //! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
-//! final name is whole, and `resume` goes on with it.
+//! final name is whole, and it can be resumed.
 
 mod pieces;
+mod prepared;
 mod recorder;
 mod resume;
+mod solve;
 mod summary;
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -20,26 +22,22 @@ use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
 use crate::error::Error;
 use crate::exports;
 use crate::fresh_mesh::{self, Check, Gain, Shapes};
-use crate::journal::{self, Identity};
-use crate::memory_limit;
+use crate::journal::{self, Identity, Journal};
 use crate::observer::{RunObserver, Started};
 use crate::output::{
-    Disk, LimitsInForce, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus,
-    StopReason, check_finite, peak_memory_bytes, resume_command, surface_files,
+    Disk, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus, check_finite,
+    peak_memory_bytes, resume_command,
 };
 use crate::setup::blame::placed;
 use crate::setup::{Purpose, Setup, set_up_watched};
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::problem::RoundEvent;
-use fluxmorph_optimizer::problem::SolverCache;
-use fluxmorph_optimizer::problem::Stage;
-use fluxmorph_optimizer::problem::{Derivatives, Problem};
+use fluxmorph_optimizer::{Error as OptimizerError, driver};
 use pieces::SharedPieces;
-use recorder::{DirectoryRecorder, write_collection, write_field};
+use prepared::Prepared;
+use recorder::DirectoryRecorder;
 pub(crate) use resume::configuration;
 pub use resume::{Limits, SavedRun, resume};
+pub use solve::solve;
 use summary::{constraints, linear_solver, terms};
 
 /// What a session is told beside the configuration.
@@ -67,30 +65,17 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
-    let clock = Instant::now();
-    observer.phase("setting up mesh and matrices");
-    let progress = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Optimisation, options.team, progress)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
-    OptimizerError::unless(options.interrupted)?;
-    // A first design that the mesh cannot reach is refused before an earlier run is replaced.
-    let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-    let approach = setup.problem.continue_to(&initial, options.interrupted);
-    let approach = approach.map_err(|error| unreached(error.into(), config, source))?;
-    let session = Session::open("run", config, source, options, (setup, clock), observer)?;
+    let prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
+    let session = prepared.approach_initial()?.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
-        let directory = session.directory.clone();
-        let names = constraint_names(&session.setup.problem);
-        let pieces = session.pieces();
-        let recorder =
-            DirectoryRecorder::create(&directory, session.identity(), &names, config.output.fields)?
-                .written_by(pieces);
-        session.optimise(&approach, recorder, options.interrupted, observer)
+        let journal = Journal::create(&session.directory, session.identity())?;
+        let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;
+        session.optimise(recorder, observer)
     })
 }
 
-/// What a worker does, whatever the first rank is to do: it sets the same problem up, and executes commands until the first
-/// one ends. A set-up that fails here and not there is reported with the first command.
+/// The work of a rank that is not the first: it sets the same problem up, and executes commands until the first one ends.
+/// A set-up that fails here and not there is reported to the first one with its first command.
 ///
 /// # Panics
 /// At the first rank.
@@ -102,123 +87,23 @@ pub fn serve(group: &RankGroup, config: &Config, source: &Source, purpose: Purpo
     group.serve(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
 }
 
-/// Analyses one design and writes its field and result.
-///
-/// # Errors
-/// As [`run`].
-pub fn solve(
-    config: &Config,
-    source: &Source,
-    design: Option<Vec<f64>>,
-    options: Options<'_>,
-    observer: &mut dyn RunObserver,
-) -> Result<RunResult, Error> {
-    let clock = Instant::now();
-    observer.phase("setting up mesh and matrices");
-    let progress = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(config, source, Purpose::Analysis, options.team, progress)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
-    OptimizerError::unless(options.interrupted)?;
-    let values = match (setup.problem.shape(), design) {
-        (Some(shape), given) => {
-            let values = given.unwrap_or_else(|| shape.initial().to_vec());
-            let outside = |k: usize| values[k] < shape.lower()[k] || values[k] > shape.upper()[k];
-            if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
-                observer.warning(&format!(
-                    "design variable {k} = {} mm lies outside its bounds",
-                    values[k] * 1e3
-                ));
-            }
-            Some(values)
-        }
-        (None, _) => None,
-    };
-    // A design that breaks the mesh is refused before an earlier run is replaced.
-    let p = values.as_deref().unwrap_or_default();
-    let approach = setup.problem.continue_to(p, options.interrupted)?;
-    let moved = setup.problem.moved(p)?;
-    let session = Session::open("solve", config, source, options, (setup, clock), observer)?;
-    session.conclude(observer, |session, observer| {
-        let problem = &session.setup.problem;
-        approach.iter().for_each(|event| observer.round(event));
-        observer.phase("solving the field");
-        let p = values.as_deref().unwrap_or_default();
-        let progress = &mut |stage| observer.stage(stage);
-        let analysis =
-            problem.analyse(moved, p, Derivatives::First, &mut SolverCache::default(), progress)?;
-        observer.stage(Stage::Writing);
-        for event in &analysis.solver_events {
-            observer.notice(&event.to_string());
-        }
-        let bounds = problem.bounds(p, &analysis)?;
-        if config.output.fields != FieldsKept::Nothing {
-            write_field(&session.directory, session.pieces().as_ref(), 0, problem, &analysis)?;
-            write_collection(&session.directory, &[0])?;
-        }
-        exports::write(config, &session.directory, &analysis.mesh, observer)?;
-        let value = analysis.objective;
-        let initial_quality = problem.quality(problem.original()).worst;
-        Ok(RunResult {
-            evaluations: 1,
-            objective: value.map(|value| ObjectiveResult {
-                initial: value,
-                best: value,
-                ratio: 1.0,
-                best_evaluation: 0,
-                verified_ratio: None,
-                verification: None,
-                terms: terms(problem, &analysis),
-            }),
-            constraints: constraints(problem, &analysis, &bounds),
-            rounds: approach.clone(),
-            ..session.result(
-                StopReason::Done,
-                &analysis,
-                values.as_deref(),
-                initial_quality,
-                &analysis.timings,
-                observer,
-            )?
-        })
-    })
-}
-
 /// A run directory with its manifest, and the problem.
 struct Session<'a> {
     command: &'static str,
     config: &'a Config,
     source: &'a Source,
     setup: Setup,
+    /// Steps that took the mesh near the first design.
+    approach: Vec<RoundEvent>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
     setup_seconds: f64,
+    interrupted: &'a dyn Fn() -> bool,
 }
 
-impl<'a> Session<'a> {
-    /// Takes the output directory, and writes the manifest.
-    fn open(
-        command: &'static str,
-        config: &'a Config,
-        source: &'a Source,
-        options: Options<'_>,
-        (setup, clock): (Setup, Instant),
-        observer: &mut dyn RunObserver,
-    ) -> Result<Self, Error> {
-        let setup_seconds = clock.elapsed().as_secs_f64();
-        let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
-        let mut manifest = Manifest::started(command, options.threads).reading(source);
-        manifest.mesh = Some(mesh_hash(config, &setup.full_mesh));
-        manifest.ranks = options.team.map(RankGroup::size);
-        manifest.surfaces = surface_files(&config.output.stl);
-        manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
-        manifest.write(&directory)?;
-        let session = Self { command, config, source, setup, directory, manifest, clock, setup_seconds };
-        session.announce(observer);
-        Ok(session)
-    }
-
-    /// Tells what is set up.
+impl Session<'_> {
+    /// Reports what is set up.
     fn announce(&self, observer: &mut dyn RunObserver) {
         let Self { command, config, setup, directory, .. } = self;
         let mesh = setup.problem.original().topology();
@@ -253,16 +138,19 @@ impl<'a> Session<'a> {
     /// Optimises, and writes what the best design leaves.
     fn optimise(
         &mut self,
-        approach: &[RoundEvent],
-        mut recorder: DirectoryRecorder<'_>,
-        interrupted: &dyn Fn() -> bool,
+        mut recorder: DirectoryRecorder,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        approach.iter().for_each(|event| observer.round(event));
+        self.approach.iter().for_each(|event| observer.round(event));
         let problem = &mut self.setup.problem;
-        let optimised =
-            driver::optimise(problem, &config.optimizer.settings(), observer, &mut recorder, interrupted)?;
+        let optimised = driver::optimise(
+            problem,
+            &config.optimizer.settings(),
+            observer,
+            &mut recorder,
+            self.interrupted,
+        )?;
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, problem, &best.analysis)?;
@@ -282,7 +170,7 @@ impl<'a> Session<'a> {
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            rounds: approach.iter().chain(&optimised.rounds).cloned().collect(),
+            rounds: self.approach.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
             ..self.result(
                 optimised.stop_reason,
@@ -297,7 +185,7 @@ impl<'a> Session<'a> {
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.verified(result, &shapes, interrupted, observer)
+        self.verified(result, &shapes, observer)
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
@@ -353,7 +241,6 @@ impl<'a> Session<'a> {
         &mut self,
         mut result: RunResult,
         shapes: &Shapes,
-        interrupted: &dyn Fn() -> bool,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
@@ -365,7 +252,7 @@ impl<'a> Session<'a> {
         let (config, source) = (self.config, self.source);
         let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
         if let Some(objective) = &mut result.objective
-            && gain.verify(objective, interrupted, observer) == Check::CutShort
+            && gain.verify(objective, self.interrupted, observer) == Check::CutShort
         {
             // It can be made up for: the search is whole, the run is not.
             result.status = RunStatus::Interrupted;
@@ -378,19 +265,6 @@ impl<'a> Session<'a> {
     }
 }
 
-/// A first design that the mesh cannot reach is a fault of the configuration.
-fn unreached(error: Error, config: &Config, source: &Source) -> Error {
-    match error {
-        Error::Optimizer(OptimizerError::DesignUnreached { .. }) => placed(error, config, source),
-        other => other,
-    }
-}
-
-/// Names of the constraints in their order.
-fn constraint_names(problem: &Problem) -> Vec<&str> {
-    problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect()
-}
-
 /// Origin and content hash of the mesh with all its regions.
 pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
     let origin = match &config.mesh {
@@ -401,6 +275,10 @@ pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
         MeshConfig::File { path, .. } => path.display().to_string(),
     };
     let topology = mesh.topology();
-    let hash = blake3::Hash::from_bytes(journal::mesh_hash(mesh)).to_hex().to_string();
-    MeshHash { origin, blake3: hash, nodes: topology.node_count(), tets: topology.tets().len() }
+    MeshHash {
+        origin,
+        blake3: journal::mesh_hash(mesh),
+        nodes: topology.node_count(),
+        tets: topology.tets().len(),
+    }
 }

@@ -1,100 +1,61 @@
 //! What a run keeps as its evaluations come: fields, journal, history.
 //!
 //! The order is that of what must be on the disk first: a field file and the collection that names it, then the record in
-//! the journal, which makes the evaluation one that a resumed run is told, then the rows of the history.
+//! the journal, which makes the evaluation one that a resumed run replays, then the row of the history.
 
 use std::collections::VecDeque;
 
 use fluxmorph_geometry::io::pvd_text;
 
+use super::Session;
 use super::pieces::SharedPieces;
 use crate::config::FieldsKept;
 use crate::error::Error;
 use crate::fields::{self, FieldData};
-use crate::journal::{Contents, Identity, Journal};
+use crate::journal::Journal;
 use crate::observer::Evaluation;
 use crate::output::{History, RunDirectory};
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::driver::Recorder;
+use fluxmorph_optimizer::driver::{Record, Recorder};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 /// Writes journal, history and fields into the run directory.
-pub(super) struct DirectoryRecorder<'a> {
-    directory: &'a RunDirectory,
+pub(super) struct DirectoryRecorder {
+    directory: RunDirectory,
     journal: Journal,
     history: History,
     kept: FieldsKept,
     /// Evaluations with a field file, ascending.
     written: Vec<usize>,
-    /// Evaluations of before that are still to be told.
-    recalled: VecDeque<Record>,
-    /// Whether these have the bits of one process.
-    is_exact: bool,
+    /// Evaluations of before that are still to be replayed.
+    replayed: VecDeque<Record>,
+    /// The most ranks that had a share in these; `None` where one process computed them.
+    ranks: Option<usize>,
     /// Where all ranks write the fields.
     pieces: Option<SharedPieces>,
 }
 
-impl<'a> DirectoryRecorder<'a> {
-    /// For a run that begins; `constraints` are the names of its constraints.
-    pub(super) fn create(
-        directory: &'a RunDirectory,
-        identity: Identity,
-        constraints: &[&str],
-        kept: FieldsKept,
-    ) -> Result<Self, Error> {
-        Ok(Self {
-            directory,
-            journal: Journal::create(directory, identity)?,
-            history: History::create(directory, constraints, &[])?,
-            kept,
-            written: Vec::new(),
-            recalled: VecDeque::new(),
-            is_exact: true,
-            pieces: None,
-        })
-    }
-
-    /// For a run that goes on behind what its journal holds: history, collection and field files are brought to that.
-    /// `ranks` are the most that have computed it; `None` where one process has.
-    pub(super) fn reopen(
-        directory: &'a RunDirectory,
-        contents: Contents,
-        constraints: &[&str],
-        kept: FieldsKept,
-        ranks: Option<usize>,
-    ) -> Result<Self, Error> {
-        let is_exact = ranks.is_none();
-        // The journal first: it holds the directory against other processes.
-        let journal = Journal::reopen(directory, &contents)?;
-        let records = contents.records;
-        let rows: Vec<&Evaluation> = records.iter().map(|record| &record.row).collect();
-        let history = History::create(directory, constraints, &rows)?;
+impl DirectoryRecorder {
+    /// Behind the records that the journal holds: history, collection and field files are brought to these.
+    pub(super) fn new(session: &Session<'_>, journal: Journal, replayed: Vec<Record>) -> Result<Self, Error> {
+        let (directory, problem) = (session.directory.clone(), &session.setup.problem);
+        let kept = session.config.output.fields;
+        let names: Vec<&str> =
+            problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect();
+        let rows: Vec<&Evaluation> = replayed.iter().map(|record| &record.row).collect();
+        let history = History::create(&directory, &names, &rows)?;
         let mut written = directory.evaluations_with_fields()?;
-        written.retain(|&evaluation| records.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
+        written.retain(|&evaluation| replayed.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
         // No collection names a file that is removed.
         if written.is_empty() {
             directory.remove(&directory.collection())?;
         } else {
-            write_collection(directory, &written)?;
+            write_collection(&directory, &written)?;
         }
         directory.remove_leftovers(&written)?;
-        Ok(Self {
-            directory,
-            journal,
-            history,
-            kept,
-            written,
-            recalled: records.into(),
-            is_exact,
-            pieces: None,
-        })
-    }
-
-    /// The same with fields that all ranks write.
-    pub(super) fn written_by(mut self, pieces: Option<SharedPieces>) -> Self {
-        self.pieces = pieces;
-        self
+        let (pieces, ranks) = (session.pieces(), session.manifest.ranks);
+        let replayed = replayed.into();
+        Ok(Self { directory, journal, history, kept, written, replayed, ranks, pieces })
     }
 
     /// Writes the field of an evaluation, and the collection of all.
@@ -107,9 +68,9 @@ impl<'a> DirectoryRecorder<'a> {
         if self.written.last() == Some(&evaluation) {
             return Ok(());
         }
-        write_field(self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
+        write_field(&self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
         self.written.push(evaluation);
-        write_collection(self.directory, &self.written)
+        write_collection(&self.directory, &self.written)
     }
 
     /// Keeps a complete evaluation.
@@ -122,13 +83,13 @@ impl<'a> DirectoryRecorder<'a> {
     }
 }
 
-impl Recorder for DirectoryRecorder<'_> {
+impl Recorder for DirectoryRecorder {
     fn is_bitwise_reproducible(&self) -> bool {
-        self.is_exact
+        self.ranks.is_none()
     }
 
     fn replay(&mut self) -> Option<Record> {
-        self.recalled.pop_front()
+        self.replayed.pop_front()
     }
 
     fn record(

@@ -1,25 +1,23 @@
-//! Going on with a run that was broken off: its directory holds all that is needed.
+//! Resuming an interrupted run: its directory holds all that is needed.
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use fluxmorph_geometry::parallel::RankGroup;
 
+use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Options, Session, constraint_names, unreached};
+use super::{Options, Session};
 use crate::config::{Config, Source};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
-use crate::memory_limit;
 use crate::observer::RunObserver;
 use crate::output::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::setup::{Purpose, set_up_watched};
+use crate::setup::Purpose;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 
 /// Largest configuration and largest result that are read [bytes].
 const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
@@ -46,7 +44,7 @@ impl SavedRun {
     /// Reads manifest and configuration; nothing is written.
     ///
     /// # Errors
-    /// [`Error::NotResumable`] where there is no run to go on with, faults of the configuration, files that cannot be read.
+    /// [`Error::NotResumable`] where there is no run to resume, [`OutputError::OlderJournal`], faults of the configuration, files that cannot be read.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
         let directory = RunDirectory::open(disk, path)?;
         let manifest = Manifest::read(&directory)?;
@@ -54,6 +52,7 @@ impl SavedRun {
             let cause = format!("it holds a `{}`, which is done in one go: start it again", manifest.command);
             return Err(not_resumable(&directory, cause));
         }
+        directory.refuse_older_journal()?;
         let (mut config, source) = configuration(&directory, &manifest)?;
         config.output.directory = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         Ok(Self { directory, manifest, config, source })
@@ -65,8 +64,7 @@ impl SavedRun {
     }
 }
 
-/// Goes on with a run as if it had not been broken off: history, fields, journal and result are those of a run without a
-/// break, but for times.
+/// Resumes an interrupted run: history, fields, journal and result are those of a run without a break, but for times.
 ///
 /// A run that has ended by itself is left as it is, and its result returned; so is one that used up its evaluations, unless
 /// `limits` allows more.
@@ -80,7 +78,6 @@ pub fn resume(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
-    let clock = Instant::now();
     let SavedRun { directory, manifest, mut config, source } = saved;
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
     config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
@@ -89,67 +86,42 @@ pub fn resume(
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(result);
     }
-    observer.phase("setting up mesh and matrices");
-    let progress = &mut |stage| observer.stage(stage);
-    let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, options.team, progress)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), &source, options.older_run)?;
-    if (options.interrupted)() {
-        return Err(OptimizerError::InterruptedRun.into());
-    }
-    let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-    let approach = setup.problem.continue_to(&initial, options.interrupted).map_err(|error| match error {
-        OptimizerError::Interrupted => OptimizerError::InterruptedRun.into(),
-        other => unreached(other.into(), &config, &source),
-    })?;
-    let setup_seconds = clock.elapsed().as_secs_f64();
-    let mut session = Session {
-        command: "run",
-        config: &config,
-        source: &source,
-        setup,
-        directory: directory.clone(),
-        manifest,
-        clock,
-        setup_seconds,
-    };
-    let ranks = session.manifest.ranks;
-    session.manifest.ranks = session.manifest.ranks.max(options.team.map(RankGroup::size));
-    let identity = session.identity();
-    let contents = journal(&directory, &identity, observer)?;
-    session.manifest.resumed(Resumption::now(
-        contents.as_ref().map_or(0, |contents| contents.records.len()),
-        LimitsInForce::of(&config.optimizer),
-        options.threads,
-    ));
-    for file in surface_files(&config.output.stl) {
-        if !session.manifest.surfaces.contains(&file) {
-            session.manifest.surfaces.push(file);
-        }
-    }
+    let prepared = Prepared::new(&config, &source, Purpose::Optimisation, options, observer)
+        .and_then(Prepared::approach_initial)
+        .map_err(|error| match error {
+            Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
+            other => other,
+        })?;
+    let mut session = prepared.session("run", directory.clone(), manifest);
+    let contents = journal(&directory, &session.identity(), observer)?;
+    session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;
-    if contents.is_none() {
-        observer.warning("there is no journal.bin: all evaluations are computed anew");
-    }
-    let names: Vec<String> =
-        constraint_names(&session.setup.problem).into_iter().map(str::to_owned).collect();
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let kept = config.output.fields;
     // Before the manifest is touched: the journal holds the directory against other processes.
-    let recorder = match contents {
-        Some(contents) => DirectoryRecorder::reopen(&directory, contents, &names, kept, ranks)?,
+    let (journal, records) = match contents {
+        Some(contents) => (Journal::reopen(&directory, &contents)?, contents.records),
         None => {
-            directory.remove_leftovers(&[])?;
-            directory.remove(&directory.collection())?;
-            DirectoryRecorder::create(&directory, identity, &names, kept)?
+            observer.warning("there is no journal.jsonl: all evaluations are computed anew");
+            (Journal::create(&directory, session.identity())?, Vec::new())
         }
     };
-    let pieces = session.pieces();
-    let recorder = recorder.written_by(pieces);
+    let recorder = DirectoryRecorder::new(&session, journal, records)?;
     session.manifest.write(&directory)?;
-    session.conclude(observer, |session, observer| {
-        session.optimise(&approach, recorder, options.interrupted, observer)
-    })
+    session.conclude(observer, |session, observer| session.optimise(recorder, observer))
+}
+
+impl Session<'_> {
+    /// Adds a resumption behind so many evaluations to the manifest, which is not written yet.
+    fn note_resumption(&mut self, evaluations: usize, options: Options<'_>) {
+        let Self { manifest, config, .. } = self;
+        manifest.ranks = manifest.ranks.max(options.team.map(RankGroup::size));
+        manifest.resumed(Resumption::now(evaluations, LimitsInForce::of(&config.optimizer), options.threads));
+        for file in surface_files(&config.output.stl) {
+            if !manifest.surfaces.contains(&file) {
+                manifest.surfaces.push(file);
+            }
+        }
+    }
 }
 
 fn not_resumable(directory: &RunDirectory, cause: String) -> Error {

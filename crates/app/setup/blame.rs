@@ -39,9 +39,11 @@ pub(crate) fn placed(error: Error, config: &Config, source: &Source) -> Error {
 /// The keys that the advice of an error is about, of those that no single value is to blame for.
 pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
     let solver = match error {
-        Error::Solver(error) => error,
-        Error::Field { cause, .. } => cause,
-        Error::Remesh(RemeshError::NotFinite { .. }) => return Some("remesh.stiffness"),
+        Error::Optimizer(OptimizerError::Solver(error)) => error,
+        Error::Optimizer(OptimizerError::Field { cause, .. }) => cause,
+        Error::Optimizer(OptimizerError::Remesh(RemeshError::NotFinite { .. })) => {
+            return Some("remesh.stiffness");
+        }
         _ => return None,
     };
     match solver {

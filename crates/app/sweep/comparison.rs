@@ -8,11 +8,8 @@ use serde_json::Value;
 use super::{Layout, Planned, Sweep, page, state};
 use crate::config::Goal;
 use crate::error::Error;
-use crate::observer::Evaluation;
+use crate::journal::Journal;
 use crate::output::{Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, csv_text};
-
-/// Largest history that is read [bytes].
-const LARGEST: u64 = 1 << 28;
 
 /// The results of all combinations, in their order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -222,19 +219,8 @@ fn is_file(layout: &Layout, path: &Path) -> bool {
     layout.disk().names(folder).is_ok_and(|names| names.iter().any(|name| path.ends_with(name)))
 }
 
-/// Evaluation and ratio of every row of a history; a last one that is being written is left out.
+/// Evaluation and ratio of every evaluation; a last one that is being written is left out.
 fn curve(run: &RunDirectory) -> Result<Vec<[f64; 2]>, OutputError> {
-    let path = run.history_jsonl();
-    let bytes = match run.disk().read(&path, LARGEST) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        other => other.map_err(OutputError::io("read", &path))?,
-    };
-    let text = String::from_utf8_lossy(&bytes);
-    let whole = text.rfind('\n').map_or("", |end| &text[..end]);
-    let row = |line: &str| {
-        let row: Evaluation = serde_json::from_str(line)
-            .map_err(|error| OutputError::Damaged { path: path.clone(), message: error.to_string() })?;
-        Ok([row.evaluation as f64, row.ratio])
-    };
-    whole.lines().map(row).collect()
+    let records = Journal::read_records(run)?;
+    Ok(records.iter().map(|record| [record.row.evaluation as f64, record.row.ratio]).collect())
 }

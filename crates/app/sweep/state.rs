@@ -67,6 +67,9 @@ impl<'a> States<'a> {
             }
             Err(error) => return Err(error),
         };
+        if let Err(error) = run.refuse_older_journal() {
+            return Ok(State::Other(error.to_string()));
+        }
         if let Err(error) = disk.hold(&run.journal())
             && error.kind() == ErrorKind::ResourceBusy
         {

@@ -45,8 +45,8 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     assert!(caught.is_err(), "the panic is not swallowed");
     assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
     assert!(!broken.join("result.json").exists());
-    let history = std::fs::read_to_string(broken.join("history.jsonl")).unwrap();
-    assert_eq!(history.lines().count(), 3);
+    let history = std::fs::read_to_string(broken.join("history.csv")).unwrap();
+    assert_eq!(history.lines().count(), 4);
     for evaluation in 0..3 {
         fluxmorph_geometry::io::read_vtu(&broken.join(format!("fields/eval_{evaluation:04}.vtu"))).unwrap();
     }

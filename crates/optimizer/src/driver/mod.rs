@@ -19,6 +19,7 @@
 //!   then there is nothing new to keep.
 
 mod compute;
+mod evaluation;
 mod incumbent;
 mod observer;
 mod outcome;
@@ -34,9 +35,10 @@ mod trust_region;
 use crate::error::Error;
 use crate::problem::Problem;
 
+pub use evaluation::{Evaluation, column};
 pub use observer::{Observer, Silent};
 pub use outcome::{Best, Optimised};
-pub use record::{Evaluation, Record, column, hash_points, reference_hash};
+pub use record::{Record, reference_hash};
 pub use recorder::{Recorder, Unrecorded};
 pub use settings::Settings;
 pub use stop_reason::StopReason;

@@ -1,6 +1,6 @@
 //! Who watches an optimisation: the driver reports what happens, an observer shows it.
 
-use super::record::Evaluation;
+use super::evaluation::Evaluation;
 use crate::problem::{RoundEvent, Stage};
 
 /// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes

@@ -1,15 +1,14 @@
-//! What an evaluation leaves: its row in the history, and all that is needed to replay it.
-
-use std::collections::BTreeMap;
+//! One evaluation as a recorder keeps it: all that answers the method when a run is resumed.
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_solver::linear::Method;
 use serde::{Deserialize, Serialize};
 
+use super::evaluation::Evaluation;
 use crate::problem::Timings;
 
-/// One evaluation.
-#[derive(Clone, Debug, PartialEq)]
+/// One evaluation with everything that a resumed run needs of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Its row in the history; objective and round stand there.
     pub row: Evaluation,
@@ -22,93 +21,45 @@ pub struct Record {
     /// What the constraints measure, in SI, with the derivatives by the variables.
     pub constraints: Vec<(f64, Vec<f64>)>,
     /// [`reference_hash`] of the round's reference mesh.
-    pub reference: [u8; 32],
+    pub reference: String,
     /// The method of the linear solver that worked last, by state; `None` where it is the first one.
+    #[serde(with = "method_names")]
     pub methods: Vec<Option<Method>>,
     /// Largest relative residual of its linear solves.
     pub worst_residual: f64,
     /// Where its time went.
+    #[serde(rename = "timings_s")]
     pub timings: Timings,
 }
 
-/// One evaluation of objective, constraints and gradients; a row of the history.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Evaluation {
-    /// Number of the evaluation, from 0.
-    pub evaluation: usize,
-    /// Evaluations so far that improved on the best before them; the first counts as 0.
-    pub iteration: usize,
-    /// The objective itself, whether it is minimised or maximised.
-    pub objective: f64,
-    /// The objective over that of evaluation 0.
-    pub ratio: f64,
-    /// Euclidean norm of the gradient with respect to the design variables [objective / m].
-    pub gradient_norm: f64,
-    /// Euclidean norm of the change of the design variables since the evaluation before [m].
-    pub step_norm: f64,
-    /// Worst quality of an element (Eq. 4).
-    pub worst_quality: f64,
-    /// Least thickness of the moved body along the direction of motion [m]; `None` where it has none.
-    pub min_thickness_m: Option<f64>,
-    /// Greatest thickness [m].
-    pub max_thickness_m: Option<f64>,
-    /// Iterations of the linear solver, state and adjoint.
-    pub linear_iterations: usize,
-    /// Wall time of the evaluation [s].
-    pub seconds: f64,
-    /// Multiple of the motion from the round's reference at which the first element inverts; `None` if none ever does.
-    pub step_to_inversion: Option<f64>,
-    /// That element.
-    pub inversion_element: Option<usize>,
-    /// Its region.
-    pub inversion_region: Option<String>,
-    /// Rounds of the mesh motion begun so far (see [`fluxmorph_optimizer::driver`]).
-    pub round: usize,
-    /// Relative distance of every constraint from its bound, satisfied where ≤ 0, by column (see [`column`]).
-    #[serde(flatten)]
-    pub constraints: BTreeMap<String, f64>,
+/// BLAKE3 of the points of a mesh whose topology is known, hexadecimal.
+pub fn reference_hash(mesh: &Mesh) -> String {
+    let bytes: Vec<u8> = mesh.points().as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
+    blake3::hash(&bytes).to_hex().to_string()
 }
 
-/// The column of the history that holds a constraint.
-pub fn column(constraint: &str) -> String {
-    format!("c_{constraint}")
-}
+/// Methods by the names that they have in a configuration.
+mod method_names {
+    use fluxmorph_solver::linear::Method;
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-impl Evaluation {
-    /// The columns of `history.csv` before those of the constraints.
-    pub const COLUMNS: [&'static str; 15] = [
-        "evaluation",
-        "iteration",
-        "objective",
-        "ratio",
-        "gradient_norm",
-        "step_norm",
-        "worst_quality",
-        "min_thickness_m",
-        "max_thickness_m",
-        "linear_iterations",
-        "seconds",
-        "step_to_inversion",
-        "inversion_element",
-        "inversion_region",
-        "round",
-    ];
-}
+    pub(super) fn serialize<S: Serializer>(
+        methods: &[Option<Method>],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        let names: Vec<_> = methods.iter().map(|method| method.map(Method::name)).collect();
+        names.serialize(serializer)
+    }
 
-/// BLAKE3 of the points of a mesh whose topology is known.
-pub fn reference_hash(mesh: &Mesh) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    hash_points(&mut hasher, mesh);
-    *hasher.finalize().as_bytes()
-}
-
-/// Adds the points of a mesh to a hash, as raw bits.
-pub fn hash_points(hasher: &mut blake3::Hasher, mesh: &Mesh) {
-    for point in mesh.points() {
-        let mut bytes = [0; 24];
-        for (slot, c) in bytes.chunks_exact_mut(8).zip(point) {
-            slot.copy_from_slice(&c.to_le_bytes());
-        }
-        hasher.update(&bytes);
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Vec<Option<Method>>, D::Error> {
+        let method = |name: String| {
+            let known = Method::ALL.into_iter().find(|method| method.name() == name);
+            known.ok_or_else(|| D::Error::custom("an unknown method of solution"))
+        };
+        let names = Vec::<Option<String>>::deserialize(deserializer)?;
+        names.into_iter().map(|name| name.map(method).transpose()).collect()
     }
 }

@@ -8,7 +8,7 @@ use fluxmorph_solver::FieldSolution;
 use fluxmorph_solver::linear::SolverEvent;
 
 /// Wall time of the parts of an evaluation [s].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Timings {
     /// Elastic solves, forward and transposed, and the mesh check.
     pub remesh: f64,
