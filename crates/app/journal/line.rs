@@ -47,12 +47,8 @@ pub(super) fn header(identity: &Identity) -> (String, String) {
     seal(&Header { fluxmorph_journal: FORM, identity }, "")
 }
 
-/// A record behind a checksum, and its own.
-pub(super) fn record(record: &Record, before: &str) -> (String, String) {
-    seal(record, before)
-}
-
-fn seal(object: &impl Serialize, before: &str) -> (String, String) {
+/// The line of a header or a record behind a checksum, and its own checksum.
+pub(super) fn seal(object: &impl Serialize, before: &str) -> (String, String) {
     let mut line = serde_json::to_string(object).expect("numbers and text have a JSON form");
     line.pop();
     let sum = checksum(before, line.as_bytes());

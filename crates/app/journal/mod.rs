@@ -163,7 +163,7 @@ impl Journal {
     /// When the record would not read back as it is, for a number that is not finite or for other sizes than the identity
     /// says: nothing is written then. When the operating system refuses.
     pub fn append(&mut self, record: &Record) -> Result<(), Error> {
-        let (line, sum) = line::record(record, &self.sum);
+        let (line, sum) = line::seal(record, &self.sum);
         if line::parse_record(line.as_bytes(), &self.identity).as_ref() != Some(record) {
             let cause = "an evaluation holds a number that is not finite, or has not the problem's variables and constraints: \
                          the journal does not take it";

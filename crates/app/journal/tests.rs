@@ -66,7 +66,7 @@ impl Written {
         let mut bytes = header.into_bytes();
         let mut ends = vec![bytes.len()];
         for record in &records {
-            let (own, next) = line::record(record, &sum);
+            let (own, next) = line::seal(record, &sum);
             bytes.extend(own.into_bytes());
             ends.push(bytes.len());
             sum = next;
@@ -88,7 +88,7 @@ impl Written {
     #[track_caller]
     pub(super) fn assert_prefix(&self, bytes: &[u8], at: usize) -> Option<Rest> {
         // Decimal digits are those of one number alone.
-        let text = |records: &[Record]| records.iter().map(|r| line::record(r, "").0).collect::<Vec<_>>();
+        let text = |records: &[Record]| records.iter().map(|r| line::seal(r, "").0).collect::<Vec<_>>();
         match (parse(bytes), self.whole_before(at)) {
             (Ok(contents), Some(whole)) => {
                 assert_eq!(contents.identity, self.identity);

@@ -30,9 +30,6 @@ pub(super) struct Prepared<'a> {
 
 impl<'a> Prepared<'a> {
     /// Sets a problem up that fits into the memory.
-    ///
-    /// # Errors
-    /// Faults of the configuration, and [`Error::Interrupted`].
     pub(super) fn new(
         config: &'a Config,
         source: &'a Source,
@@ -51,9 +48,6 @@ impl<'a> Prepared<'a> {
 
     /// Takes the mesh near the initial design. One that it cannot reach is a fault of the configuration, and is refused
     /// before an earlier run is replaced.
-    ///
-    /// # Errors
-    /// [`Error::DesignUnreached`] at its place, and [`Error::Interrupted`].
     pub(super) fn approach_initial(mut self) -> Result<Self, Error> {
         let problem = &mut self.setup.problem;
         let initial = problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
@@ -66,9 +60,6 @@ impl<'a> Prepared<'a> {
     }
 
     /// Takes the output directory, and writes the manifest.
-    ///
-    /// # Errors
-    /// When the directory is not ours, or the operating system refuses.
     pub(super) fn begin(
         self,
         command: &'static str,
