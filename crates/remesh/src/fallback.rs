@@ -176,8 +176,8 @@ impl Motion {
     /// the share [`StepLimits::smooth_below`] of their original shape: smoothed, or constrained to an axis where smoothing
     /// does not help enough. `None` where nothing is degraded, or nothing improves.
     ///
-    /// A body that is constrained to an axis is left as it is: its columns invert only where they are squeezed to nothing, and smoothing would
-    /// take that from them.
+    /// A body that is constrained to an axis is left as it is: its columns invert only where they are squeezed to nothing, and
+    /// smoothing would take that from them.
     pub(crate) fn smooth_degraded(
         &self,
         moved: &Moved,

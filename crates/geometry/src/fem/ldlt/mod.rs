@@ -8,7 +8,8 @@
 //!
 //! Lives here: the number types (`scalar`) and vectors of them (`lanes`), the analysis of a pattern (`analysis`,
 //! `panels`, `schedule`), dense kernels of one panel (`dense`, `multiply`, `panel_solve`), the numeric factorisation
-//! (`factor`) and the triangular solves (`solve`), both compiled for the four types in `compiled`. Does not live here: orderings ([`ordering`](super::ordering)), iterations that refine or precondition.
+//! (`factor`) and the triangular solves (`solve`), both compiled for the four types in `compiled`. Does not live here:
+//! orderings ([`ordering`](super::ordering)), iterations that refine or precondition.
 //!
 //! The bits of factor and solution do not depend on the number of threads: every panel, and every fixed tile of its rows,
 //! takes its updates in one order, and no dense kernel is itself parallel. They may differ between processors with other vector
