@@ -1,13 +1,14 @@
-//! Who watches a run: the driver tells what happens, an observer shows it.
+//! Who watches a run: the driver reports what happens, an observer shows it.
 //!
-//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone. All of them
-//! show the same rows (`table`) and the same end (`summary`, with the flux density at the probes from `probes`).
+//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone. The first two
+//! have the same `lines`: the rows (`table`) and the end (`summary`, with the flux density at the probes from `probes`).
 
 mod bar;
 mod console;
-mod paint;
+mod lines;
 mod probes;
 mod quiet;
+mod styles;
 mod summary;
 mod table;
 
@@ -22,10 +23,10 @@ use crate::output::RunResult;
 use crate::rounds::RoundEvent;
 use crate::stage::Stage;
 
-pub use bar::{Bar, take_down};
+pub use bar::{Bar, clear};
 pub use console::Console;
-pub use paint::{Colour, Paint};
 pub use quiet::Quiet;
+pub use styles::Styles;
 
 /// One evaluation of objective, constraints and gradients; a row of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -112,7 +113,7 @@ pub struct Started<'a> {
     pub directory: Option<&'a Path>,
 }
 
-/// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
+/// Receives what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
 /// through [`Observer::line`].
 pub trait Observer {
     /// Shows a line.
