@@ -44,7 +44,7 @@ determinism:
 test-pyvista:
     cargo test --release --test acceptance -- --ignored --nocapture pyvista
 
-# Writes schema/fluxmorph.schema.json and the tables of docs/configuration.md, both from the types of the configuration
+# Writes configs/fluxmorph.schema.json and the tables of docs/configuration.md, both from the types of the configuration
 generate:
     cargo test --release --test schema -- --ignored write_the_files
 
@@ -64,10 +64,9 @@ bench-kernels:
 demo:
     cargo run --release -- run configs/shield_quick.toml --force || test $? -eq 1
 
-# The picture of a run on a terminal, docs/images/terminal.svg; needs python3
+# The picture of a run on a terminal, docs/images/terminal.svg; needs `script` of util-linux
 screenshot-terminal:
-    cargo build --release
-    tools/terminal.py --svg docs/images/terminal.svg --at "3/5 [" --shown-as "fluxmorph run configs/shield_quick.toml" -- target/release/fluxmorph run configs/shield_quick.toml --force || test $? -eq 1
+    cargo test --release --test cli -- --ignored draw_the_terminal
 
 # Fuzz one reader (msh22, msh41_ascii, msh41_binary, config, quantity, journal); needs `cargo install cargo-fuzz`
 fuzz TARGET SECONDS="60":
@@ -89,7 +88,7 @@ commands:
 book:
     cargo test --release --test book -- --include-ignored --nocapture --skip write_the_commands
 
-# The release archive with checksum, licences and SBOM in target/dist; tries it out
+# The release archive with checksum and licences in target/dist; tries it out
 dist:
     python3 tools/dist.py
 

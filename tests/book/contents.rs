@@ -89,8 +89,8 @@ fn every_link_leads_somewhere() {
 
 /// Files and folders of the repository that a line names in code: `crates/solver/src/audit.rs`.
 fn named_paths(line: &str) -> Vec<&str> {
-    const FOLDERS: [&str; 9] =
-        ["crates/", "tests/", "docs/", "configs/", "tools/", "examples/", "benches/", "fuzz/", "paraview/"];
+    const FOLDERS: [&str; 8] =
+        ["crates/", "tests/", "docs/", "configs/", "tools/", "examples/", "benches/", "fuzz/"];
     let spans = line.split('`').skip(1).step_by(2);
     let is_path = |span: &&str| {
         let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '/' | '.' | '_' | '-');

@@ -28,7 +28,7 @@ pub(crate) struct Outcome {
 
 /// What a reader has before them, and what of it a page may change.
 const FILES: [&str; 6] =
-    ["configs", "docs/device", "docs/device_own", "examples/python", "paraview", "tools"];
+    ["configs", "docs/device", "docs/device_own", "examples/python", "examples/paraview", "tools"];
 
 /// Runs the blocks of a page in order, and compares the files that it quotes.
 pub(crate) fn run_page(page: &Page, extent: Extent) -> Outcome {

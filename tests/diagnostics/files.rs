@@ -14,7 +14,7 @@ pub(crate) const CASES: &[Case] = &[
     case(
         "mesh.file is no mesh",
         INDUCTOR,
-        &[("\"meshes/inductor.msh\"", "\"device.toml\""), ("#:schema ..", "«#:schema» ..")],
+        &[("\"meshes/inductor.msh\"", "\"device.toml\""), ("#:schema ./", "«#:schema» ./")],
     ),
     case(
         "a probe in metres in a mesh in millimetres",

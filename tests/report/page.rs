@@ -6,18 +6,8 @@ use std::process::Command;
 use crate::markup::{Element, elements};
 use crate::program::{block, fluxmorph, report, repository, shield};
 
-const SECTIONS: [&str; 10] = [
-    "shape",
-    "convergence",
-    "field",
-    "paper",
-    "results",
-    "evaluations",
-    "mesh",
-    "files",
-    "provenance",
-    "view",
-];
+const SECTIONS: [&str; 9] =
+    ["shape", "convergence", "field", "results", "evaluations", "mesh", "files", "provenance", "view"];
 
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).expect("the page")
@@ -95,7 +85,7 @@ fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
         assert!(elements.iter().any(|e| e.get("href") == Some(link)), "{link}");
         assert!(out.join(link).is_file());
     }
-    assert!(page.contains("--max-evaluations 10") && page.contains("51.16 %"));
+    assert!(page.contains("--max-evaluations 10"));
 }
 
 #[test]
@@ -125,7 +115,6 @@ fn constraints_and_rounds_are_drawn() {
     assert!(elements.iter().any(|e| e.get("data-chart") == Some("constraint")));
     assert!(elements.iter().any(|e| e.get("class") == Some("round")), "a new reference is a dotted line");
     assert!(page.contains("Constraints at the best design") && page.contains("Rounds and remedies"));
-    assert!(!has_id(&elements, "paper"), "not the paper's case");
 }
 
 #[test]

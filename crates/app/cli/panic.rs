@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::exit_code::ExitCode;
-use crate::observer::take_down;
+use crate::observer;
 
 /// Does the work; a panic is told once, and ends as a numerical failure.
 pub(super) fn reported(work: impl FnOnce() -> ExitCode) -> ExitCode {
@@ -20,7 +20,7 @@ pub(super) fn reported(work: impl FnOnce() -> ExitCode) -> ExitCode {
         if told.swap(true, Ordering::SeqCst) {
             return;
         }
-        take_down();
+        observer::clear();
         let backtrace = Backtrace::capture();
         let mut stderr = std::io::stderr();
         let _ = writeln!(stderr, "{}", message(info));

@@ -170,7 +170,7 @@ impl<'a> Session<'a> {
                 Left::Task(task) => tasks.push((*index, *task)),
                 Left::Finished(code) => {
                     self.codes.push(*code);
-                    self.note(*index, &format!("skipped, {}", self.row(*index)?.told()));
+                    self.note(*index, &format!("skipped, {}", self.row(*index)?.describe()));
                 }
                 Left::InUse => {
                     self.codes.push(ExitCode::Files);
@@ -242,7 +242,7 @@ impl<'a> Session<'a> {
                 let row = self.row(index)?;
                 let ratio = row.ratio.map_or(String::new(), |ratio| format!(", F/F0 {ratio:.5}"));
                 let evaluations = row.evaluations.unwrap_or(0);
-                let told = row.told();
+                let told = row.describe();
                 self.note(index, &format!("{told}{ratio}, {evaluations} evaluations, {seconds:.1} s"));
             }
             Ending::Code(code) => broken(&format!("failed with exit code {}", *code as u8)),

@@ -1,32 +1,35 @@
 //! A bar on a terminal: the last line shows where the work is, finished evaluations stand above it.
 //!
-//! The only module that names indicatif. There is one terminal, so there is one bar: [`take_down`] removes it from any
-//! thread, for messages of signals and panics.
+//! The only module that names indicatif. There is one terminal, so there is one bar: [`clear`] removes it from any thread,
+//! for messages of signals and panics.
 
 use std::io::{IsTerminal, Write};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 
-use super::console::announced;
-use super::summary::{self, Named};
-use super::table::{self, Columns};
-use super::{Colour, Evaluation, Observer, Paint, RunObserver, Started, show};
+use super::lines::Lines;
+use super::table::Columns;
+use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::output::RunResult;
 use fluxmorph_optimizer::problem::Stage;
 
 /// How often times on the bar move on.
 const TICK: Duration = Duration::from_millis(200);
 
-/// Steps of the bar.
-const STEPS: usize = 10;
+/// A part of the work and its time.
+const WORK: &str = "{spinner} {wide_msg} {elapsed}";
+
+/// The same within a run, before and after an evaluation has shown how long one takes.
+const FIRST: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapsed}";
+const LATER: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  ETA {eta}  {wide_msg} {elapsed}";
 
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
 /// Takes the bar off the terminal, for good. Whoever shows it goes on in plain lines.
-pub fn take_down() {
+pub fn clear() {
     // Never waits: the thread that holds it may be the one that panics.
     let Ok(mut shown) = SHOWN.try_lock() else { return };
     if let Some(bar) = shown.take().and_then(|bar| bar.upgrade()) {
@@ -39,28 +42,11 @@ pub fn take_down() {
 pub struct Bar<W> {
     bar: ProgressBar,
     writer: W,
-    paint: Paint,
-    named: Named,
-    header_is_shown: bool,
-    shown: Arc<Mutex<Shown>>,
-}
-
-/// What the bar says beside its length; drawn by a thread of its own.
-#[derive(Debug, Default)]
-struct Shown {
-    /// Of a run: limits on evaluations and time [s].
-    limits: Option<(usize, Option<f64>)>,
-    began: Option<Instant>,
-    /// Evaluations done, and the time that those took which were computed now [s].
-    evaluations: usize,
-    timed: usize,
-    seconds: f64,
-    last: Option<Instant>,
-    ratio: Option<f64>,
-    worst_quality: Option<f64>,
-    /// Work beside the evaluations: it stands alone.
-    phase: Option<(String, Instant)>,
-    stage: Option<(Stage, Instant)>,
+    lines: Lines,
+    /// The template of the stages.
+    template: &'static str,
+    /// When the run began, or the last evaluation ended.
+    last: Instant,
 }
 
 impl Bar<std::io::Stderr> {
@@ -73,7 +59,7 @@ impl Bar<std::io::Stderr> {
         let target = ProgressDrawTarget::stderr();
         (!target.is_hidden()).then(|| {
             let mut bar = Self::new(target, std::io::stderr());
-            bar.paint = Paint::for_stderr();
+            bar.lines = Lines::new(Styles::for_stderr(), Columns::Compact);
             bar.bar.enable_steady_tick(TICK);
             *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.bar.downgrade());
             bar
@@ -82,88 +68,29 @@ impl Bar<std::io::Stderr> {
 }
 
 impl<W: Write> Bar<W> {
-    /// On any target; `writer` leads to the same place.
+    /// On any target, without colours; `writer` leads to the same place.
     pub fn new(target: ProgressDrawTarget, writer: W) -> Self {
-        let shown = Arc::new(Mutex::new(Shown::default()));
-        let bar = ProgressBar::with_draw_target(None, target);
-        let told = Arc::clone(&shown);
-        let style = ProgressStyle::with_template("{spinner} {status}")
-            .expect("the template is a constant")
-            .tick_chars("|/-\\ ")
-            .with_key("status", move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
-                let shown = told.lock().unwrap_or_else(PoisonError::into_inner);
-                let _ = out.write_str(&shown.status(Instant::now()));
-            });
-        bar.set_style(style);
-        Self { bar, writer, paint: Paint::PLAIN, named: Named::default(), header_is_shown: false, shown }
+        let bar = ProgressBar::with_draw_target(None, target).with_style(style(WORK));
+        let lines = Lines::new(Styles::default(), Columns::Compact);
+        Self { bar, writer, lines, template: WORK, last: Instant::now() }
     }
 
-    /// Changes what the bar says, and draws it.
-    fn tell(&self, change: impl FnOnce(&mut Shown)) {
-        change(&mut self.shown.lock().unwrap_or_else(PoisonError::into_inner));
+    /// Shows what is being done, timed from now.
+    fn work(&self, template: &str, what: &str) {
+        // Whoever cleared the bar wants it gone for good: a change would draw it again.
         if !self.bar.is_finished() {
-            self.bar.tick();
+            self.bar.set_style(style(template));
+            self.bar.set_message(what.to_owned());
+            self.bar.reset_elapsed();
         }
     }
 }
 
-impl Shown {
-    /// The line without its spinner, within 78 columns.
-    fn status(&self, now: Instant) -> String {
-        let since = |began: Instant| {
-            let seconds = now.saturating_duration_since(began).as_secs_f64();
-            // Of what is short, a time would only flicker.
-            if seconds >= 1.0 { format!(" {}", duration(seconds)) } else { String::new() }
-        };
-        if let Some((phase, began)) = &self.phase {
-            return format!("{phase:.60}{}", since(*began));
-        }
-        let mut text = String::new();
-        if let Some((limit, _)) = self.limits {
-            let steps = (STEPS * self.evaluations).checked_div(limit).unwrap_or(0).min(STEPS);
-            text += &format!("{}/{limit} [{:<STEPS$}]", self.evaluations, "=".repeat(steps));
-            if let Some(ratio) = self.ratio {
-                text += &format!(" F/F0 {ratio:.4}");
-            }
-            if let Some(quality) = self.worst_quality {
-                text += &format!("  quality {quality:.3}");
-            }
-            if let Some(left) = self.left(now) {
-                text += &format!("  ETA {}", duration(left));
-            }
-            text += "  ";
-        }
-        if let Some((stage, began)) = &self.stage {
-            text += stage.describe();
-            text += &since(*began);
-        }
-        text.chars().take(76).collect()
-    }
-
-    /// The longest time that the evaluations may still take [s]: the run may converge before.
-    fn left(&self, now: Instant) -> Option<f64> {
-        let (limit, time) = self.limits?;
-        let elapsed = |since: Option<Instant>| since.map(|t| now.saturating_duration_since(t).as_secs_f64());
-        let each = (self.timed > 0).then(|| self.seconds / self.timed as f64);
-        let by_evaluations = each.map(|each| {
-            (each * limit.saturating_sub(self.evaluations) as f64 - elapsed(self.last).unwrap_or(0.0))
-                .max(0.0)
-        });
-        let by_time = time.zip(elapsed(self.began)).map(|(time, gone)| (time - gone).max(0.0));
-        match (by_evaluations, by_time) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        }
-    }
-}
-
-/// A time in a few characters.
-fn duration(seconds: f64) -> String {
-    match seconds {
-        s if s < 100.0 => format!("{s:.0} s"),
-        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
-        s => format!("{:.1} h", s / 3600.0),
-    }
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template)
+        .expect("the template is a constant")
+        .tick_chars("|/-\\ ")
+        .progress_chars("= ")
 }
 
 impl<W: Write> Observer for Bar<W> {
@@ -178,53 +105,48 @@ impl<W: Write> Observer for Bar<W> {
     }
 
     fn phase(&mut self, name: &str) {
-        self.tell(|shown| shown.phase = Some((name.to_owned(), Instant::now())));
+        self.work(WORK, name);
     }
 
     fn stage(&mut self, stage: Stage) {
-        self.tell(|shown| (shown.phase, shown.stage) = (None, Some((stage, Instant::now()))));
+        self.work(self.template, stage.describe());
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
-        if !self.header_is_shown {
-            self.header_is_shown = true;
-            let header = self.paint.paint(Colour::Faint, &table::header(row, Columns::Compact));
-            self.line(&header);
+        self.lines.evaluation(row).iter().for_each(|line| self.line(line));
+        let seconds = std::mem::replace(&mut self.last, Instant::now()).elapsed().as_secs_f64();
+        if self.bar.is_finished() {
+            return;
         }
-        self.line(&table::row(row, Columns::Compact));
-        self.tell(|shown| {
-            let now = Instant::now();
-            // An evaluation that is replayed from a journal takes no time now.
-            let since = shown.last.or(shown.began).map_or(0.0, |last| (now - last).as_secs_f64());
-            if since > 0.5 * row.seconds {
-                shown.timed += 1;
-                shown.seconds += row.seconds;
-            }
-            (shown.evaluations, shown.last) = (row.evaluation + 1, Some(now));
-            (shown.ratio, shown.worst_quality) = (Some(row.ratio), Some(row.worst_quality));
-        });
+        self.bar.set_prefix(format!("F/F0 {:.4}  quality {:.3}", row.ratio, row.worst_quality));
+        self.bar.set_position(row.evaluation as u64 + 1);
+        if seconds > 0.5 * row.seconds {
+            self.template = LATER;
+        } else {
+            // An evaluation that is recalled from a journal says nothing about the time of the others.
+            self.bar.reset_eta();
+        }
     }
 
     fn warning(&mut self, message: &str) {
-        let text = self.paint.warning(message);
-        self.line(&text);
+        let line = self.lines.warning(message);
+        self.line(&line);
     }
 }
 
 impl<W: Write> RunObserver for Bar<W> {
     fn started(&mut self, started: &Started<'_>) {
-        let mut lines = announced(started);
-        lines[0] = self.paint.paint(Colour::Strong, &lines[0]);
-        lines.iter().for_each(|line| self.line(line));
-        self.named = Named::of(started);
-        let limits = started.optimizer.map(|optimizer| (optimizer.max_evaluations, optimizer.max_time));
-        self.tell(|shown| (shown.limits, shown.began) = (limits, Some(Instant::now())));
+        self.lines.started(started).iter().for_each(|line| self.line(line));
+        if let Some(optimizer) = started.optimizer {
+            self.bar.set_length(optimizer.max_evaluations as u64);
+            self.template = FIRST;
+        }
+        self.last = Instant::now();
     }
 
     fn finished(&mut self, result: &RunResult) {
         self.bar.finish_and_clear();
-        self.line("");
-        summary::lines(result, &self.named, self.paint).iter().for_each(|line| self.line(line));
+        self.lines.finished(result).iter().for_each(|line| self.line(line));
     }
 }
 
@@ -236,6 +158,8 @@ impl<W> Drop for Bar<W> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use indicatif::TermLike;
 
     use super::super::tests::evaluation;
@@ -358,38 +282,31 @@ mod tests {
     }
 
     #[test]
-    fn the_time_left_is_the_lesser_of_both_limits() {
-        let now = Instant::now();
-        let mut shown = Shown {
-            limits: Some((10, None)),
-            began: Some(now),
-            evaluations: 4,
-            timed: 4,
-            seconds: 8.0,
-            last: Some(now),
-            ..Shown::default()
-        };
-        assert_eq!(shown.left(now), Some(12.0));
-        shown.limits = Some((10, Some(5.0)));
-        assert_eq!(shown.left(now + Duration::from_secs(1)), Some(4.0));
-        assert!(shown.status(now).contains("ETA 5 s"), "{}", shown.status(now));
-        let times = [5.0, 150.0, 9000.0].map(duration);
-        assert_eq!(times, ["5 s", "2 min", "2.5 h"]);
+    fn a_cleared_bar_does_not_come_back() {
+        let screen = Screen::default();
+        let mut observer = bar(&screen);
+        observer.started(&started(&Optimizer::default()));
+        observer.bar.finish_and_clear();
+        observer.stage(Stage::State);
+        observer.evaluation(&evaluation(0));
+        observer.phase("verifying");
+        let lines = screen.lines();
+        let text = lines.concat();
+        assert!(!text.contains('[') && !text.contains("verifying"), "{lines:#?}");
+        assert!(text.contains("5.00 .. 30.00"), "{lines:#?}");
     }
 
     #[test]
     fn the_line_fits_on_a_narrow_terminal() {
-        let now = Instant::now();
-        let shown = Shown {
-            limits: Some((1_000_000, Some(1e9))),
-            evaluations: 999_999,
-            timed: 1,
-            seconds: 1e4,
-            ratio: Some(1e6),
-            worst_quality: Some(0.1),
-            stage: Some((Stage::Elasticity, now)),
-            ..Shown::default()
-        };
-        assert!(shown.status(now).chars().count() <= 78);
+        let screen = Screen::default();
+        let mut observer = bar(&screen);
+        observer.started(&started(&Optimizer { max_evaluations: 100_000, ..Optimizer::default() }));
+        observer.last = Instant::now().checked_sub(Duration::from_secs(9000)).expect("the machine is up");
+        observer.evaluation(&Evaluation { ratio: 12.5, ..evaluation(99_998) });
+        observer.stage(Stage::Elasticity);
+        let lines = screen.lines();
+        let last = lines.last().expect("a bar");
+        assert!(last.contains("99999/100000") && last.contains("ETA "), "{lines:#?}");
+        assert!(last.chars().count() <= 80, "{lines:#?}");
     }
 }

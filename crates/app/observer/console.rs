@@ -3,22 +3,20 @@
 use std::io::Write;
 use std::time::Instant;
 
-use super::summary::{self, Named};
-use super::table::{self, Columns};
-use super::{Evaluation, Observer, Paint, RunObserver, Started, show};
+use super::lines::Lines;
+use super::table::Columns;
+use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::output::RunResult;
 use fluxmorph_optimizer::problem::Stage;
 
-/// A stage that takes longer [s] is told with its time, outside of evaluations: people begin to wonder then.
+/// A stage that takes longer [s] is shown with its time, outside of evaluations: people begin to wonder then.
 const LONG_STAGE: f64 = 2.0;
 
 /// Shows one plain line for each evaluation, and a summary.
 #[derive(Debug)]
 pub struct Console<W> {
     writer: W,
-    paint: Paint,
-    header_is_shown: bool,
-    named: Named,
+    lines: Lines,
     /// The stage in hand and when it began; `None` within the evaluations of a run, which have a line each.
     stage: Option<(Stage, Instant)>,
     has_evaluations: bool,
@@ -27,24 +25,18 @@ pub struct Console<W> {
 impl Console<std::io::Stderr> {
     /// On standard error.
     pub fn stderr() -> Self {
-        Self { paint: Paint::for_stderr(), ..Self::new(std::io::stderr()) }
+        Self { lines: Lines::new(Styles::for_stderr(), Columns::All), ..Self::new(std::io::stderr()) }
     }
 }
 
 impl<W: Write> Console<W> {
     /// On any writer, without colours.
     pub fn new(writer: W) -> Self {
-        Self {
-            writer,
-            paint: Paint::PLAIN,
-            header_is_shown: false,
-            named: Named::default(),
-            stage: None,
-            has_evaluations: false,
-        }
+        let lines = Lines::new(Styles::default(), Columns::All);
+        Self { writer, lines, stage: None, has_evaluations: false }
     }
 
-    /// Tells of the stage in hand that it is over, if it was long.
+    /// Shows the time of the stage in hand, if it was long.
     fn end_stage(&mut self) {
         if let Some((stage, began)) = self.stage.take() {
             let seconds = began.elapsed().as_secs_f64();
@@ -53,20 +45,6 @@ impl<W: Write> Console<W> {
             }
         }
     }
-}
-
-/// What is told at the start, in lines.
-pub(super) fn announced(started: &Started<'_>) -> Vec<String> {
-    let Started { title, nodes, tets, unknowns, variables, .. } = started;
-    let mut lines = vec![(*title).to_owned()];
-    lines.push(format!("mesh: {nodes} nodes, {tets} tetrahedra, {unknowns} unknowns"));
-    if let Some(optimizer) = started.optimizer {
-        lines.push(format!("optimisation: {variables} design variables, {}", optimizer.algorithm.name()));
-    }
-    if let Some(directory) = started.directory {
-        lines.push(format!("writing to {}", directory.display()));
-    }
-    lines
 }
 
 impl<W: Write> Observer for Console<W> {
@@ -87,16 +65,12 @@ impl<W: Write> Observer for Console<W> {
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
-        if !self.header_is_shown {
-            self.header_is_shown = true;
-            self.line(&table::header(row, Columns::All));
-        }
-        self.line(&table::row(row, Columns::All));
+        self.lines.evaluation(row).iter().for_each(|line| self.line(line));
     }
 
     fn warning(&mut self, message: &str) {
-        let text = self.paint.warning(message);
-        self.line(&text);
+        let line = self.lines.warning(message);
+        self.line(&line);
     }
 }
 
@@ -104,14 +78,12 @@ impl<W: Write> RunObserver for Console<W> {
     fn started(&mut self, started: &Started<'_>) {
         self.end_stage();
         self.has_evaluations = started.optimizer.is_some();
-        self.named = Named::of(started);
-        announced(started).iter().for_each(|line| self.line(line));
+        self.lines.started(started).iter().for_each(|line| self.line(line));
     }
 
     fn finished(&mut self, result: &RunResult) {
         self.end_stage();
-        self.line("");
-        summary::lines(result, &self.named, self.paint).iter().for_each(|line| self.line(line));
+        self.lines.finished(result).iter().for_each(|line| self.line(line));
     }
 }
 
@@ -132,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_stage_is_told_with_its_time() {
+    fn a_long_stage_is_shown_with_its_time() {
         let mut bytes = Vec::new();
         let mut console = Console::new(&mut bytes);
         console.stage(Stage::Assembling);

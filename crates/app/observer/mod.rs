@@ -1,13 +1,14 @@
-//! Who watches a run: the driver tells what happens, an observer shows it.
+//! Who watches a run: the driver reports what happens, an observer shows it.
 //!
-//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone. All of them
-//! show the same rows (`table`) and the same end (`summary`, with the flux density at the probes from `probes`).
+//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone. The first two
+//! have the same `lines`: the rows (`table`) and the end (`summary`, with the flux density at the probes from `probes`).
 
 mod bar;
 mod console;
-mod paint;
+mod lines;
 mod probes;
 mod quiet;
+mod styles;
 mod summary;
 mod table;
 
@@ -19,10 +20,10 @@ use crate::output::RunResult;
 
 pub use fluxmorph_optimizer::driver::{Evaluation, Observer, Silent, column};
 
-pub use bar::{Bar, take_down};
+pub use bar::{Bar, clear};
 pub use console::Console;
-pub use paint::{Colour, Paint};
 pub use quiet::Quiet;
+pub use styles::Styles;
 
 /// What is known when a run starts.
 #[derive(Debug, Clone, Copy)]

@@ -2,25 +2,25 @@
 
 use std::io::Write;
 
-use super::{Observer, Paint, RunObserver, show};
+use super::{Observer, RunObserver, Styles, show};
 
 /// Shows the warnings alone.
 #[derive(Debug)]
 pub struct Quiet<W> {
     writer: W,
-    paint: Paint,
+    styles: Styles,
 }
 
 impl Quiet<std::io::Stderr> {
     /// On standard error.
     pub fn stderr() -> Self {
-        Self { writer: std::io::stderr(), paint: Paint::for_stderr() }
+        Self { writer: std::io::stderr(), styles: Styles::for_stderr() }
     }
 }
 
 impl<W: Write> Observer for Quiet<W> {
     fn warning(&mut self, message: &str) {
-        show(&mut self.writer, &self.paint.warning(message));
+        show(&mut self.writer, &self.styles.warning_line(message));
     }
 }
 

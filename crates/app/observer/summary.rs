@@ -1,8 +1,9 @@
 //! The end of a run, or of a single analysis, in a few lines.
 
-use super::{Colour, Paint, Started, probes};
+use super::styles::{Styles, styled};
+use super::{Started, probes};
 use crate::config::{Goal, Objective};
-use crate::output::{ConstraintResult, RunResult, RunStatus};
+use crate::output::{ConstraintResult, ObjectiveResult, RunResult, RunStatus};
 
 /// What the objective of a run is called, and its unit.
 #[derive(Debug, Clone, Default)]
@@ -36,71 +37,74 @@ impl Named {
     }
 }
 
+/// A name and its text.
+type Row = (&'static str, String);
+
 /// The lines, without a blank one before them.
-pub(super) fn lines(result: &RunResult, named: &Named, paint: Paint) -> Vec<String> {
-    let mut lines = Vec::new();
-    let mut row = |name: &str, text: String| lines.push(format!("{name:<22} {text}"));
+pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<String> {
     let is_run = result.command != "solve";
+    let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
+    rows.extend(result.constraints.iter().map(|constraint| kept(constraint, styles)));
+    for (frequency, losses) in states(result) {
+        let at = if result.states.len() > 1 { format!(" at {frequency} Hz") } else { String::new() };
+        rows.extend(losses.iter().map(|(region, loss)| ("loss", format!("{loss:.6e} W in {region}{at}"))));
+    }
+    let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
-        let colour = match result.status {
-            RunStatus::Converged | RunStatus::Done => Colour::Good,
-            RunStatus::Failed => Colour::Bad,
-            _ => Colour::Warning,
-        };
-        row("ended", paint.paint(colour, result.stop_reason.describe()));
+        rows.push(("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations)));
+        rows.push(("worst quality", format!("{last:.4}, was {first:.4}")));
     } else {
-        let frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
-        row("analysed at", frequencies.join(", "));
+        rows.push(("worst quality", format!("{last:.4}")));
     }
-    match &result.objective {
-        Some(objective) if is_run => {
-            let unit = &named.unit;
-            if !named.name.is_empty() {
-                row("objective", named.name.clone());
-            }
-            row("objective, initial", format!("{:.6e}{unit}", objective.initial));
-            let evaluation = objective.best_evaluation;
-            row("objective, best", format!("{:.6e}{unit} at evaluation {evaluation}", objective.best));
-            row("F/F0", paint.paint(Colour::Strong, &format!("{:.5}", objective.ratio)));
-            if let Some(fresh) = &objective.verification {
-                row("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets));
-            }
-        }
-        Some(objective) => {
-            let value = paint.paint(Colour::Strong, &format!("{:.6e}{}", objective.best, named.unit));
-            // Of an analysis it is a measured quantity.
-            let what = named.name.split_once(' ').map_or("", |(_, what)| what);
-            row("value", format!("{value}  {what}").trim_end().to_owned());
-        }
-        None => {}
-    }
-    for constraint in &result.constraints {
-        let ConstraintResult { name, value, bound, satisfied } = constraint;
-        let verdict = if *satisfied { "kept".to_owned() } else { paint.paint(Colour::Bad, "NOT KEPT") };
-        row("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"));
-    }
-    for state in states(result) {
-        let at = if result.states.len() > 1 { format!(" at {} Hz", state.0) } else { String::new() };
-        for (region, loss) in state.1 {
-            row("loss", format!("{loss:.6e} W in {region}{at}"));
-        }
-    }
-    let mesh = &result.mesh;
-    if is_run {
-        row("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations));
-        let (last, first) = (mesh.worst_quality_final, mesh.worst_quality_initial);
-        row("worst quality", format!("{last:.4}, was {first:.4}"));
-    } else {
-        row("worst quality", format!("{:.4}", mesh.worst_quality_final));
-    }
-    let methods = result.linear_solver.methods.first().map(|method| format!(", {method}"));
-    let residual = result.linear_solver.worst_residual;
-    row("worst residual", format!("{residual:.1e}{}", methods.unwrap_or_default()));
-    row("time", times(result));
-    row("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0)));
+    let method = result.linear_solver.methods.first().map_or(String::new(), |method| format!(", {method}"));
+    rows.push(("worst residual", format!("{:.1e}{method}", result.linear_solver.worst_residual)));
+    rows.push(("time", times(result)));
+    rows.push(("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0))));
     let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
-    lines.extend(probes::lines(&result.probes, frequency));
-    lines
+    let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
+    rows.chain(probes::lines(&result.probes, frequency)).collect()
+}
+
+/// How a run ended, and what it has gained.
+fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
+    let style = match result.status {
+        RunStatus::Converged | RunStatus::Done => styles.good,
+        RunStatus::Failed => styles.bad,
+        _ => styles.warning,
+    };
+    let mut rows = vec![("ended", styled(style, result.stop_reason.describe()))];
+    let Some(objective) = &result.objective else { return rows };
+    if !named.name.is_empty() {
+        rows.push(("objective", named.name.clone()));
+    }
+    let ObjectiveResult { initial, best, best_evaluation, ratio, .. } = objective;
+    let unit = &named.unit;
+    rows.push(("objective, initial", format!("{initial:.6e}{unit}")));
+    rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
+    rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
+    if let Some(fresh) = &objective.verification {
+        rows.push(("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets)));
+    }
+    rows
+}
+
+/// The frequencies of an analysis, and what was measured.
+fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
+    let frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
+    let mut rows = vec![("analysed at", frequencies.join(", "))];
+    if let Some(objective) = &result.objective {
+        let value = styled(styles.strong, &format!("{:.6e}{}", objective.best, named.unit));
+        // Of an analysis it is a measured quantity: there is no goal.
+        let what = named.name.split_once(' ').map_or("", |(_, what)| what);
+        rows.push(("value", format!("{value}  {what}").trim_end().to_owned()));
+    }
+    rows
+}
+
+fn kept(constraint: &ConstraintResult, styles: &Styles) -> Row {
+    let ConstraintResult { name, value, bound, satisfied } = constraint;
+    let verdict = if *satisfied { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
+    ("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"))
 }
 
 /// Losses by frequency [Hz].
@@ -133,7 +137,7 @@ mod tests {
     #[test]
     fn the_summary_names_the_outcome() {
         let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
-        let text = lines(&crate::output::example_result(), &named, Paint::PLAIN).join("\n");
+        let text = lines(&crate::output::example_result(), &named, &Styles::default()).join("\n");
         for fragment in [
             "the objective has converged",
             "minimise loss in plate",
@@ -151,7 +155,7 @@ mod tests {
     fn an_analysis_does_not_read_like_an_optimisation() {
         let result = RunResult { command: "solve".to_owned(), ..crate::output::example_result() };
         let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
-        let text = lines(&result, &named, Paint::PLAIN).join("\n");
+        let text = lines(&result, &named, &Styles::default()).join("\n");
         assert!(text.contains("value                  1.000000e0 W  loss in plate"), "{text}");
         for word in ["F/F0", "ended", "iterations", "minimise", "was "] {
             assert!(!text.contains(word), "{word}\n{text}");

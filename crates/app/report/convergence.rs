@@ -1,8 +1,8 @@
-//! The way of the search: what the history holds against the number of the evaluation.
+//! The course of the search: what the history holds against the number of the evaluation.
+
+use maud::{Markup, html};
 
 use super::data::RunData;
-use super::html::Html;
-use super::plane::extremes;
 use super::plot::{BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, dot, grid, line, polyline, svg, text};
 use super::ticks::{Count, number};
 use super::words::capital;
@@ -17,8 +17,8 @@ const MOST_CONSTRAINTS: usize = 12;
 /// Lines at new rounds.
 const MOST_ROUNDS: usize = 100;
 
-/// Values that differ by more than this factor are drawn by factors.
-const WIDE: f64 = 30.0;
+/// Points of a curve that are drawn one by one.
+const MOST_DOTS: usize = 60;
 
 /// One quantity of the history.
 struct Series<'a> {
@@ -33,7 +33,7 @@ struct Series<'a> {
 }
 
 /// All figures.
-pub(super) fn figures(html: &mut Html, data: &RunData) {
+pub(super) fn figures(data: &RunData) -> Markup {
     let rows = &data.history;
     let series = |title: &str, value: &dyn Fn(&Evaluation) -> Option<f64>| Series {
         title: title.to_owned(),
@@ -62,14 +62,13 @@ pub(super) fn figures(html: &mut Html, data: &RunData) {
     for (kind, own) in &mut all {
         own.is_labelled = !matches!(*kind, "gradient" | "step");
     }
-    html.element("div", &[("class", "grid2")], |html| {
-        for (kind, series) in &all {
-            html.element("figure", &[("class", "chart"), ("data-chart", kind)], |html| {
-                series.draw(html);
-                html.leaf("figcaption", &[], &series.caption());
-            });
+    html! {
+        div class="grid2" {
+            @for (kind, series) in &all {
+                figure class="chart" data-chart=(kind) { (series.draw()) figcaption { (series.caption()) } }
+            }
         }
-    });
+    }
 }
 
 impl Series<'_> {
@@ -77,63 +76,46 @@ impl Series<'_> {
         self.rows.iter().zip(&self.values).filter_map(|(row, value)| Some((row, (*value)?)))
     }
 
-    fn scale(&self) -> Scale {
-        let [low, high] = extremes(self.known().map(|(_, v)| v).chain(self.bound));
-        let pixels = [TOP + HEIGHT, TOP];
-        if !(low.is_finite() && high.is_finite()) {
-            return Scale { low: 0.0, high: 1.0, count: Count::Linear, pixels };
-        }
-        if low > 0.0 && high / low > WIDE {
-            let room = (high / low).powf(0.06);
-            return Scale { low: low / room, high: high * room, count: Count::Logarithmic, pixels };
-        }
-        let room = if high > low { 0.06 * (high - low) } else { 0.1 * high.abs().max(1e-9) };
-        Scale { low: low - room, high: high + room, count: Count::Linear, pixels }
+    fn draw(&self) -> Markup {
+        let last = self.rows.last().map_or(1, |row| row.evaluation).max(1);
+        let pixels = [LEFT + 6.0, WIDTH - RIGHT];
+        let x = Scale { low: 0.0, high: last as f64, count: Count::Linear, pixels };
+        let y = Scale::around(self.known().map(|(_, v)| v).chain(self.bound), [TOP + HEIGHT, TOP]);
+        let point = |(row, value): (&Evaluation, f64)| [x.at(row.evaluation as f64), y.at(value)];
+        let points: Vec<[f64; 2]> = self.known().map(point).collect();
+        let rounds = self.rows.windows(2).filter(|pair| pair[1].round > pair[0].round).map(|pair| &pair[1]);
+        let best = self.known().find(|(row, _)| Some(row.evaluation) == self.best);
+        let content = html! {
+            (grid(&x, &y, 5))
+            (axes(&x, &y, ["evaluation", &self.title], [last.min(8), 5]))
+            @for (row, at) in rounds.take(MOST_ROUNDS).map(|row| (row, x.at(row.evaluation as f64 - 0.5))) {
+                (line("round", [at, y.pixels[0]], [at, y.pixels[1]]))
+                (text("tick", at + 3.0, TOP + 9.0, &format!("round {}", row.round)))
+            }
+            @if let Some(bound) = self.bound {
+                (line("bound", [x.pixels[0], y.at(bound)], [x.pixels[1], y.at(bound)]))
+            }
+            (polyline("curve", &points))
+            @if points.len() <= MOST_DOTS { @for at in &points { (dot("point", *at, 2.4)) } }
+            @if let Some(best) = best { (self.ring(best.1, point(best))) }
+        };
+        svg(
+            TOP + HEIGHT + BOTTOM,
+            &format!("{} against the evaluation. {}", self.title, self.caption()),
+            &content,
+        )
     }
 
-    fn draw(&self, html: &mut Html) {
-        let last = self.rows.last().map_or(1, |row| row.evaluation).max(1);
-        let x =
-            Scale { low: 0.0, high: last as f64, count: Count::Linear, pixels: [LEFT + 6.0, WIDTH - RIGHT] };
-        let y = self.scale();
-        let point = |row: &Evaluation, value: f64| [x.at(row.evaluation as f64), y.at(value)];
-        let label = format!("{} against the evaluation. {}", self.title, self.caption());
-        svg(html, TOP + HEIGHT + BOTTOM, &label, |html| {
-            grid(html, &x, &y, 5);
-            axes(html, &x, &y, ["evaluation", &self.title], [last.min(8), 5]);
-            let begun =
-                self.rows.windows(2).filter(|pair| pair[1].round > pair[0].round).map(|pair| &pair[1]);
-            for row in begun.take(MOST_ROUNDS) {
-                let at = x.at(row.evaluation as f64 - 0.5);
-                line(html, "round", [at, y.pixels[0]], [at, y.pixels[1]]);
-                text(html, "tick", at + 3.0, TOP + 9.0, &format!("round {}", row.round));
+    /// The mark of the best design, its value beside it.
+    fn ring(&self, value: f64, at: [f64; 2]) -> Markup {
+        let (class, left) = if at[0] > 0.6 * WIDTH { ("mark end", -8.0) } else { ("mark", 8.0) };
+        let down = if at[1] > TOP + 0.5 * HEIGHT { -8.0 } else { 16.0 };
+        html! {
+            (dot("best", at, 4.6))
+            @if self.is_labelled {
+                (text(class, at[0] + left, at[1] + down, &format!("best: {}", number(value, 4))))
             }
-            if let Some(bound) = self.bound {
-                line(html, "bound", [x.pixels[0], y.at(bound)], [x.pixels[1], y.at(bound)]);
-            }
-            let points: Vec<[f64; 2]> = self.known().map(|(row, value)| point(row, value)).collect();
-            polyline(html, "curve", &points);
-            if points.len() <= 60 {
-                points.iter().for_each(|&at| dot(html, "point", at, 2.4));
-            }
-            if let Some((row, value)) = self.known().find(|(row, _)| Some(row.evaluation) == self.best) {
-                let at = point(row, value);
-                dot(html, "best", at, 4.6);
-                if !self.is_labelled {
-                    return;
-                }
-                let right = at[0] > 0.6 * WIDTH;
-                let (class, x) = if right { ("mark end", at[0] - 8.0) } else { ("mark", at[0] + 8.0) };
-                let above = at[1] > TOP + 0.5 * HEIGHT;
-                text(
-                    html,
-                    class,
-                    x,
-                    at[1] + if above { -8.0 } else { 16.0 },
-                    &format!("best: {}", number(value, 4)),
-                );
-            }
-        });
+        }
     }
 
     fn caption(&self) -> String {

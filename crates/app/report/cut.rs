@@ -28,7 +28,7 @@ impl CutPlane {
         above > 0 && above < points.len()
     }
 
-    /// Where the plane meets the way from one vertex to another, with the value there.
+    /// Where the plane meets the edge between two vertices, with the value there.
     fn between(&self, (a, va): (Point, f64), (b, vb): (Point, f64)) -> (Point, f64) {
         let t = (self.at - a[self.axis]) / (b[self.axis] - a[self.axis]);
         (std::array::from_fn(|d| a[d] + t * (b[d] - a[d])), va + t * (vb - va))

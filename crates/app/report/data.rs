@@ -1,4 +1,4 @@
-//! What a run directory holds, read for a page. What is missing is told with its reason; what is damaged is an error.
+//! What a run directory holds, read for a page. What is missing is stated with its reason; what is damaged is an error.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ use fluxmorph_optimizer::driver::Record;
 /// Largest result and configuration that are read [bytes].
 const LARGEST_TEXT: u64 = 1 << 28;
 
-/// A run as its directory tells it.
+/// A run as its directory holds it.
 #[derive(Debug)]
 pub(super) struct RunData {
     /// Absolute.

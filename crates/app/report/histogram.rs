@@ -2,10 +2,10 @@
 
 use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::quality::QualityReport;
+use maud::{Markup, html};
 
 use super::data::{RunData, Snapshot};
-use super::html::Html;
-use super::plot::{WIDTH, px, svg, text};
+use super::plot::{WIDTH, rect, svg, text};
 use super::ticks::{grouped, number};
 use crate::setup::Outline;
 
@@ -19,7 +19,7 @@ const START: f64 = 66.0;
 const LONGEST: f64 = WIDTH - START - 58.0;
 
 /// The figure with its caption.
-pub(super) fn figure(html: &mut Html, data: &RunData, outline: &Outline) -> Result<(), String> {
+pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String> {
     let after = data.fields[1].as_ref().map_err(Clone::clone)?;
     let before = data.fields[0].as_ref().ok();
     let moving = outline.design.as_ref().map(|design| design.moving.clone()).filter(|m| !m.is_empty());
@@ -30,55 +30,52 @@ pub(super) fn figure(html: &mut Html, data: &RunData, outline: &Outline) -> Resu
     let report = |field: &Snapshot| report(outline, field, &elements);
     let after = report(after).ok_or("there is no element")?;
     let before = before.and_then(report);
-    html.element("figure", &[("id", "quality-histogram"), ("class", "narrow")], |html| {
-        draw(html, before.as_ref(), &after);
-        html.leaf("figcaption", &[], &caption(before.as_ref(), &after, of));
-    });
-    Ok(())
+    Ok(html! {
+        figure id="quality-histogram" class="narrow" {
+            (draw(before.as_ref(), &after))
+            figcaption { (caption(before.as_ref(), &after, of)) }
+        }
+    })
 }
 
 fn report(outline: &Outline, field: &Snapshot, elements: &[ElementId]) -> Option<QualityReport> {
     QualityReport::of_points(outline.mesh.topology(), &field.points, elements)
 }
 
-fn draw(html: &mut Html, before: Option<&QualityReport>, after: &QualityReport) {
-    let most = before.into_iter().chain([after]).flat_map(|r| r.histogram).max().unwrap_or(1).max(1);
+fn draw(before: Option<&QualityReport>, after: &QualityReport) -> Markup {
+    let shown: Vec<_> = before
+        .map(|r| ("bar-before", "before", r))
+        .into_iter()
+        .chain([("bar-after", "after", after)])
+        .collect();
+    let most = shown.iter().flat_map(|(_, _, report)| report.histogram).max().unwrap_or(1).max(1);
     let bins = after.histogram.len();
-    let label = format!("Number of elements by tenths of quality, worst {}", number(after.worst, 3));
-    svg(html, ABOVE + ROW * bins as f64 + 26.0, &label, |html| {
-        text(html, "title", 2.0, 13.0, "quality");
-        text(html, "title", START, 13.0, "elements");
-        for k in 0..bins {
-            let top = ABOVE + ROW * k as f64;
-            let tenth = format!("{:.1}–{:.1}", k as f64 / bins as f64, (k + 1) as f64 / bins as f64);
-            text(html, "tick end", START - 8.0, top + 15.0, &tenth);
-            let bars = [before.map(|r| ("bar-before", r)), Some(("bar-after", after))];
-            for (row, (class, report)) in bars.into_iter().flatten().enumerate() {
-                let count = report.histogram[k];
-                let length = LONGEST * count as f64 / most as f64;
-                let y = top + 2.0 + (BAR + 1.0) * row as f64;
-                let place = [START, y, length.max(if count > 0 { 0.8 } else { 0.0 }), BAR].map(px);
-                let [left, top, width, height] = place.each_ref().map(String::as_str);
-                html.void(
-                    "rect",
-                    &[("class", class), ("x", left), ("y", top), ("width", width), ("height", height)],
-                );
-                text(html, "count", START + length + 4.0, y + 8.0, &grouped(count));
+    let bottom = ABOVE + ROW * bins as f64;
+    let tenth = |k: usize| format!("{:.1}–{:.1}", k as f64 / bins as f64, (k + 1) as f64 / bins as f64);
+    let bar = |class: &str, count: usize, y: f64| {
+        let length = LONGEST * count as f64 / most as f64;
+        let seen = length.max(if count > 0 { 0.8 } else { 0.0 });
+        html! {
+            (rect(class, [START, y, seen, BAR]))
+            (text("count", START + length + 4.0, y + 8.0, &grouped(count)))
+        }
+    };
+    let content = html! {
+        (text("title", 2.0, 13.0, "quality"))
+        (text("title", START, 13.0, "elements"))
+        @for (k, top) in (0..bins).map(|k| (k, ABOVE + ROW * k as f64)) {
+            (text("tick end", START - 8.0, top + 15.0, &tenth(k)))
+            @for (i, (class, _, report)) in shown.iter().enumerate() {
+                (bar(class, report.histogram[k], top + 2.0 + (BAR + 1.0) * i as f64))
             }
         }
-        let y = ABOVE + ROW * bins as f64 + 8.0;
-        let keys = [("bar-before", "before", before.is_some()), ("bar-after", "after", true)];
-        for (i, (class, name, _)) in keys.into_iter().filter(|(_, _, shown)| *shown).enumerate() {
-            let left = START + 80.0 * i as f64;
-            let place = [left, y, 10.0, 9.0].map(px);
-            let [left_text, top, width, height] = place.each_ref().map(String::as_str);
-            html.void(
-                "rect",
-                &[("class", class), ("x", left_text), ("y", top), ("width", width), ("height", height)],
-            );
-            text(html, "tick", left + 15.0, y + 8.5, name);
+        @for (i, (class, name, _)) in shown.iter().enumerate() {
+            (rect(class, [START + 80.0 * i as f64, bottom + 8.0, 10.0, 9.0]))
+            (text("tick", START + 80.0 * i as f64 + 15.0, bottom + 16.5, name))
         }
-    });
+    };
+    let label = format!("Number of elements by tenths of quality, worst {}", number(after.worst, 3));
+    svg(bottom + 26.0, &label, &content)
 }
 
 fn caption(before: Option<&QualityReport>, after: &QualityReport, of: &str) -> String {

@@ -1,20 +1,17 @@
-//! Before and after: the design surface seen along the way it moves, coloured by the thickness behind it.
+//! Before and after: the design surface seen along its direction of motion, coloured by the thickness behind it.
 
 use fluxmorph_geometry::tet4::{Point, area_vector, norm};
+use maud::{Markup, html};
 
 use super::colour::ColourMap;
 use super::data::RunData;
-use super::html::Html;
+use super::frame::Frame;
 use super::plane::{Plane, extremes, images, mirrored, mirrors};
-use super::plot::{BAR, BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, colour_bar, dot, line, svg, text};
-use super::raster::Raster;
+use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, dot, line, svg, text};
 use super::ticks::{Count, number, trimmed};
 use super::words::capital;
 use crate::config::{DesignDirection, DirectionWord};
 use crate::setup::{Outline, OutlinedDesign};
-
-/// Pixels of the image for each of the drawing.
-const SHARPNESS: f64 = 2.0;
 
 /// Tallest drawing area.
 const TALLEST: f64 = 300.0;
@@ -80,32 +77,25 @@ impl SurfaceValues {
 }
 
 /// Both figures with their caption.
-pub(super) fn figure(
-    html: &mut Html,
-    data: &RunData,
-    outline: &Outline,
-    design: &OutlinedDesign,
-) -> Result<(), String> {
+pub(super) fn figure(data: &RunData, outline: &Outline, design: &OutlinedDesign) -> Result<Markup, String> {
     let surface = SurfaceValues::new(data, design);
     let after = surface.values[1].as_ref().ok_or("the best design is not known")?;
     let [low, high] = surface.range().ok_or("no node of the design surface has a value")?;
     let scale = Scale { low, high, count: Count::Linear, pixels: [LEFT, WIDTH - RIGHT] };
     let drawing = Drawing::new(data, outline, design, scale);
     let names = if data.is_run() { ["before", "after"] } else { ["undeformed", "the design analysed"] };
-    html.element("figure", &[("id", "shape-map")], |html| {
-        html.element("div", &[("class", "pair")], |html| {
-            for (k, name) in names.into_iter().enumerate() {
-                if let Some(values) = &surface.values[k] {
-                    html.element("div", &[], |html| {
-                        html.leaf("h3", &[], &capital(name));
-                        drawing.draw(html, &surface, values, &format!("map-{k}"), name);
-                    });
+    let maps = names.into_iter().zip(&surface.values).enumerate();
+    let known = maps.filter_map(|(k, (name, values))| Some((format!("map-{k}"), name, values.as_ref()?)));
+    Ok(html! {
+        figure id="shape-map" {
+            div class="pair" {
+                @for (id, name, values) in known {
+                    div { h3 { (capital(name)) } (drawing.draw(&surface, values, &id, name)) }
                 }
             }
-        });
-        html.leaf("figcaption", &[], &caption(data, outline, design, &surface, after));
-    });
-    Ok(())
+            figcaption { (caption(data, outline, design, &surface, after)) }
+        }
+    })
 }
 
 /// One view of the surface: where its triangles are on the page.
@@ -114,17 +104,16 @@ struct Drawing {
     /// Corners of every triangle in every mirror image [mm], with the places of its nodes in the surface.
     triangles: Vec<([[f64; 2]; 3], [usize; 3])>,
     scale: Scale,
-    x: Scale,
-    y: Scale,
-    mirror_lines: bool,
+    frame: Frame,
+    is_mirrored: bool,
 }
 
 impl Drawing {
     fn new(data: &RunData, outline: &Outline, design: &OutlinedDesign, scale: Scale) -> Self {
-        let points: Vec<Point> = design.surface.nodes().iter().map(|&n| outline.full_mesh.point(n)).collect();
+        let nodes = design.surface.nodes();
+        let points: Vec<Point> = nodes.iter().map(|&n| outline.full_mesh.point(n)).collect();
         let plane = Plane::across(view_normal(data, design), &points);
         let mirrors = mirrors(&data.config);
-        let nodes = design.surface.nodes();
         let place = |node| nodes.binary_search(&node).unwrap_or(0);
         let mut triangles = Vec::new();
         for image in images(&mirrors) {
@@ -134,97 +123,69 @@ impl Drawing {
             }
         }
         let corners = || triangles.iter().flat_map(|(corners, _)| corners);
-        let ends = [0, 1].map(|d| extremes(corners().map(|p| p[d])));
-        let extent = ends.map(|[low, high]| (high - low).max(1e-9));
-        let per_mm = ((WIDTH - LEFT - RIGHT) / extent[0]).min(TALLEST / extent[1]);
-        let (width, height) = (extent[0] * per_mm, extent[1] * per_mm);
-        let left = LEFT + 0.5 * (WIDTH - LEFT - RIGHT - width);
-        let axis =
-            |k: usize, pixels| Scale { low: ends[k][0], high: ends[k][1], count: Count::Linear, pixels };
-        Self {
-            x: axis(0, [left, left + width]),
-            y: axis(1, [TOP + height, TOP]),
-            mirror_lines: !mirrors.is_empty(),
-            plane,
-            triangles,
-            scale,
-        }
+        let [u, v] = [0, 1].map(|d| extremes(corners().map(|p| p[d])));
+        let frame = Frame::new([u[0], v[0]], [u[1], v[1]], TALLEST);
+        Self { plane, triangles, scale, frame, is_mirrored: !mirrors.is_empty() }
     }
 
-    fn draw(&self, html: &mut Html, surface: &SurfaceValues, values: &[Option<f64>], id: &str, name: &str) {
-        let (x, y) = (&self.x, &self.y);
-        let [width, height] = [x.pixels[1] - x.pixels[0], y.pixels[0] - y.pixels[1]];
-        let pixels = [width, height].map(|side| (side * SHARPNESS).ceil().max(1.0));
-        let mut image = Raster::new(pixels[0] as usize, pixels[1] as usize);
-        for (corners, nodes) in &self.triangles {
-            let [Some(a), Some(b), Some(c)] = nodes.map(|n| values[n]) else { continue };
-            let at = |p: [f64; 2]| [x.share(p[0]) * pixels[0], (1.0 - y.share(p[1])) * pixels[1]];
-            image.triangle(corners.map(at), [a, b, c].map(|v| self.scale.share(v)));
-        }
-        let url = image.data_url(surface.colours());
-        let [least, most] = extremes(values.iter().flatten().copied());
-        let label = format!(
-            "Map of the {} {name}: from {} to {} millimetres",
-            surface.name(),
-            trimmed(least, 2),
-            trimmed(most, 2)
-        );
-        let bottom = y.pixels[0];
-        svg(html, bottom + BOTTOM + BAR, &label, |html| {
-            let place = [x.pixels[0], y.pixels[1], width, height].map(super::plot::px);
-            let [left, top, width, height] = place.each_ref().map(String::as_str);
-            html.void(
-                "image",
-                &[
-                    ("href", &url),
-                    ("x", left),
-                    ("y", top),
-                    ("width", width),
-                    ("height", height),
-                    ("preserveAspectRatio", "none"),
-                ],
-            );
-            let titles = self.plane.titles.each_ref().map(String::as_str);
-            axes(html, x, y, titles, [6, 5]);
-            if self.mirror_lines {
-                let [u, v] = [x.at(0.0), y.at(0.0)];
-                line(html, "mirror", [u, y.pixels[0]], [u, y.pixels[1]]);
-                line(html, "mirror", [x.pixels[0], v], [x.pixels[1], v]);
-            }
-            for extreme in [least, most].iter().take(if most - least > 1e-6 * most.abs() { 2 } else { 0 }) {
-                self.mark(html, values, *extreme);
-            }
-            let title = format!("{} [mm]", surface.name());
-            colour_bar(html, id, surface.colours(), &self.scale, &title, bottom + BOTTOM + 4.0);
+    fn draw(&self, surface: &SurfaceValues, values: &[Option<f64>], id: &str, name: &str) -> Markup {
+        let Frame { x, y } = self.frame;
+        let coloured = self.triangles.iter().filter_map(|(corners, nodes)| {
+            let [Some(a), Some(b), Some(c)] = nodes.map(|n| values[n]) else { return None };
+            Some((*corners, [a, b, c].map(|v| self.scale.share(v))))
         });
+        let [least, most] = extremes(values.iter().flatten().copied());
+        let ends = if most - least > 1e-6 * most.abs() { vec![least, most] } else { Vec::new() };
+        let [u, v] = self.frame.at([0.0; 2]);
+        let titles = self.plane.titles.each_ref().map(String::as_str);
+        let bar = format!("{} [mm]", surface.name());
+        let content = html! {
+            (self.frame.image(surface.colours(), coloured))
+            (axes(&x, &y, titles, [6, 5]))
+            @if self.is_mirrored {
+                (line("mirror", [u, y.pixels[0]], [u, y.pixels[1]]))
+                (line("mirror", [x.pixels[0], v], [x.pixels[1], v]))
+            }
+            @for end in ends { @if let Some(at) = self.middle_of(values, end) { (self.mark(at, end)) } }
+            (colour_bar(id, surface.colours(), &self.scale, &bar, self.frame.bar_top()))
+        };
+        let [from, to] = [least, most].map(|end| trimmed(end, 2));
+        let label = format!("Map of the {} {name}: from {from} to {to} millimetres", surface.name());
+        svg(self.frame.height(), &label, &content)
     }
 
-    /// A dot with its value at the place, of those with an extreme value, that lies deepest among its like.
-    fn mark(&self, html: &mut Html, values: &[Option<f64>], extreme: f64) {
+    /// A dot with its value beside it.
+    fn mark(&self, at: [f64; 2], value: f64) -> Markup {
+        let right = at[0] > self.frame.x.pixels[1] - 60.0;
+        let (class, x) = if right { ("spot-text end", at[0] - 6.0) } else { ("spot-text", at[0] + 6.0) };
+        html! {
+            (dot("spot", at, 2.2))
+            (text(class, x, at[1] + 4.0, &format!("{} mm", trimmed(value, 2))))
+        }
+    }
+
+    /// The place on the page, of those with an extreme value, that lies deepest among its like.
+    fn middle_of(&self, values: &[Option<f64>], extreme: f64) -> Option<[f64; 2]> {
         let near = 1e-3 * (self.scale.high - self.scale.low);
         let is = |n: usize| values[n].is_some_and(|v| (v - extreme).abs() <= near);
         // Of the model itself, which comes before its images.
-        let own = &self.triangles[..self.triangles.len() / if self.mirror_lines { 4 } else { 1 }];
+        let own = &self.triangles[..self.triangles.len() / if self.is_mirrored { 4 } else { 1 }];
         let centre =
             |corners: &[[f64; 2]; 3]| [0, 1].map(|d| corners.iter().map(|c| c[d]).sum::<f64>() / 3.0);
         let (whole, others): (Vec<_>, Vec<_>) = own
             .iter()
             .map(|(corners, nodes)| (centre(corners), nodes))
             .partition(|(_, nodes)| nodes.iter().all(|&n| is(n)));
+        let Frame { x, y } = &self.frame;
         let apart = |p: &[f64; 2]| {
             let to_other = others.iter().map(|(o, _)| (o[0] - p[0]).hypot(o[1] - p[1]));
-            let to_edge = [p[0] - self.x.low, self.x.high - p[0], p[1] - self.y.low, self.y.high - p[1]];
+            let to_edge = [p[0] - x.low, x.high - p[0], p[1] - y.low, y.high - p[1]];
             to_other.chain(to_edge).fold(f64::INFINITY, f64::min)
         };
         // A thousand candidates tell where there is room.
         let step = whole.len().div_ceil(1000).max(1);
         let candidates = whole.iter().step_by(step).map(|(place, _)| (apart(place), place));
-        let Some((_, place)) = candidates.max_by(|(a, _), (b, _)| a.total_cmp(b)) else { return };
-        let at = [self.x.at(place[0]), self.y.at(place[1])];
-        dot(html, "spot", at, 2.2);
-        let right = at[0] > self.x.pixels[1] - 60.0;
-        let (class, x) = if right { ("spot-text end", at[0] - 6.0) } else { ("spot-text", at[0] + 6.0) };
-        text(html, class, x, at[1] + 4.0, &format!("{} mm", trimmed(extreme, 2)));
+        candidates.max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, place)| self.frame.at(*place))
     }
 }
 

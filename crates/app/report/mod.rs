@@ -1,10 +1,12 @@
 //! `report.html`: one page about a run, made from its directory alone, that can be sent and read anywhere.
 //!
-//! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others draw one thing each: `map`, `field`,
-//! `convergence`, `histogram`, `surface`, `tables`, `paper`. Underneath are `plot` (axes), `ticks` (numbers), `colour`,
-//! `raster` and `png` (images), `cut`, `coils` and `plane` (geometry), `words` (the configuration in plain words). Markup is
-//! written by `html` alone, which escapes. The page holds its style and its script (`style.css`, `view.js`), asks no network,
-//! and says nothing of the moment at which it is made: equal directories make equal pages.
+//! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others show one
+//! thing each: `head`, `map`, `field`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
+//! `plot` (axes) and `frame` (pictures to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
+//! `field_cut`, `cut`, `coils` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
+//! configuration in plain words), `markup` (what the pages of this program share). The page holds its style and its script
+//! (`style.css`, `view.js`), asks no network, and says nothing of the moment at which it is made: equal directories make
+//! equal pages.
 //!
 //! Does not live here: anything that solves a field or moves a mesh. What is shown was computed by the run.
 
@@ -13,13 +15,18 @@ mod colour;
 mod convergence;
 mod cut;
 mod data;
+mod facts;
 mod field;
+mod field_cut;
 mod field_file;
+mod files;
+mod frame;
+mod head;
 mod histogram;
-pub(crate) mod html;
 mod map;
-pub(crate) mod page;
-mod paper;
+pub(crate) mod markup;
+mod observed;
+mod page;
 mod plane;
 pub(crate) mod plot;
 mod png;
@@ -27,6 +34,7 @@ mod raster;
 mod surface;
 mod tables;
 pub(crate) mod ticks;
+mod window;
 mod words;
 
 use std::path::{Path, PathBuf};
@@ -85,14 +93,14 @@ impl ReportedRun {
         let directory = self.directory.clone();
         let path = out.map_or_else(|| directory.report(), Path::to_owned);
         let data = RunData::read(self)?;
-        let page = page::page(&data, &way(&path, directory.path()));
+        let page = page::page(&data, &link_prefix(&path, directory.path()));
         directory.write(&path, page.as_bytes())?;
         Ok(path)
     }
 }
 
-/// The way from the folder of a file to a directory, with a slash at its end; nothing where they are the same.
-fn way(file: &Path, directory: &Path) -> String {
+/// The relative path from the folder of a file to a directory, with a slash at its end; nothing where they are the same.
+fn link_prefix(file: &Path, directory: &Path) -> String {
     // Links and `..` are followed where there is something; what is not there yet is taken as written.
     let whole = |path: &Path| {
         let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
@@ -102,17 +110,13 @@ fn way(file: &Path, directory: &Path) -> String {
     let from: Vec<_> = from.components().collect();
     let to: Vec<_> = to.components().collect();
     let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
-    let mut way = "../".repeat(from.len() - same);
-    for part in &to[same..] {
-        way += &page::address(&part.as_os_str().to_string_lossy());
-        way.push('/');
-    }
-    way
+    let down = to[same..].iter().map(|part| markup::address(&part.as_os_str().to_string_lossy()) + "/");
+    "../".repeat(from.len() - same) + &down.collect::<String>()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::way;
+    use super::link_prefix;
     use std::path::Path;
 
     #[test]
@@ -122,7 +126,7 @@ mod tests {
             ("b.html", "runs/a b", "runs/a%20b/"),
             ("out/b.html", "runs/a", "../runs/a/"),
         ] {
-            assert_eq!(way(Path::new(file), Path::new(directory)), expected);
+            assert_eq!(link_prefix(Path::new(file), Path::new(directory)), expected);
         }
     }
 }

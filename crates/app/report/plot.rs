@@ -1,8 +1,10 @@
 //! Axes, scales and colour bars as inline SVG, in units that are pixels on a phone.
 
+use maud::{Markup, html};
+
 use super::colour::ColourMap;
-use super::html::Html;
-use super::ticks::{Count, labels, linear, logarithmic};
+use super::plane::extremes;
+use super::ticks::{Count, labels, linear, logarithmic, number};
 
 /// Width of every figure: a phone shows it as it is, a larger screen larger.
 pub(crate) const WIDTH: f64 = 360.0;
@@ -25,8 +27,29 @@ pub(crate) struct Scale {
     pub(crate) pixels: [f64; 2],
 }
 
+/// Positive values that differ by more than this factor are drawn by factors.
+pub(super) const WIDE: f64 = 30.0;
+
+/// Ownership of the scale that is added on both sides of the values.
+const ROOM: f64 = 0.06;
+
 impl Scale {
-    /// Share of the scale at a value, 0 to 1 inside.
+    /// With some room around finite values; 0 to 1 where there are none.
+    pub(crate) fn around(values: impl Iterator<Item = f64>, pixels: [f64; 2]) -> Self {
+        let [low, high] = extremes(values.filter(|value| value.is_finite()));
+        let (low, high, count) = if low > high {
+            (0.0, 1.0, Count::Linear)
+        } else if low > 0.0 && high / low > WIDE {
+            let room = (high / low).powf(ROOM);
+            (low / room, high * room, Count::Logarithmic)
+        } else {
+            let room = if high > low { ROOM * (high - low) } else { 0.1 * high.abs().max(1e-9) };
+            (low - room, high + room, Count::Linear)
+        };
+        Self { low, high, count, pixels }
+    }
+
+    /// Ownership of the scale at a value, 0 to 1 inside.
     pub(crate) fn share(&self, value: f64) -> f64 {
         let share = match self.count {
             Count::Linear => (value - self.low) / (self.high - self.low),
@@ -48,7 +71,7 @@ impl Scale {
         };
         let texts = match self.count {
             Count::Linear => labels(&values),
-            Count::Logarithmic => values.iter().map(|v| super::ticks::number(*v, 1)).collect(),
+            Count::Logarithmic => values.iter().map(|v| number(*v, 1)).collect(),
         };
         values.into_iter().map(|v| self.at(v)).zip(texts).collect()
     }
@@ -61,64 +84,69 @@ pub(crate) fn px(value: f64) -> String {
 }
 
 /// A drawing that is read out as `label`.
-pub(crate) fn svg(html: &mut Html, height: f64, label: &str, content: impl FnOnce(&mut Html)) {
-    let view = format!("0 0 {} {}", px(WIDTH), px(height));
-    html.element("svg", &[("viewBox", &view), ("role", "img"), ("aria-label", label)], content);
-    html.newline();
+pub(crate) fn svg(height: f64, label: &str, content: &Markup) -> Markup {
+    html! { svg viewBox={ "0 0 " (px(WIDTH)) " " (px(height)) } role="img" aria-label=(label) { (content) } }
 }
 
 /// A text of a class at a place.
-pub(crate) fn text(html: &mut Html, class: &str, x: f64, y: f64, text: &str) {
-    html.leaf("text", &[("class", class), ("x", &px(x)), ("y", &px(y))], text);
+pub(crate) fn text(class: &str, x: f64, y: f64, words: &str) -> Markup {
+    html! { text class=(class) x=(px(x)) y=(px(y)) { (words) } }
 }
 
 /// A line of a class between two places.
-pub(crate) fn line(html: &mut Html, class: &str, from: [f64; 2], to: [f64; 2]) {
-    let path = format!("M{} {}L{} {}", px(from[0]), px(from[1]), px(to[0]), px(to[1]));
-    html.void("path", &[("class", class), ("d", &path)]);
+pub(crate) fn line(class: &str, from: [f64; 2], to: [f64; 2]) -> Markup {
+    html! { path class=(class) d=(path(&[from, to])) {} }
+}
+
+/// A rectangle of a class: left, top, width, height.
+pub(super) fn rect(class: &str, [left, top, width, height]: [f64; 4]) -> Markup {
+    html! { rect class=(class) x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {} }
+}
+
+/// Straight lines from point to point.
+pub(super) fn path(points: &[[f64; 2]]) -> String {
+    let step =
+        |(i, [x, y]): (usize, &[f64; 2])| format!("{}{} {}", if i == 0 { "M" } else { "L" }, px(*x), px(*y));
+    points.iter().enumerate().map(step).collect()
 }
 
 /// Lines across the drawing at the ticks of the vertical axis.
-pub(crate) fn grid(html: &mut Html, x: &Scale, y: &Scale, ticks: usize) {
-    for (at, _) in y.ticks(ticks) {
-        line(html, "grid", [x.pixels[0], at], [x.pixels[1], at]);
-    }
+pub(crate) fn grid(x: &Scale, y: &Scale, ticks: usize) -> Markup {
+    html! { @for (at, _) in y.ticks(ticks) { (line("grid", [x.pixels[0], at], [x.pixels[1], at])) } }
 }
 
 /// Ticks, and titles with units of both axes; the title of the vertical axis stands above it.
-pub(crate) fn axes(html: &mut Html, x: &Scale, y: &Scale, titles: [&str; 2], ticks: [usize; 2]) {
+pub(crate) fn axes(x: &Scale, y: &Scale, titles: [&str; 2], ticks: [usize; 2]) -> Markup {
     let [left, right] = x.pixels;
     let [bottom, top] = y.pixels;
-    for (at, label) in y.ticks(ticks[1]) {
-        line(html, "axis", [left - 3.0, at], [left, at]);
-        text(html, "tick end", left - 5.0, at + 3.5, &label);
+    html! {
+        @for (at, label) in y.ticks(ticks[1]) {
+            (line("axis", [left - 3.0, at], [left, at]))
+            (text("tick end", left - 5.0, at + 3.5, &label))
+        }
+        @for (at, label) in x.ticks(ticks[0]) {
+            (line("axis", [at, bottom], [at, bottom + 4.0]))
+            (text("tick middle", at, bottom + 15.0, &label))
+        }
+        (line("axis", [left, bottom], [right, bottom]))
+        (line("axis", [left, bottom], [left, top]))
+        (text("title middle", 0.5 * (left + right), bottom + 30.0, titles[0]))
+        (text("title", 2.0, top - 9.0, titles[1]))
     }
-    for (at, label) in x.ticks(ticks[0]) {
-        line(html, "axis", [at, bottom], [at, bottom + 4.0]);
-        text(html, "tick middle", at, bottom + 15.0, &label);
-    }
-    line(html, "axis", [left, bottom], [right, bottom]);
-    line(html, "axis", [left, bottom], [left, top]);
-    text(html, "title middle", 0.5 * (left + right), bottom + 30.0, titles[0]);
-    text(html, "title", 2.0, top - 9.0, titles[1]);
 }
 
 /// Most points of a line: two for each pixel of the drawing's width would be more than is seen.
 const MOST_POINTS: usize = 600;
 
 /// A line through points; of very many the lowest and the highest of every group.
-pub(crate) fn polyline(html: &mut Html, class: &str, points: &[[f64; 2]]) {
+pub(crate) fn polyline(class: &str, points: &[[f64; 2]]) -> Markup {
     let group = (2 * points.len()).div_ceil(MOST_POINTS);
-    let kept: Vec<[f64; 2]> = if points.len() <= MOST_POINTS {
-        points.to_vec()
+    let d = if points.len() <= MOST_POINTS {
+        path(points)
     } else {
-        points.chunks(group).flat_map(lowest_and_highest).collect()
+        path(&points.chunks(group).flat_map(lowest_and_highest).collect::<Vec<_>>())
     };
-    let mut path = String::new();
-    for (i, [x, y]) in kept.iter().enumerate() {
-        path += &format!("{}{} {}", if i == 0 { "M" } else { "L" }, px(*x), px(*y));
-    }
-    html.void("path", &[("class", class), ("d", &path)]);
+    html! { path class=(class) d=(d) {} }
 }
 
 /// In their order.
@@ -130,36 +158,26 @@ fn lowest_and_highest(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
 }
 
 /// A dot of a class.
-pub(crate) fn dot(html: &mut Html, class: &str, [x, y]: [f64; 2], radius: f64) {
-    html.void("circle", &[("class", class), ("cx", &px(x)), ("cy", &px(y)), ("r", &px(radius))]);
+pub(crate) fn dot(class: &str, [x, y]: [f64; 2], radius: f64) -> Markup {
+    html! { circle class=(class) cx=(px(x)) cy=(px(y)) r=(px(radius)) {} }
 }
 
 /// A horizontal bar that explains a colour map, at a height; `id` is that of its gradient on the page.
-pub(super) fn colour_bar(html: &mut Html, id: &str, map: ColourMap, scale: &Scale, title: &str, top: f64) {
+pub(super) fn colour_bar(id: &str, map: ColourMap, scale: &Scale, title: &str, top: f64) -> Markup {
     let [left, right] = scale.pixels;
-    html.element("linearGradient", &[("id", id)], |html| {
-        for i in 0..=24 {
-            let share = f64::from(i) / 24.0;
-            html.void("stop", &[("offset", &format!("{share:.4}")), ("stop-color", &map.css(share))]);
+    html! {
+        linearGradient id=(id) {
+            @for share in (0..=24).map(|i| f64::from(i) / 24.0) {
+                stop offset=(format!("{share:.4}")) stop-color=(map.css(share)) {}
+            }
         }
-    });
-    let fill = format!("url(#{id})");
-    let size = [("width", px(right - left)), ("height", px(9.0))];
-    html.void(
-        "rect",
-        &[
-            ("fill", &fill),
-            ("x", &px(left)),
-            ("y", &px(top)),
-            (size[0].0, &size[0].1),
-            (size[1].0, &size[1].1),
-        ],
-    );
-    for (at, label) in scale.ticks(5) {
-        line(html, "axis", [at, top + 9.0], [at, top + 12.0]);
-        text(html, "tick middle", at, top + 23.0, &label);
+        rect fill={ "url(#" (id) ")" } x=(px(left)) y=(px(top)) width=(px(right - left)) height="9" {}
+        @for (at, label) in scale.ticks(5) {
+            (line("axis", [at, top + 9.0], [at, top + 12.0]))
+            (text("tick middle", at, top + 23.0, &label))
+        }
+        (text("title middle", 0.5 * (left + right), top + 38.0, title))
     }
-    text(html, "title middle", 0.5 * (left + right), top + 38.0, title);
 }
 
 /// Height that a colour bar takes.
@@ -173,9 +191,8 @@ mod tests {
     fn a_long_line_keeps_its_extremes() {
         let points: Vec<[f64; 2]> =
             (0..100_000).map(|i| [f64::from(i) * 1e-3, if i == 77_777 { 50.0 } else { 0.0 }]).collect();
-        let mut html = Html::default();
-        polyline(&mut html, "curve", &points);
-        assert!(html.markup().len() < 10_000 && html.markup().contains("77.8 50"), "{}", html.markup().len());
+        let drawn = polyline("curve", &points).into_string();
+        assert!(drawn.len() < 10_000 && drawn.contains("77.8 50"), "{}", drawn.len());
     }
 
     #[test]

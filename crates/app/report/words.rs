@@ -61,7 +61,7 @@ pub(super) fn frequencies(config: &Config) -> String {
 /// What moves, which way and how far, with so many variables.
 pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String> {
     let design = config.design.as_ref()?;
-    let way = match design.direction {
+    let along = match design.direction {
         DesignDirection::Word(DirectionWord::Normal) => "along its normal".to_owned(),
         DesignDirection::Vector(vector) => match (0..3).find(|&d| vector[d].abs() == 1.0) {
             Some(axis) => {
@@ -71,7 +71,7 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
         },
     };
     let [lower, upper] = [design.lower, design.upper].map(|bound| trimmed(1e3 * bound, 3));
-    let mut text = format!("by moving {} {way} between {lower} and {upper} mm", design.surface.join(", "));
+    let mut text = format!("by moving {} {along} between {lower} and {upper} mm", design.surface.join(", "));
     if let Some(variables) = variables {
         text += &format!(" with {variables} variables");
     }
@@ -151,8 +151,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shield_is_told_in_a_sentence() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+    fn the_shield_is_described_in_a_sentence() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         let (config, _) = Config::from_file(&path.join("shield.toml"), &[]).expect("shipped");
         assert_eq!(
             summary(&config, Some(91), true),

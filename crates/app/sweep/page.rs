@@ -1,10 +1,11 @@
 //! `sweep.html`: one page that compares the runs of a sweep, in the form of the report about a single run.
 
+use maud::{Markup, html};
+
 use super::comparison::{Comparison, Row};
 use super::{Sweep, plots};
 use crate::output::{RunStatus, StopReason};
-use crate::report::html::Html;
-use crate::report::page::{STYLE, address};
+use crate::report::markup::{Card, address, document, footer, header, note, section, table};
 use crate::report::ticks::{duration, number};
 
 /// What this page has beside the style of the report.
@@ -16,88 +17,44 @@ const MOST_ROWS: usize = 2000;
 /// Values of a key that are listed in words.
 const MOST_VALUES: usize = 12;
 
+/// Files beside the page.
+const FILES: [(&str, &str); 3] = [
+    ("sweep.csv", "the table above, with all digits"),
+    ("sweep.json", "keys, values, and the command of every combination"),
+    ("logs/", "what every run has said"),
+];
+
 /// The page.
 pub(super) fn page(sweep: &Sweep, comparison: &Comparison) -> String {
-    let mut html = Html::default();
-    html.element("html", &[("lang", "en")], |html| {
-        html.element("head", &[], |html| {
-            html.void("meta", &[("charset", "utf-8")]);
-            html.void("meta", &[("name", "viewport"), ("content", "width=device-width, initial-scale=1")]);
-            html.void("meta", &[("name", "color-scheme"), ("content", "light dark")]);
-            html.void("meta", &[("name", "generator"), ("content", "fluxmorph")]);
-            html.leaf("title", &[], &format!("{} · fluxmorph sweep", sweep.title));
-            html.style(STYLE);
-            html.style(OWN_STYLE);
-        });
-        html.newline();
-        html.element("body", &[], |html| {
-            html.element("main", &[], |html| body(html, sweep, comparison));
-        });
-    });
-    html.into_document()
+    let files = html! {
+        ul class="files" {
+            @for (file, what) in FILES { li { a href=(file) { (file) } span class="note" { (what) } } }
+        }
+    };
+    let content = html! {
+        (head(sweep, comparison))
+        (section("comparison", "Comparison", &rows(comparison)))
+        @if let Some((title, figure)) = plots::over_value(comparison) { (section("over-value", &title, &figure)) }
+        (section("convergence", "Convergence", &plots::convergence(comparison)))
+        (section("files", "Files", &files))
+        (footer("the runs"))
+    };
+    document(&format!("{} · fluxmorph sweep", sweep.title), OWN_STYLE, "", &content)
 }
 
-fn body(html: &mut Html, sweep: &Sweep, comparison: &Comparison) {
-    head(html, sweep, comparison);
-    section(html, "comparison", "Comparison", |html| table(html, comparison));
-    plots::over_value(html, comparison);
-    section(html, "convergence", "Convergence", |html| plots::convergence(html, comparison));
-    section(html, "files", "Files", |html| {
-        html.element("ul", &[("class", "files")], |html| {
-            for (file, what) in [
-                ("sweep.csv", "the table above, with all digits"),
-                ("sweep.json", "keys, values, and the command of every combination"),
-                ("logs/", "what every run has said"),
-            ] {
-                html.element("li", &[], |html| {
-                    html.leaf("a", &[("href", file)], file);
-                    html.leaf("span", &[("class", "note")], what);
-                });
-            }
-        });
-    });
-    html.leaf(
-        "footer",
-        &[],
-        &format!("Written by fluxmorph {} from the files of the runs.", env!("CARGO_PKG_VERSION")),
-    );
-}
-
-fn section(html: &mut Html, id: &str, title: &str, content: impl FnOnce(&mut Html)) {
-    html.element("section", &[("id", id)], |html| {
-        html.leaf("h2", &[], title);
-        content(html);
-    });
-    html.newline();
-}
-
-fn head(html: &mut Html, sweep: &Sweep, comparison: &Comparison) {
+fn head(sweep: &Sweep, comparison: &Comparison) -> Markup {
     let rows = &comparison.combinations;
     let ended = rows.iter().filter(|row| row.has_ended()).count();
     let failed = rows.iter().filter(|row| row.status == Some(RunStatus::Failed)).count();
-    html.element("header", &[], |html| {
-        html.leaf("p", &[("class", "kind")], "Sweep of shape optimisations");
-        html.leaf("h1", &[], &sweep.title);
-        let class = match (failed, ended == rows.len()) {
-            (0, true) => "good",
-            (0, false) => "fair",
-            _ => "bad",
-        };
-        let more = if failed > 0 { format!(", {failed} failed") } else { String::new() };
-        let status = format!("{ended} of {} combinations have ended{more}", rows.len());
-        html.leaf("p", &[("class", &format!("status {class}"))], &status);
-        html.leaf("p", &[("class", "lead")], &lead(sweep));
-        html.element("div", &[("class", "cards")], |html| {
-            for (name, value, note) in figures(comparison, ended) {
-                html.element("div", &[("class", "card")], |html| {
-                    html.leaf("span", &[("class", "name")], name);
-                    html.leaf("strong", &[], &value);
-                    html.leaf("span", &[("class", "note")], &note);
-                });
-            }
-        });
-    });
-    html.newline();
+    let class = match (failed, ended == rows.len()) {
+        (0, true) => "good",
+        (0, false) => "fair",
+        _ => "bad",
+    };
+    let more = if failed > 0 { format!(", {failed} failed") } else { String::new() };
+    let status = format!("{ended} of {} combinations have ended{more}", rows.len());
+    let cards = cards(comparison, ended);
+    header("Sweep of shape optimisations", &sweep.title, (class, &status), &lead(sweep), &cards)
 }
 
 /// Which keys take which values.
@@ -122,7 +79,7 @@ fn lead(sweep: &Sweep) -> String {
     text + "."
 }
 
-fn figures(comparison: &Comparison, ended: usize) -> Vec<(&'static str, String, String)> {
+fn cards(comparison: &Comparison, ended: usize) -> Vec<Card> {
     let rows = &comparison.combinations;
     let mut all = vec![("combinations", rows.len().to_string(), format!("{ended} have ended"))];
     if let Some((row, ratio)) = comparison.best.and_then(|best| Some((&rows[best], rows[best].ratio?))) {
@@ -142,7 +99,7 @@ impl Row {
     }
 
     /// How far it is, in words.
-    pub fn told(&self) -> String {
+    pub fn describe(&self) -> String {
         match (self.status, self.stop_reason) {
             (None, _) => "not begun".to_owned(),
             (Some(RunStatus::Converged), _) => "converged".to_owned(),
@@ -171,52 +128,32 @@ const HEAD: [&str; 10] = [
     "memory",
 ];
 
-fn table(html: &mut Html, comparison: &Comparison) {
-    let rows = &comparison.combinations;
-    let shown = rows.len().min(MOST_ROWS);
-    if shown < rows.len() {
-        html.leaf(
-            "p",
-            &[("class", "note")],
-            &format!("The first {shown} of {} rows; sweep.csv has all.", rows.len()),
-        );
-    }
-    html.element("div", &[("class", "scroll"), ("tabindex", "0")], |html| {
-        html.element("table", &[], |html| {
-            html.element("thead", &[], |html| {
-                html.element("tr", &[], |html| {
-                    let cells = comparison.keys.iter().map(String::as_str).chain(HEAD);
-                    cells.for_each(|cell| html.leaf("th", &[("scope", "col")], cell));
-                });
-            });
-            html.element("tbody", &[], |html| {
-                for (i, row) in rows[..shown].iter().enumerate() {
-                    let class: &[_] = if comparison.best == Some(i) { &[("class", "marked")] } else { &[] };
-                    html.element("tr", class, |html| cells(html, row));
-                }
-            });
-        });
-    });
-    if comparison.best.is_some() {
-        let note = "Marked: the best F / F₀ of the runs that keep their constraints.";
-        html.leaf("p", &[("class", "note")], note);
+fn rows(comparison: &Comparison) -> Markup {
+    let all = &comparison.combinations;
+    let shown = all.len().min(MOST_ROWS);
+    let head: Vec<&str> = comparison.keys.iter().map(String::as_str).chain(HEAD).collect();
+    let rows: Vec<Vec<Markup>> = all[..shown].iter().map(cells).collect();
+    html! {
+        @if shown < all.len() { (note(&format!("The first {shown} of {} rows; sweep.csv has all.", all.len()))) }
+        (table(&head, &rows, comparison.best))
+        @if comparison.best.is_some() {
+            (note("Marked: the best F / F₀ of the runs that keep their constraints."))
+        }
     }
 }
 
-fn cells(html: &mut Html, row: &Row) {
+fn cells(row: &Row) -> Vec<Markup> {
     let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| number(value, 4));
-    row.values.iter().for_each(|value| html.leaf("td", &[], value));
-    html.element("td", &[], |html| {
-        let (target, text) = match (row.is_reported, row.status) {
-            (true, _) => ("report.html", "report"),
-            (false, Some(_)) => ("", "files"),
-            (false, None) => return html.text("–"),
-        };
-        html.leaf("a", &[("href", &format!("{}/{target}", address(&row.directory)))], text);
-    });
+    let link =
+        |target: &str, text: &str| html! { a href={ (address(&row.directory)) "/" (target) } { (text) } };
+    let run = match (row.is_reported, row.status) {
+        (true, _) => link("report.html", "report"),
+        (false, Some(_)) => link("", "files"),
+        (false, None) => html! { "–" },
+    };
     let memory = row.peak_memory_bytes.filter(|bytes| *bytes > 0);
-    for cell in [
-        row.told(),
+    let texts = [
+        row.describe(),
         shown(row.ratio),
         shown(row.verified_ratio),
         shown(row.objective_initial),
@@ -225,7 +162,7 @@ fn cells(html: &mut Html, row: &Row) {
         shown(row.worst_quality),
         row.seconds.map_or("–".to_owned(), duration),
         memory.map_or("–".to_owned(), |bytes| format!("{} MB", bytes.div_ceil(1_000_000))),
-    ] {
-        html.leaf("td", &[], &cell);
-    }
+    ];
+    let text = |text: &String| html! { (text) };
+    row.values.iter().map(text).chain([run]).chain(texts.iter().map(text)).collect()
 }

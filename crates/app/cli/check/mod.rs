@@ -13,7 +13,7 @@ use super::args::{CheckArgs, Progress};
 use super::{stdout, with_threads};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::observer::{Bar, Observer, Paint, Silent};
+use crate::observer::{Bar, Observer, Silent, Styles};
 
 /// Set the problem up and print what it is, as a table or JSON.
 ///
@@ -39,9 +39,9 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
             stdout::print_json(&summary)?;
         } else {
             stdout::print(&text::text(&summary, &args.common.config))?;
-            let paint = Paint::for_stderr();
+            let styles = Styles::for_stderr();
             for warning in &summary.warnings {
-                let _ = writeln!(std::io::stderr(), "{}", paint.warning(warning));
+                let _ = writeln!(std::io::stderr(), "{}", styles.warning_line(warning));
             }
         }
         Ok(ExitCode::Success)

@@ -1,11 +1,11 @@
 """Loads a run directory of Fluxmorph into ParaView: |B| on a cut, and the moving body.
 
-    pvpython paraview/load_run.py RUN_DIR [--screenshot PNG] [--time last|first|best|NUMBER] [--color COLOR]
+    pvpython examples/paraview/load_run.py RUN_DIR [--screenshot PNG] [--time last|first|best|NUMBER] [--color COLOR]
 
 COLOR is `displacement` [mm] (the default) or `sensitivity`, dF/dx.
 
-In ParaView itself: `FLUXMORPH_RUN=RUN_DIR paraview --script=paraview/load_run.py`, or in its Python shell
-`import sys; sys.path.append("paraview"); import load_run; load_run.load("RUN_DIR")`.
+In ParaView itself: `FLUXMORPH_RUN=RUN_DIR paraview --script=examples/paraview/load_run.py`, or in its Python shell
+`import sys; sys.path.append("examples/paraview"); import load_run; load_run.load("RUN_DIR")`.
 
 Needs ParaView 5.10 or newer, and of a run its `fields.pvd` (output.fields other than "none"); `result.json`,
 `resolved.toml` and `optimum.msh` give title, ratio and names of regions where they are there.
