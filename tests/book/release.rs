@@ -3,6 +3,8 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
+use crate::support::repository_text;
+
 /// Most packages of the release graph, this repository's own included.
 const MOST_PACKAGES: usize = 150;
 
@@ -51,9 +53,7 @@ fn is_allowed(expression: &str, allowed: &[String]) -> bool {
 
 #[test]
 fn every_licence_is_one_that_deny_toml_allows() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/deny.toml");
-    let deny: toml::Table =
-        std::fs::read_to_string(path).expect("deny.toml").parse().expect("deny.toml is TOML");
+    let deny: toml::Table = repository_text("deny.toml").parse().expect("deny.toml is TOML");
     let allowed: Vec<String> = deny["licenses"]["allow"]
         .as_array()
         .expect("a list")

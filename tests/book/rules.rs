@@ -1,8 +1,7 @@
 //! Commands of the pages that are not run, or not always, and why.
 
-use std::fs;
-
 use crate::repository;
+use crate::support::repository_text;
 
 /// Commands that take a minute or more wherever they stand, and those that go on with what these leave.
 const LONG: [&str; 2] = ["run configs/shield.toml", "resume configs/runs/shield"];
@@ -91,12 +90,12 @@ impl Rule {
         match self.exists {
             Exists::Elsewhere => None,
             Exists::Step(file) => {
-                let text = fs::read_to_string(repository(file)).expect("a file of the repository");
+                let text = repository_text(file);
                 let stands = text.lines().any(|line| line.replace("--locked ", "").ends_with(command));
                 (!stands).then(|| format!("`{command}` is no step of {file}"))
             }
             Exists::JustTarget => {
-                let text = fs::read_to_string(repository("justfile")).expect("a file of the repository");
+                let text = repository_text("justfile");
                 let target =
                     |line: &str| line.split([' ', ':']).next() == Some(argument) && line.contains(':');
                 let exists = argument.is_empty() || text.lines().any(target);

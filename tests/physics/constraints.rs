@@ -1,9 +1,5 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
-#[path = "../support/mod.rs"]
-mod support;
-
-use fluxmorph_geometry::io::read_vtu;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, Source};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
@@ -13,7 +9,9 @@ use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::session::{self, Options};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
-use support::{config, repository, setup};
+
+use crate::support::folder::RunFolder;
+use crate::support::{self, config, parsed, repository_text, setup};
 
 #[derive(Default)]
 struct Rows(Vec<Evaluation>);
@@ -25,22 +23,22 @@ impl Recorder for Rows {
     }
 }
 
-/// Runs a shipped configuration with other settings of the optimiser.
-fn optimised(name: &str, settings: impl Fn(Optimizer) -> Optimizer) -> (Optimised, Vec<Evaluation>) {
-    with(name, &[], settings)
-}
+/// The plate of the quick shield meshed, instead of an impedance surface.
+const MESHED: [(&str, &str); 4] = [
+    ("model = \"impedance\"", "model = \"volume\""),
+    ("skin = []", "skin = [\"1 mm\", \"4 mm\"]"),
+    ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
+    ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
+];
+
+const STATIC: (&str, &str) = ("frequency = \"60 Hz\"", "frequency = 0");
 
 /// The objective of the shipped shields.
 const SQUARED: &str = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
 
 /// A shipped configuration with changes `(from, to)` in its text.
 fn changed_config(name: &str, changes: &[(&str, &str)]) -> (Config, Source) {
-    let mut text = std::fs::read_to_string(repository("configs").join(name)).expect("it is there");
-    for (from, to) in changes {
-        assert!(text.contains(from), "{from}");
-        text = text.replacen(from, to, 1);
-    }
-    Config::from_str(&text, name).unwrap_or_else(|e| panic!("{e}"))
+    parsed(&support::changed(&repository_text(&format!("configs/{name}")), changes))
 }
 
 /// Its problem, and the settings of its optimiser.
@@ -50,7 +48,7 @@ fn changed(name: &str, changes: &[(&str, &str)]) -> (Problem, Optimizer) {
     (setup.problem, config.optimizer)
 }
 
-/// As [`optimised`] with changes `(from, to)` in the text of the configuration.
+/// Runs a shipped configuration with changes `(from, to)` in its text and other settings of the optimiser.
 fn with(
     name: &str,
     changes: &[(&str, &str)],
@@ -73,7 +71,7 @@ fn measured(run: &Optimised, index: usize) -> f64 {
 
 #[test]
 fn a_limited_mass_is_kept_and_used_up_and_costs_shielding() {
-    let (run, rows) = optimised("shield_mass_limit.toml", |s| s);
+    let (run, rows) = with("shield_mass_limit.toml", &[], |s| s);
     let ratio = run.best.objective / run.initial;
     println!("{:?}: F/F0 {ratio:.4}, {:.6} kg", run.stop_reason, measured(&run, 0));
     // Active at the optimum: all of the mass is used, but for what `ftol_rel` leaves.
@@ -81,7 +79,7 @@ fn a_limited_mass_is_kept_and_used_up_and_costs_shielding() {
     assert!(run.best.violation == 0.0 && ratio < 0.7, "{ratio}");
     assert!(rows.iter().all(|row| row.constraints.keys().eq(["c_mass_plate"])));
 
-    let (free, _) = optimised("shield_quick.toml", |s| Optimizer { max_evaluations: 12, ..s });
+    let (free, _) = with("shield_quick.toml", &[], |s| Optimizer { max_evaluations: 12, ..s });
     let best = free.best.objective / free.initial;
     println!("without a limit: F/F0 {best:.4}");
     assert!(best < ratio - 0.02, "the limit costs shielding");
@@ -91,7 +89,7 @@ fn a_limited_mass_is_kept_and_used_up_and_costs_shielding() {
 fn every_method_with_constraints_keeps_them() {
     for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
         let (run, _) =
-            optimised("shield_mass_limit.toml", |s| Optimizer { algorithm, max_evaluations: 8, ..s });
+            with("shield_mass_limit.toml", &[], |s| Optimizer { algorithm, max_evaluations: 8, ..s });
         println!("{algorithm:?}: F/F0 {:.4}, {:.6} kg", run.best.objective / run.initial, measured(&run, 0));
         assert!(measured(&run, 0) <= 2.5 * (1.0 + 1e-6), "{algorithm:?}");
         assert!(run.best.violation == 0.0 && run.best.objective < run.initial, "{algorithm:?}");
@@ -169,14 +167,7 @@ fn a_negative_objective_is_optimised_both_ways() {
     let of = |goal: &str| {
         let component = "kind = \"field_component\"\nregion = \"observation\"\ndirection = [0, 0, -1]\n";
         let objective = format!("{component}goal = \"{goal}\"\n");
-        let changes = [
-            (SQUARED, objective.as_str()),
-            ("frequency = \"60 Hz\"", "frequency = 0"),
-            ("model = \"impedance\"", "model = \"volume\""),
-            ("skin = []", "skin = [\"1 mm\", \"4 mm\"]"),
-            ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
-            ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
-        ];
+        let changes = [&[(SQUARED, objective.as_str()), STATIC], &MESHED[..]].concat();
         with("shield_quick.toml", &changes, few).0
     };
     let (up, down) = (of("maximise"), of("minimise"));
@@ -207,8 +198,7 @@ fn a_run_at_two_frequencies_writes_both() {
     let objective = result.objective.as_ref().expect("an objective");
     let sum: f64 = objective.terms.iter().map(|term| term.weight * term.value).sum();
     assert!((sum / objective.best - 1.0).abs() < 1e-14);
-    let contents =
-        read_vtu(&folder.path().join("run/fields/eval_0000.vtu")).unwrap_or_else(|e| panic!("{e}"));
+    let contents = RunFolder(folder.path().join("run")).field(0);
     println!("{:?}", contents.cell_data.keys().collect::<Vec<_>>());
     for name in ["B_re", "loss_density", "B_re_200Hz", "loss_density_200Hz"] {
         assert!(contents.cell_data.contains_key(name), "{name}");
@@ -232,14 +222,8 @@ fn a_field_of_two_frequencies_is_that_of_each_alone() {
 fn loss_and_energy_are_those_of_the_field() {
     // The loss is the sum that the results report; in statics the energy is half the work of the source on the field,
     // ½ ∫ A·J = ½ Re(uᵀf), but for the penalty's share of it, ½ ∫ ν (div A)².
-    let meshed = [
-        ("model = \"impedance\"", "model = \"volume\""),
-        ("skin = []", "skin = [\"1 mm\", \"4 mm\"]"),
-        ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
-        ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
-    ];
     let loss = (SQUARED, "kind = \"loss\"\nregion = \"plate\"\n");
-    for changes in [&[loss][..], &[&[loss][..], &meshed].concat()] {
+    for changes in [&[loss][..], &[&[loss], &MESHED[..]].concat()] {
         let problem = changed("shield_quick.toml", changes).0;
         let p = problem.shape.as_ref().expect("a shape").initial.clone();
         let analysis = problem.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}"));
@@ -247,8 +231,8 @@ fn loss_and_energy_are_those_of_the_field() {
         println!("loss {sum:.4} W");
         assert!((analysis.objective.expect("a loss") / sum - 1.0).abs() < 1e-12);
     }
-    let energy = [(SQUARED, "kind = \"energy\"\n"), ("frequency = \"60 Hz\"", "frequency = 0")];
-    let problem = changed("shield_quick.toml", &[&energy[..], &meshed].concat()).0;
+    let energy = [(SQUARED, "kind = \"energy\"\n"), STATIC];
+    let problem = changed("shield_quick.toml", &[&energy, &MESHED[..]].concat()).0;
     let p = problem.shape.as_ref().expect("a shape").initial.clone();
     let analysis = problem.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}"));
     let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
@@ -286,13 +270,8 @@ fn what_regions_cannot_give_is_refused_at_its_key() {
 fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     let limit = "[[constraints]]\nkind = \"field_component\"\nregion = \"observation\"\ndirection = [0, 0, -1]\n\
                  upper_ratio = 0.9\n[design]";
-    let changes = [
-        ("[design]", limit),
-        ("frequency = \"60 Hz\"", "frequency = 0"),
-        ("model = \"impedance\"", "model = \"volume\""),
-        ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
-        ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
-    ];
+    // Without layers in the plate.
+    let changes = [&[("[design]", limit), STATIC, MESHED[0]], &MESHED[2..]].concat();
     let (mut problem, settings) = changed("shield_quick.toml", &changes);
     let error = optimise(&mut problem, &settings, &mut Silent, &mut Rows::default(), &|| false)
         .expect_err("no share");

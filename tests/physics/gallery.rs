@@ -4,15 +4,13 @@
 //! where it is short. Long ones are run by the ignored test. Numbers are looked up in the `result.json` of the run by
 //! JSON pointer, and either have a `value` with a relative `tolerance` or are `at_most`.
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
-use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
-use support::repository;
+
+use crate::support::folder::read_json;
+use crate::support::program::{command, finish, fluxmorph, folder};
+use crate::support::{repository, repository_text};
 
 /// Which entries a test runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,8 +21,7 @@ enum Length {
 
 /// The entries by file name.
 fn entries() -> BTreeMap<String, Value> {
-    let text = std::fs::read_to_string(repository("configs/expected.json")).expect("it is there");
-    serde_json::from_str(&text).unwrap_or_else(|error| panic!("configs/expected.json: {error}"))
+    serde_json::from_str(&repository_text("configs/expected.json")).expect("a table of entries")
 }
 
 fn length(entry: &Value) -> Length {
@@ -40,31 +37,18 @@ fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value[key].as_array().unwrap_or_else(|| panic!("no list `{key}` in {value}"))
 }
 
-fn fluxmorph(command: &str, config: &str, further: &[&OsStr]) -> Output {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
-    program.arg(command).arg(repository("configs").join(config)).args(further).stdin(Stdio::null());
-    program.output().expect("the binary starts")
-}
-
 /// `result.json` of one run of an entry.
 fn result(config: &str, case: &Value) -> Value {
-    let folder = tempfile::tempdir().expect("a temporary directory");
-    let out = folder.path().join("run");
-    let mut further = vec![OsStr::new("--out"), out.as_os_str(), OsStr::new("--quiet")];
+    let folder = folder();
+    let (config, out) = (repository("configs").join(config), folder.path().join("run"));
+    let mut command = command(&[&text(case, "command"), &config, &"--out", &out, &"--quiet"]);
     for change in list(case, "set") {
-        further.extend([OsStr::new("--set"), OsStr::new(change.as_str().expect("a text KEY=VALUE"))]);
+        command.args(["--set", change.as_str().expect("a text KEY=VALUE")]);
     }
-    let output = fluxmorph(text(case, "command"), config, &further);
-    // 1: stopped at a limit, with valid results; a run of the gallery may use up its evaluations, a row of a sweep may be a
-    // broken mesh.
-    assert!(
-        matches!(output.status.code(), Some(0 | 1)),
-        "{config}: {:?}\n{}",
-        output.status,
-        String::from_utf8_lossy(&output.stderr)
-    );
-    let bytes = std::fs::read(out.join("result.json")).expect("a run leaves its result");
-    serde_json::from_slice(&bytes).expect("it is JSON")
+    // Stopped at a limit, with valid results, is well: a run of the gallery may use up its evaluations, a row of a sweep
+    // may be a broken mesh.
+    finish(&mut command).completed();
+    read_json(&out.join("result.json"))
 }
 
 /// What is wrong with the number at one path; prints what it finds.
@@ -108,7 +92,7 @@ fn every_configuration_has_an_entry_with_numbers_and_every_entry_a_configuration
         .collect();
     let entries = entries();
     assert_eq!(files, entries.keys().cloned().collect::<BTreeSet<_>>());
-    let gallery = std::fs::read_to_string(repository("docs/gallery.md")).expect("it is there");
+    let gallery = repository_text("docs/gallery.md");
     for (config, entry) in &entries {
         assert!(!list(entry, "cases").is_empty(), "{config}");
         for case in list(entry, "cases") {
@@ -125,8 +109,7 @@ fn every_configuration_has_an_entry_with_numbers_and_every_entry_a_configuration
 #[test]
 fn every_configuration_passes_check() {
     for config in entries().keys() {
-        let output = fluxmorph("check", config, &[]);
-        assert!(output.status.success(), "{config}:\n{}", String::from_utf8_lossy(&output.stderr));
+        fluxmorph(&[&"check", &repository("configs").join(config)]).exits_with(0);
     }
 }
 

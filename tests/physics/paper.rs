@@ -4,9 +4,6 @@
 //! from it, with the tolerances that the shipped meshes are made for. Measured values are in docs/results.md; run with
 //! `--nocapture` to see them.
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
@@ -17,7 +14,9 @@ use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::setup::Setup;
 use fluxmorph_solver::recovery;
-use support::{ShieldReference, config, relative_l2, setup};
+
+use crate::support::shield::{ShieldReference, relative_l2};
+use crate::support::{config, setup};
 
 /// The plate meshed with skin layers, and replaced by its impedance surface.
 const MESHED: &str = "shield.toml";

@@ -1,14 +1,16 @@
 //! Reference numbers of `tests/reference/`.
 
-use std::path::Path;
-
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_solver::Material;
 use serde_json::Value;
+
+pub(crate) use crate::support::folder::named;
+use crate::support::folder::read_json;
+use crate::support::repository;
 
 /// The numbers of one file.
 pub(crate) fn reference(file: &str) -> Value {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(file);
-    let text = std::fs::read_to_string(&path).expect("the file is part of the repository");
-    serde_json::from_str(&text).expect("it is JSON")
+    read_json(&repository("tests/reference").join(file))
 }
 
 /// The number of a key.
@@ -16,8 +18,16 @@ pub(crate) fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("no number `{key}`"))
 }
 
-/// The entry of a list with a name.
-pub(crate) fn named<'a>(list: &'a Value, name: &str) -> &'a Value {
-    let mut entries = list.as_array().expect("a list").iter();
-    entries.find(|entry| entry["name"] == name).unwrap_or_else(|| panic!("no entry `{name}`"))
+/// A complex number of two.
+pub(crate) fn complex(value: &Value) -> c64 {
+    let part = |i: usize| value[i].as_f64().expect("two numbers");
+    c64::new(part(0), part(1))
+}
+
+/// The material of an entry.
+pub(crate) fn material(value: &Value) -> Material {
+    Material {
+        relative_permeability: number(value, "relative_permeability"),
+        conductivity: number(value, "conductivity_S_per_m"),
+    }
 }

@@ -1,14 +1,12 @@
 //! All ways to solve the linear systems give one field, one objective and one gradient; so do factors and solutions that
 //! are kept from design to design.
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use fluxmorph_optimizer::memory::Memory;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, SolverEvent, SolverMemory};
 use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
-use support::setup;
+
+use crate::support::{norm, relative_difference, setup};
 
 /// A meshed plate, coarse: skin layers, ψ, interfaces.
 const MESHED: (&str, &[&str]) = (
@@ -39,10 +37,8 @@ fn evaluated(problem: &Problem, memory: &mut Memory, step: f64) -> Analysis {
 /// Relative deviation of objective and gradient.
 fn deviation(a: &Analysis, b: &Analysis) -> f64 {
     let objective = |a: &Analysis| a.objective.expect("an objective");
-    let (own, other) = (a.gradient.as_ref().expect("asked for"), b.gradient.as_ref().expect("asked for"));
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-    let difference = norm(&mut own.iter().zip(other).map(|(x, y)| x - y));
-    let gradient = difference / norm(&mut other.iter().copied());
+    let gradient = |a: &Analysis| a.gradient.clone().expect("asked for");
+    let gradient = relative_difference(&gradient(a), &gradient(b));
     gradient.max((objective(a) / objective(b) - 1.0).abs())
 }
 
@@ -121,9 +117,8 @@ fn a_factor_serves_a_frequency_close_by() {
     let (own, _) = solved(&at_61, &mut SolverMemory::default());
     let (shared_count, own_count) = (shared.report().iterations, own.report().iterations);
     assert!(shared_count > own_count, "{shared_count} iterations, {own_count} with an own factor");
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
-    let difference = norm(&mut shared.values().iter().zip(own.values()).map(|(a, b)| (a - b).norm()));
-    assert!(difference < SAME * norm(&mut own.values().iter().map(|v| v.norm())));
+    let difference = norm(shared.values().iter().zip(own.values()).map(|(a, b)| (a - b).norm()));
+    assert!(difference < SAME * norm(own.values().iter().map(|v| v.norm())));
 }
 
 #[test]

@@ -5,9 +5,6 @@
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
 use fluxmorph_optimizer::driver::{Recorder, optimise};
@@ -16,7 +13,8 @@ use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::StopReason;
 use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
-use support::setup;
+
+use crate::support::{self, setup};
 
 const MESHED: &str = "shield.toml";
 const IMPEDANCE: &str = "shield_impedance.toml";

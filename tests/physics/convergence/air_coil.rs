@@ -14,8 +14,8 @@ use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
 
+use super::quadrature::line_integral;
 use crate::meshes::boxed;
-use crate::quadrature::line_integral;
 
 const PI: f64 = std::f64::consts::PI;
 

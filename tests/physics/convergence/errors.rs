@@ -8,9 +8,9 @@ use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
 use fluxmorph_solver::recovery::recovered_flux_density;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, FieldSolution, Material, Order};
 
+use super::quadrature::{point_in, tet_rule};
 use crate::meshes::Distortion;
 use crate::orders::Study;
-use crate::quadrature::{point_in, tet_rule};
 
 /// A known field at one point.
 pub(crate) struct Sample {

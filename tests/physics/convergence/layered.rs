@@ -18,7 +18,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{Boundary, FieldModelSetup, Material};
 
-use crate::errors::{KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Quadratic, Sample, assert_orders, setup};
+use super::errors::{KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Quadratic, Sample, assert_orders, setup};
 use crate::meshes::{Distortion, unit_cube};
 
 const PI: f64 = std::f64::consts::PI;

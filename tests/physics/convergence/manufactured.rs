@@ -11,7 +11,7 @@ use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{Boundary, FieldModelSetup, Material};
 
-use crate::errors::{
+use super::errors::{
     KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Quadratic, Sample, Turned, assert_orders, errors_on, setup,
 };
 use crate::meshes::{Distortion, unit_cube};

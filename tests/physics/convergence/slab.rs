@@ -13,7 +13,7 @@ use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Materia
 
 use crate::meshes::{boxed, shaken};
 use crate::orders::Study;
-use crate::references::{named, number, reference};
+use crate::references::{material, named, number, reference};
 
 /// Air at both ends [m].
 const GAP: f64 = 0.005;
@@ -33,10 +33,7 @@ impl Slab {
     fn new(name: &'static str) -> Self {
         let file = reference("slab.json");
         let slab = named(&file["slabs"], name);
-        let material = Material {
-            relative_permeability: number(slab, "relative_permeability"),
-            conductivity: number(slab, "conductivity_S_per_m"),
-        };
+        let material = material(slab);
         let frequency = number(slab, "frequency_Hz");
         let loss = number(slab, "loss_W_per_m2");
         Self { name, thickness: number(slab, "thickness_m"), frequency, material, loss }

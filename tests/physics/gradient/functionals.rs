@@ -7,12 +7,12 @@ use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
 
 use super::{MESHED, Settings, certify_all, check, wavy};
-use crate::support::repository;
+use crate::support::folder::read_text;
+use crate::support::shield::quick;
 
 /// The quick shield with another objective, constraints and overrides.
 fn problem(objective: &str, constraints: &str, frequency: &str, overrides: &[&str]) -> Problem {
-    let text = std::fs::read_to_string(repository("configs/shield_quick.toml")).expect("it is there");
-    let text = text.replace("frequency = \"60 Hz\"", frequency);
+    let text = read_text(&quick()).replace("frequency = \"60 Hz\"", frequency);
     let (start, rest) = text.split_once("[objective]").expect("it has an objective");
     let (_, end) = rest.split_once("[design]").expect("a design follows");
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().expect("a temporary file");

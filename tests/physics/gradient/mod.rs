@@ -1,16 +1,14 @@
 //! The gradient through the whole chain p → mesh → field → F, against Taylor's theorem and central differences.
 
-#[path = "../support/mod.rs"]
-mod support;
-
 use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Config;
 use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
 use fluxmorph_remesh::Moved;
-use support::{repository, setup};
+
+use crate::support::folder::read_text;
+use crate::support::shield::quick;
+use crate::support::{changed, setup, setup_of};
 
 mod functionals;
 mod sources;
@@ -133,17 +131,11 @@ fn the_gradient_is_exact_with_fictitious_forces_and_a_fine_control_grid() {
 
 /// The quick shield with another `[design]` in place of its direction and grid.
 fn designed(design: &str, overrides: &[(&str, &str)]) -> Problem {
-    let path = repository("configs/shield_quick.toml");
-    let mut text = std::fs::read_to_string(&path).expect("it is there");
+    let mut text = read_text(&quick());
     let start = text.find("direction = [").expect("a direction");
     let end = text.find("lower = \"-5 mm\"").expect("a bound");
     text.replace_range(start..end, &format!("{design}\n"));
-    for (from, to) in overrides {
-        assert!(text.contains(from), "{from}");
-        text = text.replace(from, to);
-    }
-    let (config, source) = Config::from_str(&text, "shield.toml").unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}")).problem
+    setup_of(&changed(&text, overrides)).problem
 }
 
 const FILTERED: &str = "direction = \"normal\"\nfilter_radius = \"50 mm\"";

@@ -1,19 +1,14 @@
 //! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
 
-use fluxmorph_optimizer::config::Config;
 use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify_all};
 
-use crate::{MESHED, check, setup, wavy};
+use super::{MESHED, check, wavy};
+use crate::support::{parsed, setup, setup_of};
 
 /// Two directions: the chain is that of the linear elements, which are measured in five.
 fn brief() -> Settings {
     Settings { directions: 2, ..Settings::default() }
-}
-
-fn prepared(text: &str) -> Setup {
-    let (config, source) = Config::from_str(text, "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn all_hold(setup: &Setup, p: &[f64], settings: &Settings) {
@@ -113,7 +108,7 @@ fn magnet(order: u8) -> String {
 #[test]
 fn the_gradient_with_a_magnet_that_moves_is_exact() {
     for order in [1, 2] {
-        let setup = prepared(&magnet(order));
+        let setup = setup_of(&magnet(order));
         let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
         let p: Vec<f64> = (0..variables).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
         assert_eq!(setup.problem.constraints.len(), 2);
@@ -184,7 +179,7 @@ const APPLIED: &str = r#"
 
 #[test]
 fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
-    let setup = prepared(APPLIED);
+    let setup = setup_of(APPLIED);
     let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
     let p: Vec<f64> = (0..variables).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
     assert_eq!(setup.problem.constraints.len(), 4);
@@ -199,7 +194,7 @@ fn planes_with_a_condition_must_keep_their_nodes() {
         r#"slide = ["x_min", "y_min"]
     free = ["z_min"]"#,
     );
-    let (config, source) = Config::from_str(&text, "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
+    let (config, source) = parsed(&text);
     let error =
         set_up(&config, &source, Purpose::Optimisation).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(error.contains("at right angles to z would lose its nodes"), "{error}");
@@ -208,8 +203,7 @@ fn planes_with_a_condition_must_keep_their_nodes() {
 #[test]
 fn conditions_hold_at_the_outside_and_one_a_face() {
     let refused = |from: &str, to: &str| {
-        let (config, source) =
-            Config::from_str(&APPLIED.replace(from, to), "gradient.toml").unwrap_or_else(|e| panic!("{e}"));
+        let (config, source) = parsed(&APPLIED.replace(from, to));
         set_up(&config, &source, Purpose::Analysis).err().map(|e| e.to_string()).unwrap_or_default()
     };
     let inner = refused(r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|around"]"#);

@@ -1,10 +1,10 @@
 //! One run of a shipped configuration, and the numbers that are compared.
 
-use std::process::{Command, Stdio};
-
 use serde_json::Value;
 
-use crate::rows::Case;
+use super::rows::Case;
+use crate::support::folder::list;
+use crate::support::program::{command, finish, folder};
 use crate::support::repository;
 
 /// Which mesh a configuration is solved on.
@@ -18,18 +18,16 @@ pub(crate) enum MeshSize {
 
 /// What `fluxmorph solve` says of a shipped configuration, as in `result.json`.
 pub(crate) fn solved(config: &str, size: MeshSize) -> Value {
-    let folder = tempfile::tempdir().expect("a temporary directory");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
-    command.arg("solve").arg(repository("configs").join(config));
-    command.arg("--out").arg(folder.path().join("run")).args(["--json", "--quiet"]).stdin(Stdio::null());
+    let folder = folder();
+    let (config, out) = (repository("configs").join(config), folder.path().join("run"));
+    let mut command = command(&[&"solve", &config, &"--out", &out, &"--json", &"--quiet"]);
     if size == MeshSize::Coarse {
         command.args(["--set", "mesh.boxes.refinement=0.6"]);
     }
-    let output = command.output().expect("the binary starts");
-    assert!(output.status.success(), "{config}:\n{}", String::from_utf8_lossy(&output.stderr));
-    let result: Value = serde_json::from_slice(&output.stdout).expect("one JSON value");
+    let result = finish(&mut command).exits_with(0).json();
     println!(
-        "{config} ({size:?}): {} tetrahedra, {} unknowns, {:.2} GB",
+        "{} ({size:?}): {} tetrahedra, {} unknowns, {:.2} GB",
+        config.display(),
         result["mesh"]["tets"],
         result["mesh"]["unknowns"],
         result["peak_memory_bytes"].as_f64().unwrap_or(f64::NAN) / 1e9,
@@ -45,14 +43,12 @@ pub(crate) fn case(name: String, result: &Value) -> Case {
 
 /// A list of numbers.
 pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    let list = value.as_array().expect("a list");
-    list.iter().map(|number| number.as_f64().expect("a number")).collect()
+    list(value, "").iter().map(|number| number.as_f64().expect("a number")).collect()
 }
 
 /// One component of a list of vectors.
 pub(crate) fn component(vectors: &Value, axis: usize) -> Vec<f64> {
-    let list = vectors.as_array().expect("a list of vectors");
-    list.iter().map(|vector| vector[axis].as_f64().expect("a number")).collect()
+    list(vectors, "").iter().map(|vector| vector[axis].as_f64().expect("a number")).collect()
 }
 
 /// Root mean square of the differences, over the largest measured magnitude.

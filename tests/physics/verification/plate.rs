@@ -12,9 +12,9 @@ use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, Order};
 
+use super::rows::{Case, Row, assert_rows};
 use crate::meshes::{FACES, boxed};
-use crate::references::{named, number, reference};
-use crate::rows::{Case, Row, assert_rows};
+use crate::references::{complex, material, named, number, reference};
 
 /// Side of the coil's square cross-section [m].
 const WINDING: f64 = 0.008;
@@ -84,17 +84,22 @@ fn space(
     let (_, mesh) = boxed([across.clone(), across, along], &["air", "plate"], |[_, _, z]| {
         u32::from(z > PLATE && z < top)
     });
-    let coil = Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape: loop_.into() };
+    let model = model(&mesh, frequency, order, material, loop_);
+    Space { mesh, model }
+}
+
+/// The field model of one ampere-turn in a coil.
+fn model(mesh: &Mesh, frequency: f64, order: Order, plate: Material, coil: Racetrack) -> FieldModel {
+    let coil = Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape: coil.into() };
     let setup = FieldModelSetup {
         frequency,
         order,
-        materials: vec![Material::AIR, material],
+        materials: vec![Material::AIR, plate],
         coils: vec![coil],
         boundaries: FACES.map(|face| (face.to_owned(), Boundary::FluxParallel)).to_vec(),
         ..FieldModelSetup::default()
     };
-    let model = FieldModel::new(&mesh, setup).expect("a sound problem");
-    Space { mesh, model }
+    FieldModel::new(mesh, setup).expect("a sound problem")
 }
 
 /// `B_z` on the axis behind a plate.
@@ -102,14 +107,10 @@ fn behind(name: &str, resolution: Resolution, bar: f64) -> Row {
     let file = reference("plate.json");
     let plate = named(&file["plates"], name);
     let (radius, distance) = (number(&file, "radius_m"), number(&file, "distance_m"));
-    let material = Material {
-        relative_permeability: number(plate, "relative_permeability"),
-        conductivity: number(plate, "conductivity_S_per_m"),
-    };
-    let exact = plate["flux_density_T"].as_array().expect("two numbers");
-    let exact = c64::new(exact[0].as_f64().expect("a number"), exact[1].as_f64().expect("a number"));
+    let exact = complex(&plate["flux_density_T"]);
     let thickness = number(plate, "thickness_m");
-    let space = space(material, number(plate, "frequency_Hz"), thickness, filament(radius, 0.0), resolution);
+    let (material, frequency) = (material(plate), number(plate, "frequency_Hz"));
+    let space = space(material, frequency, thickness, filament(radius, 0.0), resolution);
     let (solution, _) = space.model.solve(&space.mesh).expect("it converges");
     let point = [[0.0, 0.0, distance]];
     let field = probe(&solution, &space.model, &space.mesh, "axis", &point).expect("a point of the mesh");
@@ -136,21 +137,7 @@ fn loops(resolution: Resolution, bar: f64) -> Vec<Row> {
     for other in file["mutual"].as_array().expect("a list") {
         // The flux of the first loop through the second is ∫J_2·A_1: the load of the second on the field of the first.
         let second = filament(number(other, "radius_m"), number(other, "distance_m"));
-        let far = FieldModel::new(
-            &space.mesh,
-            FieldModelSetup {
-                order: resolution.order,
-                materials: vec![Material::AIR; 2],
-                coils: vec![Coil {
-                    name: "second".to_owned(),
-                    ampere_turns: c64::from(1.0),
-                    shape: second.into(),
-                }],
-                boundaries: FACES.map(|face| (face.to_owned(), Boundary::FluxParallel)).to_vec(),
-                ..FieldModelSetup::default()
-            },
-        )
-        .expect("a sound problem");
+        let far = model(&space.mesh, 0.0, resolution.order, Material::AIR, second);
         let linked: c64 = far.load(&space.mesh).iter().zip(solution.values()).map(|(f, a)| f * a).sum();
         rows.push(case.row("mutual inductance [H]", 4.0 * linked, number(other, "inductance_H").into(), bar));
     }

@@ -5,8 +5,9 @@
 
 use fluxmorph_optimizer::problem::Want;
 
-use crate::rows::{Case, Row, assert_rows};
-use crate::support::{ShieldReference, relative_l2, setup};
+use super::rows::{Case, Row, assert_rows};
+use crate::support::setup;
+use crate::support::shield::{ShieldReference, relative_l2};
 
 const COARSE: [&str; 3] = [
     "mesh.shield.refinement=0.5",

@@ -6,7 +6,6 @@
 //! sphere there, whose dipole is then mirrored: an error of about two thousandths of the sphere's field. The thin-skinned
 //! steel is computed with layers in its skin and as an impedance surface.
 
-use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{SphereParameters, sphere};
 use fluxmorph_geometry::tet4::{Point, norm};
 use fluxmorph_geometry::{ElementId, Mesh};
@@ -16,17 +15,12 @@ use fluxmorph_solver::{
 };
 use serde_json::Value;
 
+use super::rows::{Case, Row, assert_rows};
 use crate::orders::Study;
-use crate::references::{named, number, reference};
-use crate::rows::{Case, Row, assert_rows};
+use crate::references::{complex, material, named, number, reference};
 
 /// Outer radius over that of the sphere.
 const BOX: f64 = 8.0;
-
-fn complex(value: &Value) -> c64 {
-    let part = |i: usize| value[i].as_f64().expect("two numbers");
-    c64::new(part(0), part(1))
-}
 
 /// Conditions of an octant in the unit field along z.
 fn setup(mesh: &Mesh, frequency: f64, material: Material, order: Order) -> FieldModelSetup {
@@ -60,10 +54,7 @@ impl Solid {
         let file = reference("sphere.json");
         let data = named(&file["spheres"], name).clone();
         let radius = number(&data, "radius_m");
-        let material = Material {
-            relative_permeability: number(&data, "relative_permeability"),
-            conductivity: number(&data, "conductivity_S_per_m"),
-        };
+        let material = material(&data);
         let frequency = number(&file, "frequency_Hz");
         let skin_depth = material.skin_depth(std::f64::consts::TAU * frequency).expect("it conducts");
         let mesh = sphere(&parameters(radius, skin_depth, refinement)).expect("a sound sphere");
@@ -142,11 +133,16 @@ fn parameters(radius: f64, skin_depth: f64, refinement: f64) -> SphereParameters
         layer = (1.5 * layer).min(0.7 * skin_depth);
         depth += layer;
     }
+    SphereParameters { skin, ..coarse(radius, refinement) }
+}
+
+/// A sphere without layers.
+fn coarse(radius: f64, refinement: f64) -> SphereParameters {
+    let outer_radius = BOX * radius;
     SphereParameters {
         radius,
-        outer_radius: BOX * radius,
+        outer_radius,
         divisions: 6,
-        skin,
         growth: 1.35,
         refinement,
         ..SphereParameters::default()
@@ -158,21 +154,10 @@ pub(crate) fn hollow(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
     let file = reference("sphere.json");
     let data = &file["hollow"];
     let radius = number(data, "outer_radius_m");
-    let material = Material {
-        relative_permeability: number(data, "relative_permeability"),
-        conductivity: number(data, "conductivity_S_per_m"),
-    };
-    let mesh = sphere(&SphereParameters {
-        radius,
-        inner_radius: Some(number(data, "inner_radius_m")),
-        outer_radius: BOX * radius,
-        divisions: 6,
-        wall_layers: 3,
-        growth: 1.35,
-        refinement,
-        ..SphereParameters::default()
-    })
-    .expect("a sound sphere");
+    let material = material(data);
+    let inner_radius = Some(number(data, "inner_radius_m"));
+    let mesh = sphere(&SphereParameters { inner_radius, wall_layers: 3, ..coarse(radius, refinement) })
+        .expect("a sound sphere");
     let frequency = number(&file, "frequency_Hz");
     let model = FieldModel::new(&mesh, setup(&mesh, frequency, material, order)).expect("a sound problem");
     let (solution, _) = model.solve(&mesh).expect("it converges");
@@ -186,20 +171,10 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
     let file = reference("sphere.json");
     let data = named(&file["spheres"], "steel, 10 mm");
     let radius = number(data, "radius_m");
-    let material = Material {
-        relative_permeability: number(data, "relative_permeability"),
-        conductivity: number(data, "conductivity_S_per_m"),
-    };
+    let material = material(data);
     let frequency = number(&file, "frequency_Hz");
-    let full = sphere(&SphereParameters {
-        radius,
-        outer_radius: BOX * radius,
-        divisions: 8,
-        growth: 1.35,
-        refinement,
-        ..SphereParameters::default()
-    })
-    .expect("a sound sphere");
+    let full =
+        sphere(&SphereParameters { divisions: 8, ..coarse(radius, refinement) }).expect("a sound sphere");
     let region = full.topology().region("sphere").expect("the generator makes it");
     let (mesh, surface) = full.without_region(region).expect("air is left");
     let conductor = Conductor { name: "sphere".to_owned(), surface, material };
@@ -223,15 +198,7 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
 /// A sphere with the remanence `B_r` and the permeability of vacuum: `B = 2/3 B_r` inside, a dipole outside.
 pub(crate) fn magnet(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
     let radius = 0.01;
-    let mesh = sphere(&SphereParameters {
-        radius,
-        outer_radius: BOX * radius,
-        divisions: 6,
-        growth: 1.35,
-        refinement,
-        ..SphereParameters::default()
-    })
-    .expect("a sound sphere");
+    let mesh = sphere(&coarse(radius, refinement)).expect("a sound sphere");
     let remanence = 1.2;
     let of = |name: &String| if name == "sphere" { [0.0, 0.0, remanence] } else { [0.0; 3] };
     let mut setup = setup(&mesh, 0.0, Material::AIR, order);

@@ -1,8 +1,8 @@
 //! TEAM 21a: the loss of a non-magnetic plate beside two coils of opposed currents, without and with two slits.
 
-use crate::case::{MeshSize, case, component, numbers, rms_of_peak, solved};
+use super::case::{MeshSize, case, component, numbers, rms_of_peak, solved};
+use super::rows::{Row, assert_rows};
 use crate::references::reference;
-use crate::rows::{Row, assert_rows};
 
 /// The plate's loss, and with two slits the flux density beside the plate.
 pub(crate) fn rows(model: &str, size: MeshSize, bar: f64) -> Vec<Row> {

@@ -3,9 +3,9 @@
 //! Compared are the columns that two independent solutions agree with: both phases at 50 Hz, and the in-phase one at
 //! 200 Hz. The 200 Hz quadrature column is printed only (`tests/reference/team7.json` says why).
 
-use crate::case::{MeshSize, case, component, numbers, rms_of_peak, solved};
+use super::case::{MeshSize, case, component, numbers, rms_of_peak, solved};
+use super::rows::{Row, assert_rows};
 use crate::references::reference;
-use crate::rows::{Row, assert_rows};
 
 /// One row a line and phase that counts; the error is the root mean square over the line, as a share of the peak.
 pub(crate) fn rows(frequency: u32, size: MeshSize, bar: f64) -> Vec<Row> {
