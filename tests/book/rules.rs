@@ -28,40 +28,24 @@ enum Exists {
     Paths,
 }
 
+const fn rule(begins: &'static str, reason: &'static str, exists: Exists) -> Rule {
+    Rule { begins, reason, exists }
+}
+
 const NEVER_RUN: [Rule; 13] = [
-    Rule { begins: "git clone ", reason: "needs the address of the repository", exists: Exists::Elsewhere },
-    Rule { begins: "cd fluxmorph", reason: "the folder of the clone", exists: Exists::Elsewhere },
-    Rule {
-        begins: "cargo test --release --workspace",
-        reason: "is what runs this test",
-        exists: Exists::Step(".ci/run"),
-    },
-    Rule { begins: "cargo test ", reason: "the test command with a filter", exists: Exists::Elsewhere },
-    Rule {
-        begins: "cargo install ",
-        reason: "compiles for minutes; see `just dist`",
-        exists: Exists::Elsewhere,
-    },
-    Rule {
-        begins: "cargo build ",
-        reason: "compiles for minutes, and is built here",
-        exists: Exists::Elsewhere,
-    },
-    Rule {
-        begins: "just ",
-        reason: "its targets are cargo commands over the tests",
-        exists: Exists::JustTarget,
-    },
-    Rule { begins: "paraview ", reason: "a window, on what other commands make", exists: Exists::Elsewhere },
-    Rule {
-        begins: "pip install ",
-        reason: "the tests have their own Python below target/",
-        exists: Exists::Elsewhere,
-    },
-    Rule { begins: "mpirun ", reason: "needs MPI; tests/mpi has it", exists: Exists::Elsewhere },
-    Rule { begins: "sbatch ", reason: "needs a cluster", exists: Exists::Elsewhere },
-    Rule { begins: "tools/scale.py", reason: "takes an hour, and needs MPI", exists: Exists::Elsewhere },
-    Rule { begins: "mdbook ", reason: "mdBook is not needed to read the book", exists: Exists::Paths },
+    rule("git clone ", "needs the address of the repository", Exists::Elsewhere),
+    rule("cd fluxmorph", "the folder of the clone", Exists::Elsewhere),
+    rule("cargo test --release --workspace", "is what runs this test", Exists::Step(".ci/run")),
+    rule("cargo test ", "the test command with a filter", Exists::Elsewhere),
+    rule("cargo install ", "compiles for minutes; see `just dist`", Exists::Elsewhere),
+    rule("cargo build ", "compiles for minutes, and is built here", Exists::Elsewhere),
+    rule("just ", "its targets are cargo commands over the tests", Exists::JustTarget),
+    rule("paraview ", "a window, on what other commands make", Exists::Elsewhere),
+    rule("pip install ", "the tests have their own Python below target/", Exists::Elsewhere),
+    rule("mpirun ", "needs MPI; tests/mpi has it", Exists::Elsewhere),
+    rule("sbatch ", "needs a cluster", Exists::Elsewhere),
+    rule("tools/scale.py", "takes an hour, and needs MPI", Exists::Elsewhere),
+    rule("mdbook ", "mdBook is not needed to read the book", Exists::Paths),
 ];
 
 /// Whether a command takes a minute or more.

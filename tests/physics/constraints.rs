@@ -1,7 +1,7 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, Source};
+use fluxmorph_optimizer::config::{Algorithm, Optimizer};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
@@ -36,14 +36,9 @@ const STATIC: (&str, &str) = ("frequency = \"60 Hz\"", "frequency = 0");
 /// The objective of the shipped shields.
 const SQUARED: &str = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
 
-/// A shipped configuration with changes `(from, to)` in its text.
-fn changed_config(name: &str, changes: &[(&str, &str)]) -> (Config, Source) {
-    parsed(&support::changed(&repository_text(&format!("configs/{name}")), changes))
-}
-
-/// Its problem, and the settings of its optimiser.
+/// The problem of a shipped configuration with changes `(from, to)` in its text, and the settings of its optimiser.
 fn changed(name: &str, changes: &[(&str, &str)]) -> (Problem, Optimizer) {
-    let (config, source) = changed_config(name, changes);
+    let (config, source) = parsed(&support::changed(&repository_text(&format!("configs/{name}")), changes));
     let setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     (setup.problem, config.optimizer)
 }
@@ -241,29 +236,6 @@ fn loss_and_energy_are_those_of_the_field() {
     let energy = analysis.objective.expect("an energy");
     println!("energy {energy:.4} J, half the work {work:.4} J");
     assert!(energy < work * (1.0 + 1e-9) && energy > 0.97 * work);
-}
-
-#[test]
-fn what_regions_cannot_give_is_refused_at_its_key() {
-    let constraint = |text: &str| format!("[[constraints]]\n{text}\n[design]");
-    let cases = [
-        ("kind = \"mass\"\nregion = \"plate\"\nupper = 1", "constraints[0].kind", "has no density"),
-        ("kind = \"loss\"\nregion = \"air\"\nupper = 1", "constraints[0].region", "does not conduct"),
-        ("kind = \"energy\"\nregion = \"plate\"\nupper = 1", "constraints[0].region", "impedance surface"),
-        ("kind = \"volume\"\nregion = \"plat\"\nupper = 1", "constraints[0].region", "no region `plat`"),
-        (
-            "kind = \"flux_density_squared\"\nregion = \"remesh\"\nupper = 1",
-            "constraints[0].region",
-            "lies inside the remesh region",
-        ),
-    ];
-    for (text, path, message) in cases {
-        let (config, source) = changed_config("shield_quick.toml", &[("[design]", &constraint(text))]);
-        let error = set_up(&config, &source, Purpose::Optimisation).expect_err(text);
-        let Error::Config(ConfigError::Faults(report)) = &error else { panic!("{error}") };
-        assert_eq!(report.faults[0].path, path, "{error}");
-        assert!(error.to_string().contains(message), "{error}");
-    }
 }
 
 #[test]

@@ -7,8 +7,9 @@ use std::process::Command;
 
 use crate::support::device::{Device, block, shipped, slow};
 use crate::support::essence::{Essence, assert_same, essence};
-use crate::support::folder::files;
+use crate::support::folder::{RunFolder, files};
 use crate::support::program::{finish, folder};
+use crate::support::shield::Model;
 
 /// All that the linear solver can be told; `two_level` is for quadratic elements.
 const METHODS: [&str; 6] =
@@ -17,6 +18,7 @@ const METHODS: [&str; 6] =
 fn on_threads(device: &Device, home: &Path, threads: &str) -> Essence {
     let out = home.join(threads);
     finish(device.command("run", &out).args(["--threads", threads])).completed();
+    assert_eq!(RunFolder(out.clone()).json("manifest.json")["threads"].to_string(), threads);
     essence(&files(&out))
 }
 
@@ -54,8 +56,10 @@ fn any_number_of_threads_writes_the_same_bits_on_systems_cut_into_many_tasks() {
 #[test]
 fn any_number_of_threads_writes_the_same_bits_of_the_shields() {
     for name in ["shield_quick", "shield_two_frequencies"] {
-        same_on_all_threads(&shipped(name, &["--set", "output.fields=every"]));
+        same_on_all_threads(&shipped(name, &[]).with("output.fields=every"));
     }
+    let meshed = shipped("shield_quick", Model::Meshed.arguments()).with("output.fields=every");
+    same_on_all_threads(&meshed.with("optimizer.max_evaluations=3"));
 }
 
 /// Needs the program of the `dev` profile: `just determinism` builds it first.

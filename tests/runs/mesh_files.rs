@@ -148,27 +148,12 @@ fn interfaces_serve_as_surfaces_everywhere() {
     let design = ["--set", "design.surface=plate|remesh", "--set", "design.direction=[0, 0, -1]"];
     let text = with("check", &config, &design);
     assert!(!text.stderr.contains("there is no"), "{}", text.stderr);
-}
-
-#[test]
-fn misspelt_names_are_shown_with_the_nearest_that_the_file_has() {
-    let home = folder();
-    let config = device(home.path());
-    let cases: [(&str, &[&str]); 6] = [
-        (
-            "design.surface=plate_botom",
-            &["there is no surface `plate_botom`", "did you mean `plate_bottom`?", "x_max"],
-        ),
-        ("design.surface=plaet|remesh", &["there is no region `plaet`", "did you mean `plate`?", "outside"]),
-        ("remesh.slide=[\"remesh|outsde\"]", &["there is no region `outsde`", "did you mean `outside`?"]),
-        ("boundaries.flux_normal=[\"plate|observation\"]", &["plate|observation", "no face in common"]),
-        ("objective.region=observaton", &["there is no region `observaton`", "did you mean `observation`?"]),
-        ("output.stl=[\"plate_tip\"]", &["there is no surface `plate_tip`", "did you mean `plate_top`?"]),
-    ];
-    for (set, says) in cases {
-        with("check", &config, &["--set", set]).with(3, says);
+    for (set, says) in [
+        ("remesh.slide=[\"remesh|outsde\"]", ["there is no region `outsde`", "did you mean `outside`?"]),
+        ("output.stl=[\"plate_tip\"]", ["there is no surface `plate_tip`", "did you mean `plate_top`?"]),
+    ] {
+        with("check", &config, &["--set", set]).with(3, &says);
     }
-    with("check", &config, &["--set", "output.mesh=yes"]).with(3, &["output.mesh", "true or false"]);
 }
 
 #[test]
@@ -203,12 +188,4 @@ fn a_broken_mesh_file_is_refused_with_line_and_element() {
     with("check", &config, &[]).with(3, &["line 1", "$MeshFormat"]);
     fs::remove_file(&mesh).expect("removed");
     with("check", &config, &[]).with(5, &["cannot read", "device.msh"]);
-}
-
-#[test]
-fn a_file_without_unit_is_a_fault() {
-    let home = folder();
-    let config = device(home.path());
-    edit(&config, "unit = \"mm\"\n", "");
-    with("check", &config, &[]).with(3, &["missing key `unit` in `mesh`", "unit = \"mm\""]);
 }

@@ -217,23 +217,23 @@ fn what_cannot_be_moved_is_a_fault_at_its_key() {
     let refused = |text: &str, fragments: &[&str]| {
         morph(home.path(), text, &[]).with(3, fragments);
     };
-    let without =
-        BLOCK.split("[[morph").next().expect("a beginning").to_owned() + "[analysis]\nfrequency = 0\n";
+    let nodes = "nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]";
+    let cases: [(&str, &str, &[&str]); 3] = [
+        (
+            "nodes = [[\"21 mm\", \"20 mm\", \"40 mm\"]]",
+            "there is no node at (21.000, 20.000, 40.000) mm",
+            &["the nearest is at (20.000, 20.000, 40.000) mm"],
+        ),
+        ("surface = \"top\"", "there is no surface `top`", &["z_max"]),
+        ("box = [[1, 1, 1], [2, 2, 2]]", "`morph.motion[0].box` holds no node of the mesh", &[]),
+    ];
+    for (moved, says, advice) in cases {
+        refused(&BLOCK.replace(nodes, moved), &[&[says], advice].concat());
+    }
+    let start = |end: &str| BLOCK.split(end).next().expect("a beginning").to_owned();
+    let without = start("[[morph") + "[analysis]\nfrequency = 0\n";
     refused(&without, &["missing table `morph`", "[[morph.motion]]"]);
-    refused(
-        &BLOCK.replace("\"20 mm\", \"20 mm\", \"40 mm\"", "\"21 mm\", \"20 mm\", \"40 mm\""),
-        &["there is no node at (21.000, 20.000, 40.000) mm", "the nearest is at (20.000, 20.000, 40.000) mm"],
-    );
-    refused(
-        &BLOCK.replace("nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]", "surface = \"top\""),
-        &["there is no surface `top`", "z_max"],
-    );
-    refused(
-        &BLOCK.replace("nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]", "box = [[1, 1, 1], [2, 2, 2]]"),
-        &["`morph.motion[0].box` holds no node of the mesh"],
-    );
-    let designed = BLOCK.split("nodes").next().expect("a beginning").to_owned() + "design = \"upper\"\n";
-    refused(&designed, &["there is no [design]"]);
+    refused(&(start("nodes") + "design = \"upper\"\n"), &["there is no [design]"]);
     let field = format!("{BLOCK}[[coils]]\nname = \"coil\"\n");
     refused(&field, &["missing key `analysis`", "as there is `coils`"]);
     // A name that only a case gives wrong is shown at the line of the case.

@@ -20,26 +20,39 @@ fn run(model: Model, out: &std::path::Path) -> RunFolder {
 }
 
 #[test]
-fn a_run_leaves_every_file_and_the_files_agree_with_each_other() {
+fn a_run_leaves_files_that_agree_and_fields_that_hold_its_design_and_its_objective() {
     for model in Model::ALL {
         let home = folder();
         let run = run(model, &home.path().join("out"));
-        let fields = (0..EVALUATIONS).map(|e| format!("fields/eval_{e:04}.vtu"));
-        let others = "config.toml fields.pvd history.csv history.jsonl journal.bin manifest.json optimum.msh \
-                      optimum_plate_bottom.stl report.html resolved.toml result.json";
-        let mut expected: Vec<String> = others.split(' ').map(str::to_owned).chain(fields).collect();
-        expected.sort();
-        assert_eq!(files_below(&run.0), expected, "{model:?}");
-
         let result = run.result();
+        all_files_are_there(&run);
         result_has_the_keys_of_its_contract(&result);
         manifest_describes_the_run(&run.json("manifest.json"), &result);
         history_has_a_row_for_each_evaluation(&run, &result);
         collection_lists_the_fields_by_evaluation(&run);
-        assert_eq!(run.text("config.toml"), read_text(&quick()));
-        let resolved = run.0.join("resolved.toml");
-        fluxmorph(&[&"check", &resolved]).exits_with(0);
+        every_field_file_holds_the_arrays_of_its_contract(&run, &result, model);
+        the_plate_in_the_moved_mesh_is_as_thick_as_the_design_says(&run, &result);
+        objective_and_losses_follow_from_the_fields(&run, &result, model);
+        resolved_configuration_repeats_the_run(&run, &result);
     }
+}
+
+fn all_files_are_there(run: &RunFolder) {
+    let fields = (0..EVALUATIONS).map(|e| format!("fields/eval_{e:04}.vtu"));
+    let others = "config.toml fields.pvd history.csv history.jsonl journal.bin manifest.json optimum.msh \
+                  optimum_plate_bottom.stl report.html resolved.toml result.json";
+    let mut expected: Vec<String> = others.split(' ').map(str::to_owned).chain(fields).collect();
+    expected.sort();
+    assert_eq!(files_below(&run.0), expected);
+    assert_eq!(run.text("config.toml"), read_text(&quick()));
+}
+
+/// What was read is enough to do the same again, bit for bit.
+fn resolved_configuration_repeats_the_run(run: &RunFolder, result: &Value) {
+    let (resolved, again) = (run.0.join("resolved.toml"), run.0.with_file_name("again"));
+    fluxmorph(&[&"check", &resolved]).exits_with(0);
+    fluxmorph(&[&"run", &resolved, &"--out", &again, &"--max-evaluations", &"4"]).exits_with(1);
+    assert_eq!(RunFolder(again).result()["design"]["values_m"], result["design"]["values_m"]);
 }
 
 fn result_has_the_keys_of_its_contract(result: &Value) {
@@ -146,128 +159,101 @@ fn collection_lists_the_fields_by_evaluation(run: &RunFolder) {
     }
 }
 
-#[test]
-fn every_field_file_holds_the_arrays_of_its_contract_in_the_right_shape() {
-    const POINT_VECTORS: [&str; 4] = ["A_re", "A_im", "displacement", "sensitivity"];
-    const POINT_SCALARS: [&str; 2] = ["psi_re", "psi_im"];
-    const CELL_VECTORS: [&str; 4] = ["B_re", "B_im", "J_re", "J_im"];
-    const CELL_SCALARS: [&str; 3] = ["B_abs", "loss_density", "quality"];
-    for model in Model::ALL {
-        let home = folder();
-        let run = run(model, &home.path().join("out"));
-        let result = run.result();
-        for evaluation in 0..EVALUATIONS as u64 {
-            let field = run.field(evaluation);
-            let (nodes, tets) = (field.points.len(), field.tets.len());
-            assert_eq!(
-                [nodes as u64, tets as u64],
-                ["nodes", "tets"].map(|n| count(&result["mesh"], &format!("/{n}")))
-            );
-            assert_eq!((field.point_data.len(), field.cell_data.len()), (6, 8));
-            let is_finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
-            let is_zero = |v: &[f64]| v.iter().all(|&x| x == 0.0);
-            let mut zero = Vec::new();
-            for (names, data, length) in
-                [(&POINT_VECTORS, &field.point_data, nodes), (&CELL_VECTORS, &field.cell_data, tets)]
-            {
-                for name in names {
-                    let values = vectors(&data[*name]);
-                    assert_eq!(values.len(), length, "{name}");
-                    assert!(is_finite(values.as_flattened()), "{name}");
-                    zero.extend(is_zero(values.as_flattened()).then_some(*name));
-                }
+fn every_field_file_holds_the_arrays_of_its_contract(run: &RunFolder, result: &Value, model: Model) {
+    for evaluation in 0..EVALUATIONS as u64 {
+        let field = run.field(evaluation);
+        let (nodes, tets) = (field.points.len(), field.tets.len());
+        let counts = ["/mesh/nodes", "/mesh/tets"].map(|pointer| count(result, pointer));
+        assert_eq!([nodes as u64, tets as u64], counts);
+        assert_eq!((field.point_data.len(), field.cell_data.len()), (6, 8));
+        assert_eq!(field.cell_data["region"].len(), tets);
+        let (points, cells) = (&field.point_data, &field.cell_data);
+        let mut zero = Vec::new();
+        for (names, data, length) in
+            [("A_re A_im displacement sensitivity", points, nodes), ("B_re B_im J_re J_im", cells, tets)]
+        {
+            for name in names.split(' ') {
+                let values = vectors(&data[name]);
+                assert!(values.len() == length && values.iter().flatten().all(|x| x.is_finite()), "{name}");
+                zero.extend(values.iter().flatten().all(|&x| x == 0.0).then_some(name));
             }
-            for (names, data, length) in
-                [(&POINT_SCALARS[..], &field.point_data, nodes), (&CELL_SCALARS[..], &field.cell_data, tets)]
-            {
-                for name in names {
-                    let values = scalars(&data[*name]);
-                    assert_eq!(values.len(), length, "{name}");
-                    assert!(is_finite(values), "{name}");
-                    zero.extend(is_zero(values).then_some(*name));
-                }
-            }
-            assert_eq!(field.cell_data["region"].len(), tets);
-            // Nothing is solved for inside an impedance surface; the first design has not moved.
-            let mut expected = Vec::new();
-            expected.extend((evaluation == 0).then_some("displacement"));
-            if model == Model::Impedance {
-                expected.extend(["J_re", "J_im", "psi_re", "psi_im", "loss_density"]);
-            }
-            assert_eq!(zero, expected, "{model:?}, evaluation {evaluation}");
         }
+        for (names, data, length) in
+            [("psi_re psi_im", points, nodes), ("B_abs loss_density quality", cells, tets)]
+        {
+            for name in names.split(' ') {
+                let values = scalars(&data[name]);
+                assert!(values.len() == length && values.iter().all(|x| x.is_finite()), "{name}");
+                zero.extend(values.iter().all(|&x| x == 0.0).then_some(name));
+            }
+        }
+        // Nothing is solved for inside an impedance surface; the first design has not moved.
+        let mut expected = Vec::new();
+        expected.extend((evaluation == 0).then_some("displacement"));
+        if model == Model::Impedance {
+            expected.extend(["J_re", "J_im", "psi_re", "psi_im", "loss_density"]);
+        }
+        assert_eq!(zero, expected, "{model:?}, evaluation {evaluation}");
     }
 }
 
-#[test]
-fn the_plate_in_the_moved_mesh_is_as_thick_as_the_design_says() {
+fn the_plate_in_the_moved_mesh_is_as_thick_as_the_design_says(run: &RunFolder, result: &Value) {
     // Rounding of coordinates and of the interpolation, a few 1e-17 m, with room.
     let rounding = 1e-15;
-    for model in Model::ALL {
-        let home = folder();
-        let run = run(model, &home.path().join("out"));
-        let result = run.result();
-        let best = count(&result, "/objective/best_evaluation");
-        let design = numbers(&result, "/design/values_m");
-        let (start, end) = (run.field(0), run.field(best));
-        assert_eq!(start.tets, end.tets, "the topology stays");
+    let best = count(result, "/objective/best_evaluation");
+    let design = numbers(result, "/design/values_m");
+    let (start, end) = (run.field(0), run.field(best));
+    assert_eq!(start.tets, end.tets, "the topology stays");
 
-        let bottom = plate_bottom(&start.points);
-        // At least the control points themselves.
-        assert!(bottom.len() >= 91, "{}", bottom.len());
-        let mut thickness = Vec::new();
-        for &n in &bottom {
-            let ([x, y, _], moved) = (start.points[n], end.points[n]);
-            let expected = [x, y, -0.01 - height(&design, x, y)];
-            assert!((0..3).all(|d| (moved[d] - expected[d]).abs() < rounding), "{moved:?} {expected:?}");
-            thickness.push(-moved[2]);
-        }
-        let displacement = vectors(&end.point_data["displacement"]);
-        for ((a, b), u) in start.points.iter().zip(&end.points).zip(displacement) {
-            assert!((0..3).all(|d| (b[d] - a[d] - u[d]).abs() < rounding), "{a:?} {b:?} {u:?}");
-        }
-
-        let (header, rows) = run.history();
-        let cell = |name: &str| -> f64 {
-            let column = header.iter().position(|c| c == name).expect("the column");
-            rows[best as usize][column].parse().expect("a number")
-        };
-        let least = thickness.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = thickness.iter().copied().fold(0.0, f64::max);
-        assert!((cell("min_thickness_m") - least).abs() < rounding);
-        assert!((cell("max_thickness_m") - most).abs() < rounding);
-        // The run has done something: the bounds allow 5 to 30 mm.
-        assert!((0.005 - rounding..0.006).contains(&least) && most > 0.015, "{least} {most}");
+    let bottom = plate_bottom(&start.points);
+    // At least the control points themselves.
+    assert!(bottom.len() >= 91, "{}", bottom.len());
+    let mut thickness = Vec::new();
+    for &n in &bottom {
+        let ([x, y, _], moved) = (start.points[n], end.points[n]);
+        let expected = [x, y, -0.01 - height(&design, x, y)];
+        assert!((0..3).all(|d| (moved[d] - expected[d]).abs() < rounding), "{moved:?} {expected:?}");
+        thickness.push(-moved[2]);
     }
+    let displacement = vectors(&end.point_data["displacement"]);
+    for ((a, b), u) in start.points.iter().zip(&end.points).zip(displacement) {
+        assert!((0..3).all(|d| (b[d] - a[d] - u[d]).abs() < rounding), "{a:?} {b:?} {u:?}");
+    }
+
+    let (header, rows) = run.history();
+    let cell = |name: &str| -> f64 {
+        let column = header.iter().position(|c| c == name).expect("the column");
+        rows[best as usize][column].parse().expect("a number")
+    };
+    let least = thickness.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = thickness.iter().copied().fold(0.0, f64::max);
+    assert!((cell("min_thickness_m") - least).abs() < rounding);
+    assert!((cell("max_thickness_m") - most).abs() < rounding);
+    // The run has done something: the bounds allow 5 to 30 mm.
+    assert!((0.005 - rounding..0.006).contains(&least) && most > 0.015, "{least} {most}");
 }
 
 /// Relative rounding of sums over thousands of terms of one sign, with room.
 const SUM_ROUNDING: f64 = 1e-12;
 
-#[test]
-fn objective_losses_and_quality_follow_from_the_fields_in_the_files() {
-    for model in Model::ALL {
-        let home = folder();
-        let run = run(model, &home.path().join("out"));
-        let result = run.result();
-        let best = count(&result, "/objective/best_evaluation");
-        for (evaluation, key) in [(0, "/objective/initial"), (best, "/objective/best")] {
-            let field = run.field(evaluation);
-            let volumes: Vec<f64> = corners(&field).into_iter().map(volume).collect();
-            assert!(volumes.iter().all(|&v| v > 0.0), "no element is inverted");
-            let objective = number(&result, key);
-            assert!((objective_of(&field, &volumes) / objective - 1.0).abs() < SUM_ROUNDING);
-            magnitudes_are_those_of_the_parts(&field);
-            if model == Model::Meshed && evaluation == best {
-                let density = scalars(&field.cell_data["loss_density"]);
-                let loss: f64 = density.iter().zip(&volumes).map(|(p, v)| p * v).sum();
-                let expected = number(&result, "/losses_w/plate");
-                assert!((loss / expected - 1.0).abs() < SUM_ROUNDING, "{loss} {expected}");
-                joule_heat_lies_where_the_currents_are(&field);
-            }
+fn objective_and_losses_follow_from_the_fields(run: &RunFolder, result: &Value, model: Model) {
+    let best = count(result, "/objective/best_evaluation");
+    for (evaluation, key) in [(0, "/objective/initial"), (best, "/objective/best")] {
+        let field = run.field(evaluation);
+        let volumes: Vec<f64> = corners(&field).into_iter().map(volume).collect();
+        assert!(volumes.iter().all(|&v| v > 0.0), "no element is inverted");
+        let objective = number(result, key);
+        assert!((objective_of(&field, &volumes) / objective - 1.0).abs() < SUM_ROUNDING);
+        magnitudes_are_those_of_the_parts(&field);
+        if model == Model::Meshed && evaluation == best {
+            let density = scalars(&field.cell_data["loss_density"]);
+            let loss: f64 = density.iter().zip(&volumes).map(|(p, v)| p * v).sum();
+            let expected = number(result, "/losses_w/plate");
+            assert!((loss / expected - 1.0).abs() < SUM_ROUNDING, "{loss} {expected}");
+            joule_heat_lies_where_the_currents_are(&field);
         }
-        the_observed_part_stays_and_has_no_sensitivity(&run.field(best));
     }
+    the_observed_part_stays_and_has_no_sensitivity(&run.field(best));
 }
 
 /// `Σ_k B_k·B_k*` over the 2 by 6 observation cells of 20 mm, `B_k` the volume mean over a cell.
@@ -354,17 +340,6 @@ fn a_converged_run_exits_with_success() {
     let run = RunFolder(out);
     assert_eq!(run.result()["stop_reason"], "objective_converged");
     assert_eq!(run.json("manifest.json")["status"], "converged");
-}
-
-#[test]
-fn a_run_from_its_resolved_configuration_repeats_it_bit_for_bit() {
-    let home = folder();
-    let first = run(Model::Meshed, &home.path().join("first"));
-    let resolved = first.0.join("resolved.toml");
-    let second = home.path().join("second");
-    fluxmorph(&[&"run", &resolved, &"--out", &second, &"--max-evaluations", &"4"]).exits_with(1);
-    let values = |run: &RunFolder| numbers(&run.result(), "/design/values_m");
-    assert_eq!(values(&first), values(&RunFolder(second)));
 }
 
 /// Signed volume of a tetrahedron [m³].

@@ -204,27 +204,6 @@ fn assert_iterations(model: &FieldModel, solution: &FieldSolution) {
     assert!(iterations <= limit, "{iterations} iterations");
 }
 
-/// The same field on quadratic elements.
-pub(crate) struct Quadratic<F>(pub(crate) F);
-
-impl<F: KnownField> KnownField for Quadratic<F> {
-    fn name(&self) -> String {
-        self.0.name()
-    }
-
-    fn at(&self, x: Point, inside: Point) -> Sample {
-        self.0.at(x, inside)
-    }
-
-    fn mesh(&self, n: usize) -> Mesh {
-        self.0.mesh(n)
-    }
-
-    fn setup(&self) -> FieldModelSetup {
-        FieldModelSetup { order: Order::Quadratic, ..self.0.setup() }
-    }
-}
-
 /// The same field, mesh and conditions, turned in space: no face is at right angles to an axis any more.
 pub(crate) struct Turned<F>(pub(crate) F);
 

@@ -9,10 +9,10 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{Boundary, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, FieldModelSetup, Material, Order};
 
 use super::errors::{
-    KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Quadratic, Sample, Turned, assert_orders, errors_on, setup,
+    KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Sample, Turned, assert_orders, errors_on, setup,
 };
 use crate::meshes::{Distortion, unit_cube};
 
@@ -33,6 +33,7 @@ struct Smooth {
     faces: Boundary,
     frequency: f64,
     penalty: f64,
+    order: Order,
 }
 
 impl Smooth {
@@ -46,7 +47,7 @@ impl Smooth {
 
 impl KnownField for Smooth {
     fn name(&self) -> String {
-        let Self { faces, frequency, penalty } = self;
+        let Self { faces, frequency, penalty, .. } = self;
         format!("smooth, {faces:?}, {frequency} Hz, p = {penalty}")
     }
 
@@ -81,45 +82,32 @@ impl KnownField for Smooth {
     }
 
     fn setup(&self) -> FieldModelSetup {
-        setup(self.frequency, self.penalty, vec![self.material()], self.faces)
+        let setup = setup(self.frequency, self.penalty, vec![self.material()], self.faces);
+        FieldModelSetup { order: self.order, ..setup }
     }
 }
 
 #[test]
-fn a_static_field_converges_between_flux_parallel_faces() {
-    let field = Smooth { faces: Boundary::FluxParallel, frequency: 0.0, penalty: 1.0 };
-    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
-}
-
-#[test]
-fn a_harmonic_field_converges_between_flux_parallel_faces() {
-    let field = Smooth { faces: Boundary::FluxParallel, frequency: 50.0, penalty: 1.0 };
-    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
-}
-
-#[test]
-fn a_penalty_that_couples_all_components_keeps_the_order() {
-    for frequency in [0.0, 50.0] {
-        let field = Smooth { faces: Boundary::FluxParallel, frequency, penalty: 0.5 };
+fn smooth_fields_converge_between_faces_of_either_kind_whatever_the_penalty() {
+    use Boundary::{FluxNormal, FluxParallel};
+    for (faces, frequency, penalty) in [
+        (FluxParallel, 0.0, 1.0),
+        (FluxParallel, 50.0, 1.0),
+        // All components are coupled.
+        (FluxParallel, 0.0, 0.5),
+        (FluxParallel, 50.0, 0.5),
+        (FluxNormal, 0.0, 1.0),
+        // The scalar potential is grounded in one node.
+        (FluxNormal, 50.0, 1.0),
+    ] {
+        let field = Smooth { faces, frequency, penalty, order: Order::Linear };
         assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
     }
 }
 
 #[test]
-fn a_static_field_converges_between_flux_normal_faces() {
-    let field = Smooth { faces: Boundary::FluxNormal, frequency: 0.0, penalty: 1.0 };
-    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
-}
-
-#[test]
-fn a_harmonic_field_with_one_grounded_node_converges_between_flux_normal_faces() {
-    let field = Smooth { faces: Boundary::FluxNormal, frequency: 50.0, penalty: 1.0 };
-    assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
-}
-
-#[test]
 fn recovered_flux_density_converges_faster_than_its_elements_on_a_smooth_mesh() {
-    let field = Smooth { faces: Boundary::FluxParallel, frequency: 50.0, penalty: 1.0 };
+    let field = Smooth { faces: Boundary::FluxParallel, frequency: 50.0, penalty: 1.0, order: Order::Linear };
     // Second order, with a margin for fits that reach over two or three of a dozen cells.
     let order = assert_orders(&field, Distortion::Smooth, &CELLS, ORDER_OF_A);
     assert!(order >= 1.7, "{order}");
@@ -133,7 +121,7 @@ fn quadratic_elements_gain_an_order() {
         (Boundary::FluxNormal, 50.0, 1.0),
         (Boundary::FluxParallel, 50.0, 0.5),
     ] {
-        let field = Quadratic(Smooth { faces, frequency, penalty });
+        let field = Smooth { faces, frequency, penalty, order: Order::Quadratic };
         assert_orders(&field, Distortion::Random, &COARSE_CELLS, QUADRATIC_ORDER_OF_A);
     }
 }
@@ -153,9 +141,10 @@ fn conditions_on_oblique_planes_are_those_of_the_axes_turned() {
     }
     for faces in [Boundary::FluxParallel, Boundary::FluxNormal] {
         for (frequency, penalty) in [(0.0, 1.0), (50.0, 1.0), (50.0, 0.5)] {
-            let field = || Smooth { faces, frequency, penalty };
-            compare(field(), Turned(field()));
-            compare(Quadratic(field()), Turned(Quadratic(field())));
+            for order in [Order::Linear, Order::Quadratic] {
+                let field = || Smooth { faces, frequency, penalty, order };
+                compare(field(), Turned(field()));
+            }
         }
     }
 }

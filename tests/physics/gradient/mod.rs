@@ -81,52 +81,26 @@ fn flat(problem: &Problem) -> Vec<f64> {
 }
 
 #[test]
-fn the_gradient_of_the_impedance_model_is_exact() {
-    let setup = setup("shield_quick.toml", &[]);
-    holds(&setup.problem, &flat(&setup.problem));
-    holds(&setup.problem, &wavy(&setup.problem));
+fn the_gradient_is_exact_in_both_models_flat_and_wavy() {
+    for overrides in [&[][..], &MESHED] {
+        let problem = setup("shield_quick.toml", overrides).problem;
+        holds(&problem, &flat(&problem));
+        holds(&problem, &wavy(&problem));
+        node_gradient_holds(&problem);
+    }
 }
 
 #[test]
-fn the_gradient_of_the_volume_model_is_exact() {
-    let setup = setup("shield_quick.toml", &MESHED);
-    holds(&setup.problem, &flat(&setup.problem));
-    holds(&setup.problem, &wavy(&setup.problem));
-}
-
-#[test]
-fn the_gradient_is_exact_with_another_penalty_and_volume_weighting() {
-    let mut overrides = MESHED.to_vec();
-    overrides.extend(["analysis.penalty=0.3", "objective.weighting=\"volume\""]);
-    let setup = setup("shield_quick.toml", &overrides);
-    holds(&setup.problem, &wavy(&setup.problem));
-}
-
-#[test]
-fn the_gradient_is_exact_in_statics_on_a_coarse_control_grid() {
-    let mut overrides = MESHED.to_vec();
-    overrides.extend(["analysis.frequency=\"0 Hz\"", "remesh.motion=\"along_design\"", "design.grid=[2, 3]"]);
-    let setup = setup("shield_quick.toml", &overrides);
-    holds(&setup.problem, &wavy(&setup.problem));
-}
-
-#[test]
-fn the_derivative_at_every_node_is_exact_in_the_impedance_model() {
-    node_gradient_holds(&setup("shield_quick.toml", &[]).problem);
-}
-
-#[test]
-fn the_derivative_at_every_node_is_exact_in_the_volume_model() {
-    node_gradient_holds(&setup("shield_quick.toml", &MESHED).problem);
-}
-
-#[test]
-fn the_gradient_is_exact_with_fictitious_forces_and_a_fine_control_grid() {
-    let setup = setup(
-        "shield_quick.toml",
-        &["remesh.force=[0.0, 0.0, 2e-6]", "remesh.stiffness=\"uniform\"", "design.grid=[13, 25]"],
-    );
-    holds(&setup.problem, &wavy(&setup.problem));
+fn the_gradient_is_exact_with_another_penalty_weighting_frequency_grid_and_force() {
+    let meshed: [&[&str]; 2] = [
+        &["analysis.penalty=0.3", "objective.weighting=\"volume\""],
+        &["analysis.frequency=\"0 Hz\"", "remesh.motion=\"along_design\"", "design.grid=[2, 3]"],
+    ];
+    let forced = ["remesh.force=[0.0, 0.0, 2e-6]", "remesh.stiffness=\"uniform\"", "design.grid=[13, 25]"];
+    for overrides in meshed.map(|more| [&MESHED[..], more].concat()).into_iter().chain([forced.to_vec()]) {
+        let problem = setup("shield_quick.toml", &overrides).problem;
+        holds(&problem, &wavy(&problem));
+    }
 }
 
 /// The quick shield with another `[design]` in place of its direction and grid.

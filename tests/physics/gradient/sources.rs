@@ -4,7 +4,7 @@ use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify_all};
 
 use super::{MESHED, check, wavy};
-use crate::support::{parsed, setup, setup_of};
+use crate::support::{changed, parsed, setup, setup_of};
 
 /// Two directions: the chain is that of the linear elements, which are measured in five.
 fn brief() -> Settings {
@@ -187,27 +187,18 @@ fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
 }
 
 #[test]
-fn planes_with_a_condition_must_keep_their_nodes() {
-    // Nothing lets the nodes on z = 0 slide in it: as a free face they would leave it.
-    let text = APPLIED.replace(
-        r#"slide = ["x_min", "y_min", "z_min"]"#,
-        r#"slide = ["x_min", "y_min"]
-    free = ["z_min"]"#,
-    );
-    let (config, source) = parsed(&text);
-    let error =
-        set_up(&config, &source, Purpose::Optimisation).err().map(|e| e.to_string()).unwrap_or_default();
-    assert!(error.contains("at right angles to z would lose its nodes"), "{error}");
-}
-
-#[test]
-fn conditions_hold_at_the_outside_and_one_a_face() {
-    let refused = |from: &str, to: &str| {
-        let (config, source) = parsed(&APPLIED.replace(from, to));
-        set_up(&config, &source, Purpose::Analysis).err().map(|e| e.to_string()).unwrap_or_default()
-    };
-    let inner = refused(r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|around"]"#);
-    assert!(inner.contains("has faces inside the mesh") && inner.contains("flux_normal"), "{inner}");
-    let twice = refused(r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#);
-    assert!(twice.contains("share the face"), "{twice}");
+fn conditions_on_planes_and_faces_that_cannot_hold_are_refused() {
+    for (from, to, says) in [
+        // Nothing lets the nodes on z = 0 slide in it: as a free face they would leave it.
+        (
+            r#"slide = ["x_min", "y_min", "z_min"]"#,
+            "slide = [\"x_min\", \"y_min\"]\nfree = [\"z_min\"]",
+            "at right angles to z would lose its nodes",
+        ),
+        (r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#, "share the face"),
+    ] {
+        let (config, source) = parsed(&changed(APPLIED, &[(from, to)]));
+        let error = set_up(&config, &source, Purpose::Optimisation).err().expect(says).to_string();
+        assert!(error.contains(says), "{error}");
+    }
 }
