@@ -1,27 +1,16 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
-use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::{Algorithm, Optimizer};
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
+use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_optimizer::session::{self, Options};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
 
+use crate::problems::{analysed, initial, objective, optimised, try_optimised};
 use crate::support::folder::RunFolder;
 use crate::support::{self, config, parsed, repository_text, setup};
-
-#[derive(Default)]
-struct Rows(Vec<Evaluation>);
-
-impl Recorder for Rows {
-    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        self.0.push(record.row.clone());
-        Ok(())
-    }
-}
 
 /// The plate of the quick shield meshed, instead of an impedance surface.
 const MESHED: [(&str, &str); 4] = [
@@ -50,13 +39,7 @@ fn with(
     settings: impl Fn(Optimizer) -> Optimizer,
 ) -> (Optimised, Vec<Evaluation>) {
     let (mut problem, own) = changed(name, changes);
-    run(&mut problem, &settings(own))
-}
-
-fn run(problem: &mut Problem, settings: &Optimizer) -> (Optimised, Vec<Evaluation>) {
-    let mut rows = Rows::default();
-    let result = optimise(problem, settings, &mut Silent, &mut rows, &|| false);
-    (result.unwrap_or_else(|e| panic!("{e}")), rows.0)
+    optimised(&mut problem, &settings(own))
 }
 
 /// What a constraint measured at the best design.
@@ -205,12 +188,10 @@ fn a_field_of_two_frequencies_is_that_of_each_alone() {
     // With a factor of its own each: the same bits.
     let alone = "analysis.linear_solver.reuse=\"never\"";
     let both = setup("shield_two_frequencies.toml", &[alone]).problem;
-    let p = both.shape.as_ref().expect("a shape").initial.clone();
-    let terms = both.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}")).terms;
+    let p = initial(&both);
+    let terms = analysed(&both, &p).terms;
     let one = setup("shield_quick.toml", &["analysis.frequency=\"200 Hz\""]).problem;
-    let alone =
-        one.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}")).objective.expect("an objective");
-    assert_eq!(terms[1], alone);
+    assert_eq!(terms[1], objective(&one, &p));
 }
 
 #[test]
@@ -220,16 +201,14 @@ fn loss_and_energy_are_those_of_the_field() {
     let loss = (SQUARED, "kind = \"loss\"\nregion = \"plate\"\n");
     for changes in [&[loss][..], &[&[loss], &MESHED[..]].concat()] {
         let problem = changed("shield_quick.toml", changes).0;
-        let p = problem.shape.as_ref().expect("a shape").initial.clone();
-        let analysis = problem.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}"));
+        let analysis = analysed(&problem, &initial(&problem));
         let sum = analysis.solutions[0].losses(&problem.states[0], &analysis.mesh)[0].1;
         println!("loss {sum:.4} W");
         assert!((analysis.objective.expect("a loss") / sum - 1.0).abs() < 1e-12);
     }
     let energy = [(SQUARED, "kind = \"energy\"\n"), STATIC];
     let problem = changed("shield_quick.toml", &[&energy, &MESHED[..]].concat()).0;
-    let p = problem.shape.as_ref().expect("a shape").initial.clone();
-    let analysis = problem.evaluate(&p, Want::Value).unwrap_or_else(|e| panic!("{e}"));
+    let analysis = analysed(&problem, &initial(&problem));
     let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
     let load = model.load(&analysis.mesh);
     let work: f64 = 0.5 * load.iter().zip(solution.values()).map(|(f, u)| (f * u).re).sum::<f64>();
@@ -245,8 +224,6 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     // Without layers in the plate.
     let changes = [&[("[design]", limit), STATIC, MESHED[0]], &MESHED[2..]].concat();
     let (mut problem, settings) = changed("shield_quick.toml", &changes);
-    let error = optimise(&mut problem, &settings, &mut Silent, &mut Rows::default(), &|| false)
-        .expect_err("no share");
-    let text = error.to_string();
+    let text = try_optimised(&mut problem, &settings).0.expect_err("no share").to_string();
     assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
 }

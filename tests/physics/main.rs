@@ -13,6 +13,7 @@ mod guards;
 mod meshes;
 mod orders;
 mod paper;
+mod problems;
 mod references;
 mod solvers;
 mod starts;

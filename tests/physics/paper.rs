@@ -4,17 +4,16 @@
 //! from it, with the tolerances that the shipped meshes are made for. Measured values are in docs/results.md; run with
 //! `--nocapture` to see them.
 
-use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::fresh_mesh::{Gain, Shapes};
-use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::problem::Analysis;
 use fluxmorph_optimizer::setup::Setup;
 use fluxmorph_solver::recovery;
 
+use crate::problems::{self, analysed, objective, variables};
 use crate::support::shield::{ShieldReference, relative_l2};
 use crate::support::{config, setup};
 
@@ -29,14 +28,9 @@ fn rms(objective: f64) -> f64 {
     (objective / 12.0).sqrt()
 }
 
-fn value(problem: &Problem, p: &[f64]) -> Analysis {
-    problem.evaluate(p, Want::Value).unwrap_or_else(|e| panic!("{e}"))
-}
-
 /// F of a uniform change of thickness [m].
 fn uniform(setup: &Setup, height: f64) -> f64 {
-    let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
-    value(&setup.problem, &vec![height; variables]).objective.expect("an objective")
+    objective(&setup.problem, &vec![height; variables(&setup.problem)])
 }
 
 /// B of flat and framed plate against the reference: in the cells (what the objective sees) and at the probes.
@@ -52,7 +46,7 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
         .into_iter()
         .enumerate()
     {
-        let analysis = value(problem, p);
+        let analysis = analysed(problem, p);
         let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
         let objective = problem.objective.as_ref().expect("an objective");
         cells[case] = relative_l2(
@@ -118,7 +112,7 @@ fn frequency_and_box_change_the_result_as_the_reference_says() {
     let ratio = |overrides: &[&str]| {
         let setup = setup(IMPEDANCE, &[overrides, &["mesh.shield.growth=1.4"]].concat());
         let flat = uniform(&setup, 0.0);
-        let best = value(&setup.problem, &framed).objective.expect("an objective");
+        let best = objective(&setup.problem, &framed);
         (flat, best / flat)
     };
     let (flat, base) = ratio(&[]);
@@ -145,27 +139,14 @@ fn one_element_through_the_plate_warns() {
     assert!(graded.warnings.is_empty(), "{:?}", graded.warnings);
 }
 
-/// Rows of the history.
-#[derive(Default)]
-struct Rows(Vec<Evaluation>);
-
-impl Recorder for Rows {
-    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        self.0.push(record.row.clone());
-        Ok(())
-    }
-}
-
 fn run(name: &str) -> (Setup, Optimised, Vec<Evaluation>) {
     let (config, _) = config(name, &[]);
     let mut setup = setup(name, &[]);
     let settings = Optimizer { max_evaluations: 13, ..config.optimizer };
-    let mut rows = Rows::default();
-    let optimised = optimise(&mut setup.problem, &settings, &mut Silent, &mut rows, &|| false)
-        .unwrap_or_else(|e| panic!("{e}"));
-    let path: Vec<String> = rows.0.iter().map(|r| format!("{:.4}", r.ratio)).collect();
+    let (optimised, rows) = problems::optimised(&mut setup.problem, &settings);
+    let path: Vec<String> = rows.iter().map(|r| format!("{:.4}", r.ratio)).collect();
     println!("{name}: F/F0 {}", path.join(" "));
-    (setup, optimised, rows.0)
+    (setup, optimised, rows)
 }
 
 /// The paper's 51.16 % within 13 evaluations, and the frame: 30 mm rim, 5 mm middle.

@@ -6,6 +6,7 @@ use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, SolverEvent, SolverMemory};
 use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
 
+use crate::problems::variables;
 use crate::support::{norm, relative_difference, setup};
 
 /// A meshed plate, coarse: skin layers, ψ, interfaces.
@@ -25,8 +26,7 @@ fn problem((name, settings): (&str, &[&str]), more: &[&str]) -> Problem {
 
 /// A design in the middle of nowhere, `step` times away from flat.
 fn design(problem: &Problem, step: f64) -> Vec<f64> {
-    let count = problem.shape.as_ref().expect("a design").surface.variable_count();
-    (0..count).map(|k| 1e-3 * step * (1.0 + (k as f64).sin())).collect()
+    (0..variables(problem)).map(|k| 1e-3 * step * (1.0 + (k as f64).sin())).collect()
 }
 
 fn evaluated(problem: &Problem, memory: &mut Memory, step: f64) -> Analysis {

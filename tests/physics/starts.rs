@@ -5,15 +5,11 @@
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
-use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::config::Optimizer;
-use fluxmorph_optimizer::driver::{Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
-use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::StopReason;
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
 use fluxmorph_optimizer::setup::{Purpose, set_up};
 
+use crate::problems::{objective, optimised, variables};
 use crate::support::{self, setup};
 
 const MESHED: &str = "shield.toml";
@@ -34,7 +30,7 @@ enum Start {
     Random(usize),
 }
 
-/// What a run came to.
+/// What a run came to; `worst_quality` of any evaluation.
 #[derive(Debug)]
 struct End {
     stop_reason: StopReason,
@@ -43,16 +39,6 @@ struct End {
     /// F at the best design.
     objective: f64,
     worst_quality: f64,
-}
-
-/// Worst quality of any evaluation.
-struct Worst(f64);
-
-impl Recorder for Worst {
-    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        self.0 = self.0.min(record.row.worst_quality);
-        Ok(())
-    }
 }
 
 fn run(name: &str, overrides: &[&str], start: Start) -> End {
@@ -66,24 +52,20 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     }
     let mut setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     let settings = Optimizer { max_evaluations: ENOUGH, ..config.optimizer };
-    let mut worst = Worst(f64::INFINITY);
-    let optimised = optimise(&mut setup.problem, &settings, &mut Silent, &mut worst, &|| false)
-        .unwrap_or_else(|e| panic!("{name} from {start:?}: {e}"));
+    let (optimised, rows) = optimised(&mut setup.problem, &settings);
     End {
         stop_reason: optimised.stop_reason,
         evaluations: optimised.evaluations,
         rounds: setup.problem.shape.as_ref().expect("a shape").motion.round(),
         objective: optimised.best.objective,
-        worst_quality: worst.0,
+        worst_quality: rows.iter().map(|row| row.worst_quality).fold(f64::INFINITY, f64::min),
     }
 }
 
 /// F of the flat plate.
 fn flat(name: &str, overrides: &[&str]) -> f64 {
     let problem = setup(name, overrides).problem;
-    let variables = problem.shape.as_ref().expect("a shape").surface.variable_count();
-    let analysis = problem.evaluate(&vec![0.0; variables], Want::Value).unwrap_or_else(|e| panic!("{e}"));
-    analysis.objective.expect("an objective")
+    objective(&problem, &vec![0.0; variables(&problem)])
 }
 
 /// Runs from every start, prints the table, and asserts that all end alike.

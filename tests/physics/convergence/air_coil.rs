@@ -79,7 +79,6 @@ fn model(mesh: &Mesh, corner: Corner) -> FieldModel {
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR],
-        impedance_surfaces: Vec::new(),
         coils: vec![Coil {
             name: "coil".to_owned(),
             ampere_turns: c64::from(AMPERE_TURNS),

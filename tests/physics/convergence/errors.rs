@@ -47,8 +47,6 @@ pub(crate) fn setup(
         frequency,
         penalty,
         materials,
-        impedance_surfaces: Vec::new(),
-        coils: Vec::new(),
         boundaries: crate::meshes::FACES.map(|face| (face.to_owned(), faces)).to_vec(),
         ..FieldModelSetup::default()
     }

@@ -151,8 +151,6 @@ fn setup(frequency: f64, penalty: f64, boundaries: &[(&str, Boundary)]) -> Field
         frequency,
         penalty,
         materials: materials(),
-        impedance_surfaces: Vec::new(),
-        coils: Vec::new(),
         boundaries: boundaries.iter().map(|&(name, kind)| (name.to_owned(), kind)).collect(),
         ..FieldModelSetup::default()
     }

@@ -76,7 +76,6 @@ impl Slab {
             penalty: 1.0,
             materials: vec![Material::AIR, self.material],
             impedance_surfaces,
-            coils: Vec::new(),
             boundaries: faces.map(|(name, kind)| (name.to_owned(), kind)).to_vec(),
             ..FieldModelSetup::default()
         };

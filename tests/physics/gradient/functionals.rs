@@ -3,10 +3,11 @@
 use std::io::Write;
 
 use fluxmorph_optimizer::config::Config;
-use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_optimizer::setup::{Purpose, set_up};
 
 use super::{MESHED, Settings, certify_all, check, wavy};
+use crate::problems::analysed;
 use crate::support::folder::read_text;
 use crate::support::shield::quick;
 
@@ -116,7 +117,7 @@ const TWICE: &str = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper
 fn sums_over_two_frequencies_are_exact() {
     let problem = problem(SUM, TWICE, "frequencies = [60, 200]", &[]);
     assert_eq!(problem.states.len(), 2);
-    let analysis = problem.evaluate(&wavy(&problem), Want::Value).unwrap_or_else(|e| panic!("{e}"));
+    let analysis = analysed(&problem, &wavy(&problem));
     let terms = &problem.objective.as_ref().expect("an objective").terms;
     for (term, value) in terms.iter().zip(&analysis.terms) {
         println!("{}: {:e}", term.label.kind, term.weight * value);

@@ -6,6 +6,7 @@ use fluxmorph_optimizer::problem::{Problem, Want};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
 use fluxmorph_remesh::Moved;
 
+use crate::problems::{initial, variables};
 use crate::support::folder::read_text;
 use crate::support::shield::quick;
 use crate::support::{changed, setup, setup_of};
@@ -72,19 +73,14 @@ fn node_gradient_holds(problem: &Problem) {
 
 /// A design inside the bounds that is flat nowhere.
 fn wavy(problem: &Problem) -> Vec<f64> {
-    let variables = problem.shape.as_ref().expect("a shape").surface.variable_count();
-    (0..variables).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
-}
-
-fn flat(problem: &Problem) -> Vec<f64> {
-    problem.shape.as_ref().expect("a shape").initial.clone()
+    (0..variables(problem)).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
 }
 
 #[test]
 fn the_gradient_is_exact_in_both_models_flat_and_wavy() {
     for overrides in [&[][..], &MESHED] {
         let problem = setup("shield_quick.toml", overrides).problem;
-        holds(&problem, &flat(&problem));
+        holds(&problem, &initial(&problem));
         holds(&problem, &wavy(&problem));
         node_gradient_holds(&problem);
     }
@@ -132,8 +128,8 @@ fn the_gradient_is_exact_with_tied_nodes_and_a_fixed_rim() {
          symmetry = [{ axis = \"y\", at = \"120 mm\" }]",
         &[],
     );
-    let count = |problem: &Problem| problem.shape.as_ref().expect("a shape").surface.variable_count();
-    assert!(2 * count(&tied) < count(&free) + 20, "{} of {}", count(&tied), count(&free));
+    let [few, many] = [&tied, &free].map(variables);
+    assert!(2 * few < many + 20, "{few} of {many}");
     holds(&tied, &wavy(&tied));
     holds(&free, &wavy(&free));
 }

@@ -4,6 +4,7 @@ use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify_all};
 
 use super::{MESHED, check, wavy};
+use crate::problems::variables;
 use crate::support::{changed, parsed, setup, setup_of};
 
 /// Two directions: the chain is that of the linear elements, which are measured in five.
@@ -109,8 +110,7 @@ fn magnet(order: u8) -> String {
 fn the_gradient_with_a_magnet_that_moves_is_exact() {
     for order in [1, 2] {
         let setup = setup_of(&magnet(order));
-        let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
-        let p: Vec<f64> = (0..variables).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
+        let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
         assert_eq!(setup.problem.constraints.len(), 2);
         all_hold(&setup, &p, &brief());
     }
@@ -180,8 +180,7 @@ const APPLIED: &str = r#"
 #[test]
 fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
     let setup = setup_of(APPLIED);
-    let variables = setup.problem.shape.as_ref().expect("a shape").surface.variable_count();
-    let p: Vec<f64> = (0..variables).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
+    let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
     assert_eq!(setup.problem.constraints.len(), 4);
     all_hold(&setup, &p, &brief());
 }

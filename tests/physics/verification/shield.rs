@@ -3,9 +3,8 @@
 //! Two layers of elements in the first skin depths of the plate and 21 thousand tetrahedra in all. The reference itself is
 //! some tenths of a per cent away from a finer one.
 
-use fluxmorph_optimizer::problem::Want;
-
 use super::rows::{Case, Row, assert_rows};
+use crate::problems::{analysed, variables};
 use crate::support::setup;
 use crate::support::shield::{ShieldReference, relative_l2};
 
@@ -20,9 +19,7 @@ fn cells(order: u8, bar: f64) -> Row {
     let order = format!("analysis.order={order}");
     let setup = setup("shield.toml", &[&COARSE[..], &[&order]].concat());
     let problem = &setup.problem;
-    let shape = problem.shape.as_ref().expect("a shape");
-    let flat = vec![0.0; shape.surface.variable_count()];
-    let analysis = problem.evaluate(&flat, Want::Value).expect("a field");
+    let analysis = analysed(problem, &vec![0.0; variables(problem)]);
     let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
     let objective = problem.objective.as_ref().expect("an objective");
     let cells = objective.terms[0].functional.cell_flux_densities(model, &analysis.mesh, solution);
