@@ -3,9 +3,9 @@
 use std::process::Command;
 
 use crate::launch::ranks;
-use crate::repository;
 use crate::support::folder::{count, read_text};
 use crate::support::program::{finish, folder};
+use crate::support::repository;
 
 #[test]
 fn two_ranks_take_at_most_twice_the_iterations_of_one() {
