@@ -5,22 +5,16 @@ use std::process::Stdio;
 
 use serde_json::Value;
 
+use crate::support::changed;
+use crate::support::device::MOTION;
 use crate::support::folder::{RunFolder, count};
 use crate::support::program::{command, end_of, folder, send, wait_until};
 
-/// A block of 10 × 10 × 10 cells whose middle top node is lifted: a tenth of a second a motion.
-const BLOCK: &str = r#"[mesh]
-generator = "block"
-[mesh.block]
-size = ["40 mm", "40 mm", "40 mm"]
-cells = [10, 10, 10]
-[remesh]
-region = "block"
-free = ["z_max"]
-[[morph.motion]]
-nodes = [["20 mm", "20 mm", "40 mm"]]
-displacement = ["0 mm", "0 mm", "2 mm"]
-"#;
+/// A motion in a block of so many cells a side that it takes a tenth of a second, or the like.
+fn block(cells: usize, further: &str) -> String {
+    let cells = format!("cells = [{cells}, {cells}, {cells}]");
+    changed(MOTION, &[("cells = [4, 4, 4]", &cells), ("\"5 mm\"", "\"2 mm\"")]) + further
+}
 
 /// Ends `morph` with a signal once a file of the run directory is there; what was said, and the result.
 fn interrupted_morph(
@@ -56,8 +50,7 @@ fn an_interrupted_sweep_keeps_the_cases_that_are_done() {
     let cases: String = (1..=8)
         .map(|k| format!("[[morph.case]]\nname = \"nu {k}\"\nremesh.poisson = {}\n", 0.05 * k as f64))
         .collect();
-    let text = format!("{BLOCK}{cases}").replace("cells = [10, 10, 10]", "cells = [20, 20, 20]");
-    let (said, result) = interrupted_morph(&text, None, "case_01_after.vtu", "TERM", 143);
+    let (said, result) = interrupted_morph(&block(20, &cases), None, "case_01_after.vtu", "TERM", 143);
     let done = result["cases"].as_array().expect("a list").len();
     assert!((1..8).contains(&done), "{done}");
     assert!(said.contains(&format!("left out: {} of 8 cases: nu {}", 8 - done, done + 1)), "{said}");
@@ -65,7 +58,7 @@ fn an_interrupted_sweep_keeps_the_cases_that_are_done() {
 
 #[test]
 fn an_interrupted_tuner_keeps_the_best_it_found() {
-    let text = format!("{BLOCK}[morph.tune]\nparameters = [\"poisson\", \"force\"]\n");
+    let text = block(10, "[morph.tune]\nparameters = [\"poisson\", \"force\"]\n");
     let (said, result) = interrupted_morph(&text, Some("--tune"), "resolved.toml", "INT", 130);
     assert_eq!(result["cases"].as_array().map(Vec::len), Some(0));
     assert!(count(&result, "/tuned/evaluations") >= 1);

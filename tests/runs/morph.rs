@@ -5,24 +5,10 @@ use std::path::Path;
 use fluxmorph_geometry::io::read_vtu;
 use serde_json::Value;
 
+use crate::support::device::MOTION as BLOCK;
 use crate::support::folder::{count, files_below, number, read_json, read_text, scalars, vectors};
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 use crate::support::repository;
-
-/// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
-const BLOCK: &str = r#"title = "lifted"
-[mesh]
-generator = "block"
-[mesh.block]
-size = ["40 mm", "40 mm", "40 mm"]
-cells = [4, 4, 4]
-[remesh]
-region = "block"
-free = ["z_max"]
-[[morph.motion]]
-nodes = [["20 mm", "20 mm", "40 mm"]]
-displacement = ["0 mm", "0 mm", "5 mm"]
-"#;
 
 /// Pressed in by three quarters of the height: no single increment survives that.
 fn pressed(increments: &str) -> String {

@@ -19,6 +19,21 @@ pub(crate) const CONSTRAINT: (&str, &str) =
 /// Steps of the block so cautious that the mesh has several references.
 pub(crate) const ROUNDS: (&str, &str) = ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = [");
 
+/// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
+pub(crate) const MOTION: &str = r#"title = "lifted"
+[mesh]
+generator = "block"
+[mesh.block]
+size = ["40 mm", "40 mm", "40 mm"]
+cells = [4, 4, 4]
+[remesh]
+region = "block"
+free = ["z_max"]
+[[morph.motion]]
+nodes = [["20 mm", "20 mm", "40 mm"]]
+displacement = ["0 mm", "0 mm", "5 mm"]
+"#;
+
 /// What is run.
 #[derive(Clone, Debug)]
 pub(crate) struct Device {
