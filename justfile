@@ -22,7 +22,7 @@ test-long:
 
 # Computes the table of closed forms and benchmarks in docs/verification.md
 verify:
-    cargo test --release --test verification -- --ignored --nocapture write_the_table
+    cargo test --release --test physics -- --ignored --nocapture verification::page
 
 # Tables of mesh motion in docs/torture.md, of killed runs, full disks and signals in docs/robustness.md
 torture: torture-meshes torture-runs
@@ -33,16 +33,16 @@ torture-meshes:
 
 # Real kills, full disks (as root, or where this user may mount) and timed signals; writes docs/robustness.md
 torture-runs:
-    cargo test --release --test real_runs -- --ignored --nocapture write_the_table
+    cargo test --release --test robustness -- --ignored --nocapture page::write_the_table
 
 # The same bits from the program built without and with optimisation
 determinism:
     cargo build
-    cargo test --release --test real_runs -- --ignored --nocapture debug_and_release
+    cargo test --release --test robustness -- --ignored --nocapture debug_and_release
 
 # The fields of fresh runs read through VTK; installs pyvista with pip below target/
 test-pyvista:
-    cargo test --release --test acceptance -- --ignored --nocapture pyvista
+    cargo test --release --test runs -- --ignored --nocapture pyvista
 
 # Writes configs/fluxmorph.schema.json and the tables of docs/configuration.md, both from the types of the configuration
 generate:

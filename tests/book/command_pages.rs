@@ -2,9 +2,10 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::process::Command;
 
 use crate::repository;
+use crate::support::program::{finish, program};
+use crate::support::repository_text;
 
 /// The page that is written here.
 pub(crate) const PATH: &str = "docs/commands.md";
@@ -15,15 +16,8 @@ const HEAD: &str = "# Commands\n\n\
 
 /// What `fluxmorph ARGUMENTS --help` prints.
 fn help(arguments: &[String]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_fluxmorph"))
-        .args(arguments)
-        .arg("--help")
-        .env("NO_COLOR", "1")
-        .env_remove("COLUMNS")
-        .output()
-        .expect("the binary starts");
-    assert!(output.status.success(), "fluxmorph {arguments:?} --help: {}", output.status);
-    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let mut help = program();
+    let text = finish(help.args(arguments).arg("--help").env_remove("COLUMNS")).exits_with(0).stdout;
     text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
@@ -58,8 +52,7 @@ fn page() -> String {
 
 #[test]
 fn the_page_of_commands_is_what_the_program_says() {
-    let known = fs::read_to_string(repository(PATH)).expect("a page of the repository");
-    assert!(known == page(), "{PATH} is stale: `just commands` writes it");
+    assert!(repository_text(PATH) == page(), "{PATH} is stale: `just commands` writes it");
 }
 
 #[test]

@@ -15,18 +15,15 @@
 mod command_pages;
 mod contents;
 mod page;
+mod release;
 mod rules;
 mod runner;
-
-use std::path::PathBuf;
+#[path = "../support/mod.rs"]
+mod support;
 
 use page::Page;
 use runner::{Extent, run_page};
-
-/// A file of the repository.
-fn repository(path: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
-}
+use support::repository;
 
 fn run_pages(extent: Extent) {
     let mut faults = Vec::new();

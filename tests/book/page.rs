@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::repository;
+use crate::support::repository_text;
 
 /// A page with the path that it has in the repository.
 pub(crate) struct Page {
@@ -51,7 +52,7 @@ impl Page {
     /// # Panics
     /// When the page cannot be read, or a block of it is not closed.
     pub(crate) fn read(path: &str) -> Self {
-        let content = fs::read_to_string(repository(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
+        let content = repository_text(path);
         let mut page = Self { path: path.to_owned(), blocks: Vec::new(), text: Vec::new() };
         let mut open: Option<(Block, usize)> = None;
         for (number, line) in (1..).zip(content.lines()) {

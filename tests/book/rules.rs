@@ -1,8 +1,7 @@
 //! Commands of the pages that are not run, or not always, and why.
 
-use std::fs;
-
 use crate::repository;
+use crate::support::repository_text;
 
 /// Commands that take a minute or more wherever they stand, and those that go on with what these leave.
 const LONG: [&str; 2] = ["run configs/shield.toml", "resume configs/runs/shield"];
@@ -29,40 +28,24 @@ enum Exists {
     Paths,
 }
 
+const fn rule(begins: &'static str, reason: &'static str, exists: Exists) -> Rule {
+    Rule { begins, reason, exists }
+}
+
 const NEVER_RUN: [Rule; 13] = [
-    Rule { begins: "git clone ", reason: "needs the address of the repository", exists: Exists::Elsewhere },
-    Rule { begins: "cd fluxmorph", reason: "the folder of the clone", exists: Exists::Elsewhere },
-    Rule {
-        begins: "cargo test --release --workspace",
-        reason: "is what runs this test",
-        exists: Exists::Step(".ci/run"),
-    },
-    Rule { begins: "cargo test ", reason: "the test command with a filter", exists: Exists::Elsewhere },
-    Rule {
-        begins: "cargo install ",
-        reason: "compiles for minutes; see `just dist`",
-        exists: Exists::Elsewhere,
-    },
-    Rule {
-        begins: "cargo build ",
-        reason: "compiles for minutes, and is built here",
-        exists: Exists::Elsewhere,
-    },
-    Rule {
-        begins: "just ",
-        reason: "its targets are cargo commands over the tests",
-        exists: Exists::JustTarget,
-    },
-    Rule { begins: "paraview ", reason: "a window, on what other commands make", exists: Exists::Elsewhere },
-    Rule {
-        begins: "pip install ",
-        reason: "the tests have their own Python below target/",
-        exists: Exists::Elsewhere,
-    },
-    Rule { begins: "mpirun ", reason: "needs MPI; tests/mpi has it", exists: Exists::Elsewhere },
-    Rule { begins: "sbatch ", reason: "needs a cluster", exists: Exists::Elsewhere },
-    Rule { begins: "tools/scale.py", reason: "takes an hour, and needs MPI", exists: Exists::Elsewhere },
-    Rule { begins: "mdbook ", reason: "mdBook is not needed to read the book", exists: Exists::Paths },
+    rule("git clone ", "needs the address of the repository", Exists::Elsewhere),
+    rule("cd fluxmorph", "the folder of the clone", Exists::Elsewhere),
+    rule("cargo test --release --workspace", "is what runs this test", Exists::Step(".ci/run")),
+    rule("cargo test ", "the test command with a filter", Exists::Elsewhere),
+    rule("cargo install ", "compiles for minutes; see `just dist`", Exists::Elsewhere),
+    rule("cargo build ", "compiles for minutes, and is built here", Exists::Elsewhere),
+    rule("just ", "its targets are cargo commands over the tests", Exists::JustTarget),
+    rule("paraview ", "a window, on what other commands make", Exists::Elsewhere),
+    rule("pip install ", "the tests have their own Python below target/", Exists::Elsewhere),
+    rule("mpirun ", "needs MPI; tests/mpi has it", Exists::Elsewhere),
+    rule("sbatch ", "needs a cluster", Exists::Elsewhere),
+    rule("tools/scale.py", "takes an hour, and needs MPI", Exists::Elsewhere),
+    rule("mdbook ", "mdBook is not needed to read the book", Exists::Paths),
 ];
 
 /// Whether a command takes a minute or more.
@@ -91,12 +74,12 @@ impl Rule {
         match self.exists {
             Exists::Elsewhere => None,
             Exists::Step(file) => {
-                let text = fs::read_to_string(repository(file)).expect("a file of the repository");
+                let text = repository_text(file);
                 let stands = text.lines().any(|line| line.replace("--locked ", "").ends_with(command));
                 (!stands).then(|| format!("`{command}` is no step of {file}"))
             }
             Exists::JustTarget => {
-                let text = fs::read_to_string(repository("justfile")).expect("a file of the repository");
+                let text = repository_text("justfile");
                 let target =
                     |line: &str| line.split([' ', ':']).next() == Some(argument) && line.contains(':');
                 let exists = argument.is_empty() || text.lines().any(target);

@@ -1,13 +1,15 @@
 //! The program on several ranks as a user starts it.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::journal::Journal;
 use fluxmorph_optimizer::output::{RunDirectory, system_disk};
 
-use crate::support;
+use crate::support::folder::read_json;
+use crate::support::program::{Finished, finish};
+use crate::support::{relative_difference, repository};
 
 /// A meshed plate, coarse; a few evaluations with all fields, and no fresh mesh.
 pub(crate) const COARSE: [&str; 6] = [
@@ -49,23 +51,17 @@ pub(crate) fn fluxmorph(count: usize) -> Command {
 /// `fluxmorph COMMAND configs/NAME --out DIR` with overrides.
 pub(crate) fn on(count: usize, command: &str, name: &str, out: &Path, overrides: &[&str]) -> Command {
     let mut program = fluxmorph(count);
-    program.arg(command).arg(support::repository("configs").join(name)).arg("--out").arg(out);
+    program.arg(command).arg(repository("configs").join(name)).arg("--out").arg(out);
     for setting in overrides {
         program.args(["--set", setting]);
     }
     program
 }
 
-/// Exit code and standard error of an ended command.
-pub(crate) fn said(output: &Output) -> (Option<i32>, String) {
-    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-}
-
 /// Lets a command come to the end of its work: converged, done, or at a limit.
 #[track_caller]
-pub(crate) fn completed(command: &mut Command) {
-    let (code, said) = said(&command.output().expect("it starts"));
-    assert!(matches!(code, Some(0 | 1)), "{code:?}: {said}");
+pub(crate) fn completed(command: &mut Command) -> Finished {
+    finish(command).completed()
 }
 
 /// The evaluations of a run.
@@ -76,8 +72,7 @@ pub(crate) fn records(directory: &Path) -> Vec<Record> {
 
 /// `result.json` of a run.
 pub(crate) fn result(directory: &Path) -> serde_json::Value {
-    let text = std::fs::read_to_string(directory.join("result.json")).expect("written");
-    serde_json::from_str(&text).expect("it is JSON")
+    read_json(&directory.join("result.json"))
 }
 
 /// Objective and gradient of every evaluation agree to 1e-8, and there are as many.
@@ -85,11 +80,9 @@ pub(crate) fn result(directory: &Path) -> serde_json::Value {
 pub(crate) fn assert_same(own: &Path, other: &Path) {
     let (own, other) = (records(own), records(other));
     assert_eq!(own.len(), other.len());
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
     for (a, b) in own.iter().zip(&other) {
         let objective = (a.row.objective / b.row.objective - 1.0).abs();
-        let difference = norm(&mut a.gradient.iter().zip(&b.gradient).map(|(x, y)| x - y));
-        let gradient = difference / norm(&mut b.gradient.iter().copied());
+        let gradient = relative_difference(&a.gradient, &b.gradient);
         let evaluation = a.row.evaluation;
         assert!(objective < 1e-8 && gradient < 1e-8, "{evaluation}: {objective:e} and {gradient:e}");
     }

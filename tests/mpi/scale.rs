@@ -3,31 +3,27 @@
 use std::process::Command;
 
 use crate::launch::ranks;
-use crate::support;
+use crate::support::folder::{count, read_text};
+use crate::support::program::{finish, folder};
+use crate::support::repository;
 
 #[test]
 fn two_ranks_take_at_most_twice_the_iterations_of_one() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder();
     let mut command = Command::new("python3");
     let program = env!("CARGO_BIN_EXE_fluxmorph");
-    command.arg(support::repository("tools/scale.py")).args([
-        "--program",
-        program,
-        "--mesh",
-        "meshed 14k",
-        "--keep",
-    ]);
+    command.arg(repository("tools/scale.py"));
+    command.args(["--program", program, "--mesh", "meshed 14k", "--keep"]);
     // The same surroundings as for every other start of mpirun.
     let surroundings = ranks(0, program.as_ref());
     command.arg(folder.path()).envs(surroundings.get_envs().filter_map(|(name, value)| Some((name, value?))));
-    let output = command.output().expect("python3 is there");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let lines = std::fs::read_to_string(folder.path().join("scale.jsonl")).expect("written");
+    finish(&mut command).exits_with(0);
+    let lines = read_text(&folder.path().join("scale.jsonl"));
     let records: Vec<serde_json::Value> =
         lines.lines().map(|line| serde_json::from_str(line).expect("it is JSON")).collect();
     assert_eq!(records.len(), 4, "two solvers, each on one and two ranks");
     for pair in records.chunks(2) {
-        let iterations = |record: &serde_json::Value| record["iterations"].as_u64().expect("it was solved");
+        let iterations = |record: &serde_json::Value| count(record, "/iterations");
         assert_eq!((&pair[0]["solver"], &pair[0]["ranks"]), (&pair[1]["solver"], &1.into()));
         assert!(iterations(&pair[1]) <= 2 * iterations(&pair[0]), "{pair:?}");
         assert_eq!(pair[1]["mib"].as_array().map(Vec::len), Some(2));

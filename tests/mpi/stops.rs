@@ -2,33 +2,23 @@
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Child, Command, Output};
-use std::time::{Duration, Instant};
+use std::process::{Child, Output};
 
-use crate::launch::{COARSE, assert_same, completed, fluxmorph, on, result, said};
-
-/// Far longer than any of these runs takes.
-const PATIENCE: Duration = Duration::from_secs(120);
+use crate::launch::{COARSE, assert_same, completed, fluxmorph, on, result};
+use crate::support::folder::rows;
+use crate::support::program::{folder, send, wait_until};
 
 /// Starts a run, waits for its second evaluation, and sends a signal to one of its ranks, or without one to mpirun; how mpirun
 /// ended.
 fn stopped(out: &Path, rank: Option<usize>, signal: &str) -> Output {
     let child = on(2, "run", "shield.toml", out, &COARSE).spawn().expect("it starts");
-    let begun = Instant::now();
-    let rows = || std::fs::read_to_string(out.join("history.csv")).map_or(0, |text| text.lines().count());
-    // A head and two rows.
-    while rows() < 3 {
-        assert!(begun.elapsed() < PATIENCE, "no second evaluation came");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let process = rank.map_or_else(|| child.id().to_string(), |rank| process_of(&child, rank));
-    let sent = Command::new("kill").args(["-s", signal, &process]).status().expect("kill is there");
-    assert!(sent.success());
+    wait_until("a second evaluation", || rows(out) > 1);
+    send(signal, rank.map_or(child.id(), |rank| process_of(&child, rank)));
     child.wait_with_output().expect("it ends")
 }
 
 /// The process of a rank: the child of mpirun that was told so.
-fn process_of(mpirun: &Child, rank: usize) -> String {
+fn process_of(mpirun: &Child, rank: usize) -> u32 {
     let id = mpirun.id().to_string();
     let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux has it");
     let told = format!("OMPI_COMM_WORLD_RANK={rank}");
@@ -36,12 +26,12 @@ fn process_of(mpirun: &Child, rank: usize) -> String {
         let environment = std::fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
         environment.split(|&byte| byte == 0).any(|variable| variable == told.as_bytes())
     };
-    children.split_whitespace().find(is_it).expect("mpirun has started it").to_owned()
+    children.split_whitespace().find(is_it).expect("mpirun has started it").parse().expect("a number")
 }
 
 #[test]
 fn a_run_one_of_whose_ranks_is_killed_goes_on_as_if_it_had_not_been() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder();
     let whole = folder.path().join("whole");
     completed(&mut on(2, "run", "shield.toml", &whole, &COARSE));
     for (killed, goes_on) in [(1, 2), (0, 3)] {
@@ -57,11 +47,12 @@ fn a_run_one_of_whose_ranks_is_killed_goes_on_as_if_it_had_not_been() {
 
 #[test]
 fn a_signal_to_one_rank_ends_all_with_the_state_saved() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
+    let folder = folder();
     for (rank, signal) in [(Some(0), "TERM"), (Some(1), "TERM"), (None, "USR1")] {
         let out = folder.path().join(format!("{rank:?}"));
-        let (code, said) = said(&stopped(&out, rank, signal));
-        assert_eq!(code, Some(143), "{said}");
+        let ended = stopped(&out, rank, signal);
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(143), "{said}");
         assert_eq!(result(&out)["status"], "interrupted");
         assert!(said.contains("fluxmorph resume"), "{said}");
     }

@@ -1,9 +1,10 @@
 //! The page in a browser: `tests/report/browser.py` drives headless Chromium, where it is installed.
 
-use std::path::Path;
 use std::process::Command;
 
-use crate::program::{repository, shield};
+use crate::shield;
+use crate::support::program::folder;
+use crate::support::repository;
 
 /// Whether a program answers; without it the test is skipped.
 fn is_there(program: &str) -> bool {
@@ -18,14 +19,14 @@ fn chromium_shows_every_figure_without_complaint() {
         println!("skipped: no Chromium or no python3 on this machine");
         return;
     }
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = home.path().join("out");
     shield(&out, &[]);
     let script = repository("tests/report/browser.py");
     let output = Command::new("python3")
         .arg(script)
         .arg(out.join("report.html"))
-        .env("PYTHONPATH", Path::new(env!("CARGO_MANIFEST_DIR")).join("tools"))
+        .env("PYTHONPATH", repository("tools"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output()
         .expect("python3 starts");

@@ -1,9 +1,12 @@
 //! Directories that there is no report of, and files that are damaged: named, with the exit codes of the documentation.
 
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use crate::program::{BLOCK, block, fluxmorph, report, repository};
+use crate::support::device::BLOCK;
+use crate::support::folder::read_text;
+use crate::support::program::{finish, fluxmorph, folder};
+use crate::support::{repository, with_mesh_file};
+use crate::{block, report};
 
 fn report_fails(directory: &Path, code: i32, fragments: &[&str]) {
     fluxmorph(&[&"report", &directory]).with(code, fragments);
@@ -11,7 +14,7 @@ fn report_fails(directory: &Path, code: i32, fragments: &[&str]) {
 
 #[test]
 fn what_is_no_run_or_analysis_is_refused() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     report_fails(home.path(), 5, &["holds no run of fluxmorph"]);
     report_fails(&home.path().join("none"), 5, &["holds no run of fluxmorph"]);
     let out = home.path().join("morph");
@@ -23,7 +26,7 @@ fn what_is_no_run_or_analysis_is_refused() {
 
 #[test]
 fn a_damaged_file_is_named_and_the_older_page_stays() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = block("run", home.path(), &[]);
     let page = std::fs::read(out.join("report.html")).expect("a page");
     let field = "fields/eval_0000.vtu";
@@ -42,9 +45,13 @@ fn a_damaged_file_is_named_and_the_older_page_stays() {
             std::fs::write(&path, damaged).expect("written");
             let ended = fluxmorph(&[&"report", &out]);
             let expected = if name == "config.toml" { [Some(3), Some(5)] } else { [Some(5); 2] };
-            assert!(expected.contains(&ended.code), "{name}: {:?} {}", ended.code, ended.said);
+            assert!(expected.contains(&ended.code), "{name}: {:?} {}", ended.code, ended.stderr);
             let file = if name == "manifest.json" { "out" } else { name };
-            assert!(ended.said.contains(file) && !ended.said.contains("panicked"), "{name}: {}", ended.said);
+            assert!(
+                ended.stderr.contains(file) && !ended.stderr.contains("panicked"),
+                "{name}: {}",
+                ended.stderr
+            );
             assert_eq!(std::fs::read(out.join("report.html")).expect("a page"), page, "{name}");
         }
         std::fs::write(&path, whole).expect("written");
@@ -58,29 +65,26 @@ fn block_from_file(home: &Path, name: &str) -> PathBuf {
     let folder = home.join("second");
     std::fs::create_dir(&folder).expect("made");
     std::fs::copy(first.join("optimum.msh"), folder.join(name)).expect("copied");
-    let (before, rest) = BLOCK.split_once("[mesh]").expect("a mesh");
-    let (_, behind) = rest.split_once("[analysis]").expect("an analysis");
-    let text = format!("{before}[mesh]\nfile = \"{name}\"\nunit = \"mm\"\n\n[analysis]{behind}");
-    std::fs::write(folder.join("block.toml"), text).expect("written");
+    std::fs::write(folder.join("block.toml"), with_mesh_file(BLOCK, name)).expect("written");
     folder
 }
 
 #[test]
 fn a_mesh_from_elsewhere_is_shown_where_the_user_allows_it() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let folder = block_from_file(home.path(), "../device.msh");
     for (command, code) in [("run", 1), ("solve", 0)] {
         let out = folder.join(command);
         let config = folder.join("block.toml");
-        let arguments: [&dyn AsRef<OsStr>; 5] = [&command, &config, &"--out", &out, &"--quiet"];
-        fluxmorph(&arguments).with(3, &["which leads upwards by `..`", "--allow-outside"]);
-        fluxmorph(&[&arguments[..], &[&"--allow-outside"]].concat()).with(code, &[]);
+        let mut program = crate::support::program::command(&[&command, &config, &"--out", &out, &"--quiet"]);
+        finish(&mut program).with(3, &["which leads upwards by `..`", "--allow-outside"]);
+        finish(program.arg("--allow-outside")).exits_with(code);
         // A run has made its page by itself.
         let own = std::fs::read_to_string(out.join("report.html")).ok();
         assert_eq!(own.is_some(), command == "run");
         report_fails(&out, 3, &["which leads upwards by `..`", "--allow-outside"]);
         fluxmorph(&[&"report", &out, &"--allow-outside"]).with(0, &["report.html"]);
-        let page = std::fs::read_to_string(out.join("report.html")).expect("the page");
+        let page = read_text(&out.join("report.html"));
         assert!(own.is_none_or(|own| own == page), "{command}");
         assert!(page.contains("<svg") && page.contains("data:image/png;base64,"), "{command}: no figures");
         assert!(!page.contains("Not shown"), "{command}");
@@ -89,10 +93,10 @@ fn a_mesh_from_elsewhere_is_shown_where_the_user_allows_it() {
 
 #[test]
 fn without_its_mesh_file_a_run_is_still_reported() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let folder = block_from_file(home.path(), "device.msh");
     let out = folder.join("out");
-    fluxmorph(&[&"solve", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).with(0, &[]);
+    fluxmorph(&[&"solve", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).exits_with(0);
     assert!(!report(&out).contains("Not shown"));
     std::fs::remove_file(folder.join("device.msh")).expect("removed");
     let page = report(&out);
@@ -101,7 +105,7 @@ fn without_its_mesh_file_a_run_is_still_reported() {
 
 #[test]
 fn a_page_that_cannot_be_written_is_an_error_that_names_it() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = block("run", home.path(), &[]);
     let nowhere = home.path().join("none/report.html");
     fluxmorph(&[&"report", &out, &"--out", &nowhere]).with(5, &["none/report.html"]);
@@ -110,13 +114,13 @@ fn a_page_that_cannot_be_written_is_an_error_that_names_it() {
 #[cfg(unix)]
 #[test]
 fn a_run_whose_page_cannot_be_written_ends_as_it_would() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out =
         block("run", home.path(), &[("verify_refinement = 0", "verify_refinement = 0\nreport = false")]);
     // A folder in the place of the page.
     std::fs::create_dir(out.join("report.html")).expect("made");
     std::fs::write(out.join("report.html/theirs"), "x").expect("written");
-    let text = std::fs::read_to_string(out.join("config.toml")).expect("a configuration");
+    let text = read_text(&out.join("config.toml"));
     std::fs::write(out.join("config.toml"), text.replace("report = false", "report = true"))
         .expect("written");
     let ended = fluxmorph(&[&"resume", &out, &"--max-evaluations", &"7"]);

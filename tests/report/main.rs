@@ -3,6 +3,33 @@
 
 mod browser;
 mod faults;
-mod markup;
 mod page;
-mod program;
+#[path = "../support/mod.rs"]
+mod support;
+
+use std::path::{Path, PathBuf};
+
+use support::device::written;
+use support::folder::read_text;
+use support::program::{finish, fluxmorph};
+use support::shield::on_quick;
+
+/// A run of the quick shield, which ends at its limit of evaluations.
+fn shield(out: &Path, further: &[&str]) {
+    on_quick("run", out, &[&["--quiet"], further].concat()).exits_with(1);
+}
+
+/// A run of the block with texts of its configuration replaced.
+fn block(command: &str, folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
+    let out = folder.join("out");
+    let code = if command == "run" { 1 } else { 0 };
+    finish(&mut written("block", folder, changes).command(command, &out)).exits_with(code);
+    out
+}
+
+/// The page of a run directory, made now.
+#[track_caller]
+fn report(directory: &Path) -> String {
+    fluxmorph(&[&"report", &directory]).with(0, &["report.html"]);
+    read_text(&directory.join("report.html"))
+}

@@ -1,17 +1,13 @@
 //! What stands on the page.
 
-use std::path::Path;
-use std::process::Command;
+use crate::support::device::{CONSTRAINT, ROUNDS};
+use crate::support::folder::read_text as read;
+use crate::support::markup::{Element, elements};
+use crate::support::program::{fluxmorph, fluxmorph_in, folder};
+use crate::support::shield::on_quick;
+use crate::{block, report, shield};
 
-use crate::markup::{Element, elements};
-use crate::program::{block, fluxmorph, report, repository, shield};
-
-const SECTIONS: [&str; 9] =
-    ["shape", "convergence", "field", "results", "evaluations", "mesh", "files", "provenance", "view"];
-
-fn read(path: &Path) -> String {
-    std::fs::read_to_string(path).expect("the page")
-}
+const SECTIONS: &str = "shape convergence field results evaluations mesh files provenance view";
 
 fn has_id(elements: &[Element], id: &str) -> bool {
     elements.iter().any(|element| element.get("id") == Some(id))
@@ -59,21 +55,19 @@ fn figures_are_described(elements: &[Element]) {
 
 #[test]
 fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = home.path().join("out");
     shield(&out, &[]);
     let page = read(&out.join("report.html"));
     assert!(page.len() <= 2_000_000, "{}", page.len());
     assert_eq!(report(&out), page);
     // However the directory is typed.
-    let mut relative = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
-    relative.args(["report", "out", "--quiet"]).current_dir(home.path());
-    assert!(relative.status().expect("the program starts").success());
+    fluxmorph_in(home.path(), &["report", "out", "--quiet"]).exits_with(0);
     assert_eq!(read(&out.join("report.html")), page);
     let elements = elements(&page);
     stands_alone(&page, &elements);
     figures_are_described(&elements);
-    for id in SECTIONS.iter().chain(&["shape-map", "field-cut", "quality-histogram", "surface"]) {
+    for id in SECTIONS.split(' ').chain(["shape-map", "field-cut", "quality-histogram", "surface"]) {
         assert!(has_id(&elements, id), "{id}");
     }
     let charts: Vec<&str> = elements.iter().filter_map(|e| e.get("data-chart")).collect();
@@ -90,10 +84,10 @@ fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
 
 #[test]
 fn another_file_has_links_that_lead_to_the_run() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = block("run", home.path(), &[]);
     let elsewhere = home.path().join("for a colleague.html");
-    fluxmorph(&[&"report", &out, &"--out", &elsewhere, &"--quiet"]).with(0, &[]);
+    fluxmorph(&[&"report", &out, &"--out", &elsewhere, &"--quiet"]).exits_with(0);
     let page = read(&elsewhere);
     assert!(page.contains("href=\"out/fields.pvd\""));
     assert_eq!(page.replace("href=\"out/", "href=\""), read(&out.join("report.html")));
@@ -101,13 +95,8 @@ fn another_file_has_links_that_lead_to_the_run() {
 
 #[test]
 fn constraints_and_rounds_are_drawn() {
-    let home = tempfile::tempdir().expect("a temporary folder");
-    let constraint = "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]";
-    let changes = [
-        ("[design]", constraint),
-        ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = ["),
-        ("max_evaluations = 6", "max_evaluations = 8"),
-    ];
+    let home = folder();
+    let changes = [CONSTRAINT, ROUNDS, ("max_evaluations = 6", "max_evaluations = 8")];
     let out = block("run", home.path(), &changes);
     let page = read(&out.join("report.html"));
     let elements = elements(&page);
@@ -119,7 +108,7 @@ fn constraints_and_rounds_are_drawn() {
 
 #[test]
 fn names_from_files_stay_text() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let title = r#"</title><script>alert(1)</script><img src=x onerror=alert(1)>&amp;"'"#;
     let region = "<b onclick='x'>iron</b>&";
     let changes = [
@@ -140,7 +129,7 @@ fn names_from_files_stay_text() {
 
 #[test]
 fn without_fields_the_page_says_what_is_missing_and_shows_the_rest() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = home.path().join("out");
     shield(&out, &["--set", "output.fields=none"]);
     let page = read(&out.join("report.html"));
@@ -156,7 +145,7 @@ fn without_fields_the_page_says_what_is_missing_and_shows_the_rest() {
 
 #[test]
 fn a_run_that_was_broken_off_is_reported_as_far_as_it_went() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = home.path().join("out");
     shield(&out, &["--set", "output.fields=every"]);
     std::fs::remove_file(out.join("result.json")).expect("removed");
@@ -179,7 +168,7 @@ fn a_run_that_was_broken_off_is_reported_as_far_as_it_went() {
 
 #[test]
 fn an_analysis_has_a_page_too() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = block("solve", home.path(), &[]);
     assert!(!out.join("report.html").exists(), "solve writes none by itself");
     let page = report(&out);
@@ -192,13 +181,11 @@ fn an_analysis_has_a_page_too() {
 
 #[test]
 fn a_run_without_report_has_none_and_force_removes_an_old_one() {
-    let home = tempfile::tempdir().expect("a temporary folder");
+    let home = folder();
     let out = home.path().join("out");
     shield(&out, &[]);
     assert!(out.join("report.html").is_file());
     shield(&out, &["--force", "--set", "output.report=false", "--set", "optimizer.max_evaluations=1"]);
     assert!(!out.join("report.html").exists());
-    let config = repository("configs/shield_quick.toml");
-    let run = fluxmorph(&[&"run", &config, &"--out", &out, &"--force", &"--max-evaluations", &"1"]);
-    run.with(1, &["report: ", "report.html"]);
+    on_quick("run", &out, &["--force", "--max-evaluations", "1"]).with(1, &["report: ", "report.html"]);
 }

@@ -1,16 +1,58 @@
-//! What the top-level tests share: shipped configurations, and the reference of the shield.
+//! What the top-level tests share. `program`: the binary as a process; `device`: small devices and their runs; `folder`: a
+//! run directory read back; `essence` and `whole`: what of it must be the same, and whether it is whole; `shield`: the
+//! shipped shield and its reference; `markup`: a strict reader of pages.
 
 #![allow(dead_code, reason = "every test binary uses its part")]
 
+pub(crate) mod device;
+pub(crate) mod essence;
+pub(crate) mod folder;
+pub(crate) mod markup;
+pub(crate) mod program;
+pub(crate) mod shield;
+pub(crate) mod whole;
+
 use std::path::PathBuf;
 
-use fluxmorph::config::{Config, Source};
-use fluxmorph::setup::{Purpose, Setup, set_up};
-use fluxmorph_geometry::fem::c64;
+use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 
 /// A file of the repository.
 pub(crate) fn repository(path: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// The text of a file of the repository.
+#[track_caller]
+pub(crate) fn repository_text(path: &str) -> String {
+    std::fs::read_to_string(repository(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// A text with changes `(from, to)`, each at the first place where `from` stands; it must stand somewhere.
+#[track_caller]
+pub(crate) fn changed(text: &str, changes: &[(&str, &str)]) -> String {
+    changes.iter().fold(text.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "no `{from}` in:\n{text}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// The text of a configuration with its mesh from `file` in millimetres, in place of the table `[mesh]`.
+#[track_caller]
+pub(crate) fn with_mesh_file(text: &str, file: &str) -> String {
+    let (before, rest) = text.split_once("[mesh]").expect("a mesh");
+    let (_, behind) = rest.split_once("[analysis]").expect("an analysis");
+    format!("{before}[mesh]\nfile = \"{file}\"\nunit = \"mm\"\n\n[analysis]{behind}")
+}
+
+/// Replaces what stands in a page of docs/ between the marks of a `name` by a table that was computed.
+pub(crate) fn write_into_page(page: &str, name: &str, table: &str) {
+    let [begin, end] = ["begin", "end"].map(|mark| format!("<!-- {name}:{mark} -->\n"));
+    let text = repository_text(page);
+    let (head, rest) = text.split_once(&begin).expect("the page has the first mark");
+    let (_, tail) = rest.split_once(&end).expect("the page has the second mark");
+    std::fs::write(repository(page), format!("{head}{begin}{table}{end}{tail}"))
+        .expect("the page can be written");
 }
 
 /// A shipped configuration with overrides `key=value`.
@@ -25,44 +67,25 @@ pub(crate) fn setup(name: &str, overrides: &[&str]) -> Setup {
     set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The independent reference of the shield (`tests/reference/shield.json`): B in the 12 observation cells.
-pub(crate) struct ShieldReference {
-    /// B of the flat plate [T], shape `(12, 3)`.
-    pub(crate) flat: Vec<[c64; 3]>,
-    /// B of the framed plate [T].
-    pub(crate) framed: Vec<[c64; 3]>,
-    /// The framed plate's design variables [m].
-    pub(crate) framed_design: Vec<f64>,
-    /// Where B was taken [m].
-    pub(crate) points: Vec<[f64; 3]>,
+/// A configuration of this text.
+pub(crate) fn parsed(text: &str) -> (Config, Source) {
+    Config::from_str(text, "test.toml").unwrap_or_else(|e| panic!("{e}"))
 }
 
-impl ShieldReference {
-    /// Reads the reference file.
-    pub(crate) fn read() -> Self {
-        let text = std::fs::read_to_string(repository("tests/reference/shield.json")).expect("it is there");
-        let json: serde_json::Value = serde_json::from_str(&text).expect("it is JSON");
-        let vectors = |value: &serde_json::Value| -> Vec<[f64; 3]> {
-            serde_json::from_value(value.clone()).expect("a list of vectors")
-        };
-        let complex = |case: &str| -> Vec<[c64; 3]> {
-            let (re, im) = (vectors(&json[case]["b_re_t"]), vectors(&json[case]["b_im_t"]));
-            re.iter().zip(&im).map(|(re, im)| std::array::from_fn(|d| c64::new(re[d], im[d]))).collect()
-        };
-        Self {
-            flat: complex("flat"),
-            framed: complex("framed"),
-            framed_design: serde_json::from_value(json["framed"]["design_m"].clone()).expect("a list"),
-            points: vectors(&json["points_m"]),
-        }
-    }
+/// The problem of a configuration of this text.
+pub(crate) fn setup_of(text: &str) -> Setup {
+    let (config, source) = parsed(text);
+    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Relative l2 difference of complex vectors.
-pub(crate) fn relative_l2(values: &[[c64; 3]], reference: &[[c64; 3]]) -> f64 {
-    assert_eq!(values.len(), reference.len());
-    let sum = |f: &dyn Fn(usize, usize) -> c64| -> f64 {
-        (0..values.len()).flat_map(|k| (0..3).map(move |d| (k, d))).map(|(k, d)| f(k, d).norm_sqr()).sum()
-    };
-    (sum(&|k, d| values[k][d] - reference[k][d]) / sum(&|k, d| reference[k][d])).sqrt()
+/// Euclidean norm.
+pub(crate) fn norm(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+/// `|a − b| / |b|`.
+#[track_caller]
+pub(crate) fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    norm(a.iter().zip(b).map(|(a, b)| a - b)) / norm(b.iter().copied())
 }

@@ -1,0 +1,229 @@
+//! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
+
+use fluxmorph_optimizer::config::{Algorithm, Optimizer};
+use fluxmorph_optimizer::driver::Optimised;
+use fluxmorph_optimizer::observer::{Evaluation, Silent};
+use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
+use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::session::{self, Options};
+use fluxmorph_optimizer::setup::{Purpose, set_up};
+
+use crate::problems::{analysed, initial, objective, optimised, try_optimised};
+use crate::support::folder::RunFolder;
+use crate::support::{self, config, parsed, repository_text, setup};
+
+/// The plate of the quick shield meshed, instead of an impedance surface.
+const MESHED: [(&str, &str); 4] = [
+    ("model = \"impedance\"", "model = \"volume\""),
+    ("skin = []", "skin = [\"1 mm\", \"4 mm\"]"),
+    ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
+    ("stiffness = \"inverse_size\"", "stiffness = \"inverse_volume\""),
+];
+
+const STATIC: (&str, &str) = ("frequency = \"60 Hz\"", "frequency = 0");
+
+/// The objective of the shipped shields.
+const SQUARED: &str = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
+
+/// The problem of a shipped configuration with changes `(from, to)` in its text, and the settings of its optimiser.
+fn changed(name: &str, changes: &[(&str, &str)]) -> (Problem, Optimizer) {
+    let (config, source) = parsed(&support::changed(&repository_text(&format!("configs/{name}")), changes));
+    let setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
+    (setup.problem, config.optimizer)
+}
+
+/// Runs a shipped configuration with changes `(from, to)` in its text and other settings of the optimiser.
+fn with(
+    name: &str,
+    changes: &[(&str, &str)],
+    settings: impl Fn(Optimizer) -> Optimizer,
+) -> (Optimised, Vec<Evaluation>) {
+    let (mut problem, own) = changed(name, changes);
+    optimised(&mut problem, &settings(own))
+}
+
+/// What a constraint measured at the best design.
+fn measured(run: &Optimised, index: usize) -> f64 {
+    run.best.analysis.constraints[index].value
+}
+
+#[test]
+fn a_limited_mass_is_kept_and_used_up_and_costs_shielding() {
+    let (run, rows) = with("shield_mass_limit.toml", &[], |s| s);
+    let ratio = run.best.objective / run.initial;
+    println!("{:?}: F/F0 {ratio:.4}, {:.6} kg", run.stop_reason, measured(&run, 0));
+    // Active at the optimum: all of the mass is used, but for what `ftol_rel` leaves.
+    assert!(measured(&run, 0) <= 2.5 * (1.0 + 1e-4) && measured(&run, 0) > 2.5 * (1.0 - 1e-2));
+    assert!(run.best.violation == 0.0 && ratio < 0.7, "{ratio}");
+    assert!(rows.iter().all(|row| row.constraints.keys().eq(["c_mass_plate"])));
+
+    let (free, _) = with("shield_quick.toml", &[], |s| Optimizer { max_evaluations: 12, ..s });
+    let best = free.best.objective / free.initial;
+    println!("without a limit: F/F0 {best:.4}");
+    assert!(best < ratio - 0.02, "the limit costs shielding");
+}
+
+#[test]
+fn every_method_with_constraints_keeps_them() {
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        let (run, _) =
+            with("shield_mass_limit.toml", &[], |s| Optimizer { algorithm, max_evaluations: 8, ..s });
+        println!("{algorithm:?}: F/F0 {:.4}, {:.6} kg", run.best.objective / run.initial, measured(&run, 0));
+        assert!(measured(&run, 0) <= 2.5 * (1.0 + 1e-6), "{algorithm:?}");
+        assert!(run.best.violation == 0.0 && run.best.objective < run.initial, "{algorithm:?}");
+    }
+}
+
+#[test]
+fn a_design_that_starts_outside_is_led_inside() {
+    // The flat plate has 2.26 kg.
+    let few = |s| Optimizer { max_evaluations: 12, ..s };
+    let (run, rows) = with("shield_mass_limit.toml", &[("\"2.5 kg\"", "\"2.2 kg\"")], few);
+    assert!(rows[0].constraints["c_mass_plate"] > 0.0);
+    println!("{:.6} kg after {} evaluations", measured(&run, 0), rows.len());
+    assert!(run.best.violation == 0.0 && run.best.evaluation > 0);
+}
+
+#[test]
+fn a_limit_that_no_design_keeps_ends_with_the_least_violation() {
+    // At its lower bound everywhere the plate has 1.13 kg.
+    let few = |s| Optimizer { max_evaluations: 8, ..s };
+    let (run, rows) = with("shield_mass_limit.toml", &[("\"2.5 kg\"", "\"1 kg\"")], few);
+    let least = rows.iter().map(|row| row.constraints["c_mass_plate"]).fold(f64::INFINITY, f64::min);
+    assert!(least > 0.1 && run.best.violation == least, "{least} {}", run.best.violation);
+}
+
+#[test]
+fn a_thickness_keeps_within_both_of_its_bounds() {
+    let bounds =
+        "[[constraints]]\nkind = \"thickness\"\nminimum = \"7 mm\"\nmaximum = \"20 mm\"\n[[constraints]]";
+    let (run, rows) = with("shield_mass_limit.toml", &[("[[constraints]]", bounds)], |s| s);
+    let columns: Vec<&str> = rows[0].constraints.keys().map(String::as_str).collect();
+    assert_eq!(columns, ["c_mass_plate", "c_thickness_maximum", "c_thickness_minimum"]);
+    let best = &rows[run.best.evaluation];
+    let (least, most) = (best.min_thickness_m.expect("a plate"), best.max_thickness_m.expect("a plate"));
+    println!("{:.3} to {:.3} mm, F/F0 {:.4}", least * 1e3, most * 1e3, best.ratio);
+    // The smooth bounds lie on the safe side of the true ones.
+    assert!(run.best.violation == 0.0 && least >= 7e-3 - 1e-9 && most <= 20e-3 + 1e-9 && best.ratio < 1.0);
+}
+
+#[test]
+fn a_field_may_be_limited_relative_to_the_initial_design() {
+    let limit = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 1.01\n[design]";
+    let few = |s| Optimizer { max_evaluations: 12, ..s };
+    let (run, rows) = with("shield_quick.toml", &[("[design]", limit)], few);
+    println!("loss {:.3} of {:.3} W", measured(&run, 0), run.bounds[0].value);
+    assert!(
+        (rows[0].constraints["c_loss_plate"] + 0.01 / 1.01).abs() < 1e-12,
+        "the initial design is the measure"
+    );
+    assert!(run.best.violation == 0.0 && measured(&run, 0) <= run.bounds[0].value * (1.0 + 1e-6));
+    assert!(run.best.objective < run.initial);
+}
+
+#[test]
+fn a_loss_can_be_made_large_and_small() {
+    let few = |s| Optimizer { max_evaluations: 5, ..s };
+    let of = |goal: &str| {
+        let goal = format!("kind = \"loss\"\nregion = \"plate\"\ngoal = \"{goal}\"\n");
+        with("shield_quick.toml", &[(SQUARED, goal.as_str())], few)
+    };
+    let ((large, rows), (small, _)) = (of("maximise"), of("minimise"));
+    let (initial, most, least) = (large.initial, large.best.objective, small.best.objective);
+    println!("loss {initial:.2} W, at most {most:.2}, at least {least:.2}");
+    assert!(
+        most > initial && rows.iter().all(|row| row.objective <= most),
+        "the history shows the loss itself"
+    );
+    assert!(least < initial && small.initial == initial);
+}
+
+#[test]
+fn a_negative_objective_is_optimised_both_ways() {
+    // B_z behind the plate in statics, seen from the other side: below zero.
+    let few = |s| Optimizer { max_evaluations: 5, ..s };
+    let of = |goal: &str| {
+        let component = "kind = \"field_component\"\nregion = \"observation\"\ndirection = [0, 0, -1]\n";
+        let objective = format!("{component}goal = \"{goal}\"\n");
+        let changes = [&[(SQUARED, objective.as_str()), STATIC], &MESHED[..]].concat();
+        with("shield_quick.toml", &changes, few).0
+    };
+    let (up, down) = (of("maximise"), of("minimise"));
+    println!("{:e}: up to {:e}, down to {:e}", up.initial, up.best.objective, down.best.objective);
+    assert!(up.initial < 0.0 && up.best.objective > up.initial && down.best.objective < down.initial);
+}
+
+#[test]
+fn a_run_at_two_frequencies_writes_both() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let overrides = [
+        format!("output.directory={:?}", folder.path().join("run")),
+        "optimizer.max_evaluations=3".to_owned(),
+    ];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let (config, source) = config("shield_two_frequencies.toml", &overrides);
+    let disk = system_disk();
+    let older_run = OlderRun::Keep;
+    let options = Options { disk: &disk, older_run, threads: 1, team: None, interrupted: &|| false };
+    let result: RunResult =
+        session::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(result.frequencies_hz, [60.0, 200.0]);
+    let frequencies: Vec<f64> = result.states.iter().map(|state| state.frequency_hz).collect();
+    assert_eq!(frequencies, result.frequencies_hz);
+    assert_eq!((&result.states[0].losses_w, &result.states[0].probes), (&result.losses_w, &result.probes));
+    // Below saturation the loss of thick steel under a given current grows faster than the square root of the frequency.
+    assert!(result.states[1].losses_w["plate"] > 1.8 * result.losses_w["plate"]);
+    let objective = result.objective.as_ref().expect("an objective");
+    let sum: f64 = objective.terms.iter().map(|term| term.weight * term.value).sum();
+    assert!((sum / objective.best - 1.0).abs() < 1e-14);
+    let contents = RunFolder(folder.path().join("run")).field(0);
+    println!("{:?}", contents.cell_data.keys().collect::<Vec<_>>());
+    for name in ["B_re", "loss_density", "B_re_200Hz", "loss_density_200Hz"] {
+        assert!(contents.cell_data.contains_key(name), "{name}");
+    }
+}
+
+#[test]
+fn a_field_of_two_frequencies_is_that_of_each_alone() {
+    // With a factor of its own each: the same bits.
+    let alone = "analysis.linear_solver.reuse=\"never\"";
+    let both = setup("shield_two_frequencies.toml", &[alone]).problem;
+    let p = initial(&both);
+    let terms = analysed(&both, &p).terms;
+    let one = setup("shield_quick.toml", &["analysis.frequency=\"200 Hz\""]).problem;
+    assert_eq!(terms[1], objective(&one, &p));
+}
+
+#[test]
+fn loss_and_energy_are_those_of_the_field() {
+    // The loss is the sum that the results report; in statics the energy is half the work of the source on the field,
+    // ½ ∫ A·J = ½ Re(uᵀf), but for the penalty's share of it, ½ ∫ ν (div A)².
+    let loss = (SQUARED, "kind = \"loss\"\nregion = \"plate\"\n");
+    for changes in [&[loss][..], &[&[loss], &MESHED[..]].concat()] {
+        let problem = changed("shield_quick.toml", changes).0;
+        let analysis = analysed(&problem, &initial(&problem));
+        let sum = analysis.solutions[0].losses(&problem.states[0], &analysis.mesh)[0].1;
+        println!("loss {sum:.4} W");
+        assert!((analysis.objective.expect("a loss") / sum - 1.0).abs() < 1e-12);
+    }
+    let energy = [(SQUARED, "kind = \"energy\"\n"), STATIC];
+    let problem = changed("shield_quick.toml", &[&energy, &MESHED[..]].concat()).0;
+    let analysis = analysed(&problem, &initial(&problem));
+    let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
+    let load = model.load(&analysis.mesh);
+    let work: f64 = 0.5 * load.iter().zip(solution.values()).map(|(f, u)| (f * u).re).sum::<f64>();
+    let energy = analysis.objective.expect("an energy");
+    println!("energy {energy:.4} J, half the work {work:.4} J");
+    assert!(energy < work * (1.0 + 1e-9) && energy > 0.97 * work);
+}
+
+#[test]
+fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
+    let limit = "[[constraints]]\nkind = \"field_component\"\nregion = \"observation\"\ndirection = [0, 0, -1]\n\
+                 upper_ratio = 0.9\n[design]";
+    // Without layers in the plate.
+    let changes = [&[("[design]", limit), STATIC, MESHED[0]], &MESHED[2..]].concat();
+    let (mut problem, settings) = changed("shield_quick.toml", &changes);
+    let text = try_optimised(&mut problem, &settings).0.expect_err("no share").to_string();
+    assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
+}

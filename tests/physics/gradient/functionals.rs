@@ -1,0 +1,130 @@
+//! Every kind of objective and constraint, in statics and harmonics, with a meshed plate and with its impedance surface.
+
+use std::io::Write;
+
+use fluxmorph_optimizer::config::Config;
+use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::setup::{Purpose, set_up};
+
+use super::{MESHED, Settings, certify_all, check, wavy};
+use crate::problems::analysed;
+use crate::support::folder::read_text;
+use crate::support::shield::quick;
+
+/// The quick shield with another objective, constraints and overrides.
+fn problem(objective: &str, constraints: &str, frequency: &str, overrides: &[&str]) -> Problem {
+    let text = read_text(&quick()).replace("frequency = \"60 Hz\"", frequency);
+    let (start, rest) = text.split_once("[objective]").expect("it has an objective");
+    let (_, end) = rest.split_once("[design]").expect("a design follows");
+    let mut file = tempfile::Builder::new().suffix(".toml").tempfile().expect("a temporary file");
+    write!(file, "{start}[objective]\n{objective}\n{constraints}\n[design]{end}").expect("written");
+    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+    let (config, source) = Config::from_file(file.path(), &overrides).unwrap_or_else(|e| panic!("{e}"));
+    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}")).problem
+}
+
+/// The certificates of the objective and of every constraint, on a design that is flat nowhere.
+fn all_hold(problem: &Problem) {
+    let settings = Settings { directions: 2, ..Settings::default() };
+    let certificates = certify_all(problem, &wavy(problem), &settings, |_, _, _| {});
+    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
+    println!("objective {:e}", certificates.objective.objective);
+    check(&certificates.objective);
+    for named in &certificates.constraints {
+        println!("{} {:e}", named.name, named.certificate.objective);
+        check(&named.certificate);
+    }
+}
+
+/// Constraints on what does not need eddy currents.
+const FIELD: &str = r#"
+[[constraints]]
+kind = "uniformity"
+region = "observation"
+target = ["0 T", "1 mT", "5 mT"]
+upper_ratio = 0.9
+[[constraints]]
+kind = "field_component"
+region = "observation"
+direction = [0.2, -0.1, 1.0]
+upper = "1 T"
+[[constraints]]
+kind = "energy"
+upper = "1 kJ"
+[[constraints]]
+name = "energy_around"
+kind = "energy"
+region = "remesh"
+upper = "1 kJ"
+"#;
+
+/// Constraints on the loss and on the shape.
+const REST: &str = r#"
+[[constraints]]
+kind = "loss"
+region = "plate"
+upper = "1 kW"
+[[constraints]]
+kind = "volume"
+region = "plate"
+upper_ratio = 1.1
+[[constraints]]
+kind = "thickness"
+minimum = "8 mm"
+maximum = "15 mm"
+"#;
+
+const OBSERVED: &str = "region = \"observation\"";
+
+#[test]
+fn every_kind_is_exact_in_the_volume_model() {
+    all_hold(&problem(OBSERVED, &format!("{FIELD}{REST}"), "frequency = 60", &MESHED));
+}
+
+#[test]
+fn every_kind_is_exact_in_the_impedance_model() {
+    all_hold(&problem(OBSERVED, &format!("{FIELD}{REST}"), "frequency = 60", &[]));
+}
+
+#[test]
+fn every_kind_is_exact_in_statics() {
+    let inside =
+        "[[constraints]]\nkind = \"energy\"\nregion = \"plate\"\nname = \"inside\"\nupper = \"1 J\"\n";
+    all_hold(&problem(OBSERVED, &format!("{FIELD}{inside}"), "frequency = 0", &MESHED));
+}
+
+/// Two frequencies; one term at each and one at both, with weights that make them alike in size.
+const SUM: &str = r#"goal = "maximise"
+[[objective.terms]]
+region = "observation"
+weight = -1e3
+[[objective.terms]]
+kind = "loss"
+region = "plate"
+frequency = "60 Hz"
+weight = -1e-2
+[[objective.terms]]
+kind = "energy"
+frequency = "200 Hz"
+weight = -0.1
+"#;
+
+const TWICE: &str = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper = \"1 kW\"\n\
+                     [[constraints]]\nkind = \"loss\"\nname = \"at_200\"\nregion = \"plate\"\nupper = \"1 kW\"\n\
+                     frequency = \"200 Hz\"\n";
+
+#[test]
+fn sums_over_two_frequencies_are_exact() {
+    let problem = problem(SUM, TWICE, "frequencies = [60, 200]", &[]);
+    assert_eq!(problem.states.len(), 2);
+    let analysis = analysed(&problem, &wavy(&problem));
+    let terms = &problem.objective.as_ref().expect("an objective").terms;
+    for (term, value) in terms.iter().zip(&analysis.terms) {
+        println!("{}: {:e}", term.label.kind, term.weight * value);
+        assert!(
+            term.weight * value / analysis.objective.expect("an objective") > 0.05,
+            "every term has a say"
+        );
+    }
+    all_hold(&problem);
+}

@@ -1,0 +1,146 @@
+//! The gradient through the whole chain p → mesh → field → F, against Taylor's theorem and central differences.
+
+use fluxmorph_geometry::NodeId;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
+use fluxmorph_remesh::Moved;
+
+use crate::problems::{initial, variables};
+use crate::support::folder::read_text;
+use crate::support::shield::quick;
+use crate::support::{changed, setup, setup_of};
+
+mod functionals;
+mod sources;
+
+/// Small meshes: the exactness of a discrete gradient does not depend on the mesh.
+const MESHED: [&str; 5] = [
+    "regions.plate.model=\"volume\"",
+    "mesh.shield.skin=[\"1 mm\", \"4 mm\"]",
+    "remesh.region=[\"plate\", \"remesh\"]",
+    "remesh.stiffness=\"inverse_volume\"",
+    "remesh.poisson=0.1",
+];
+
+fn holds(problem: &Problem, p: &[f64]) {
+    check_in_five(&certify(problem, p, &Settings::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}")));
+}
+
+fn check(certificate: &Certificate) {
+    for direction in &certificate.directions {
+        println!(
+            "slope {:.4}, central difference {:.2e} of {:.1e}",
+            direction.slope, direction.error, direction.adjoint
+        );
+    }
+    assert!(certificate.holds, "slope {}, error {:e}", certificate.least_slope, certificate.largest_error);
+    assert!(certificate.directions[0].steps.len() >= 6);
+}
+
+/// As [`check`], with the number of directions that one function alone is measured in.
+fn check_in_five(certificate: &Certificate) {
+    check(certificate);
+    assert!(certificate.directions.len() >= 5);
+}
+
+/// dF/dx against the motion of every node that the elastic map may move, each on its own.
+fn node_gradient_holds(problem: &Problem) {
+    let shape = problem.shape.as_ref().expect("a shape");
+    let at = problem.moved(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
+    let mesh = at.mesh.clone();
+    let base = problem.analyse(&wavy(problem), at.clone(), Want::Gradient).unwrap_or_else(|e| panic!("{e}"));
+    let objective = base.objective.expect("an objective");
+    let gradient: Vec<f64> = base.sensitivity.expect("it was asked for").into_iter().flatten().collect();
+    // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
+    let moves = |k: usize| {
+        let node = NodeId::new(k / 3);
+        shape.motion.map().is_unknown(node, k % 3) || shape.surface.nodes().binary_search(&node).is_ok()
+    };
+    let span: Vec<f64> = (0..gradient.len()).map(|k| if moves(k) { 1e-5 } else { 0.0 }).collect();
+    let settings = Settings { first_step: 1.0, difference_step: 0.01, ..Settings::default() };
+    let value = |v: &[f64]| -> Result<f64, Error> {
+        let moved = mesh.moved(v.as_chunks::<3>().0)?;
+        Ok(problem
+            .analyse(&wavy(problem), Moved { mesh: moved, ..at.clone() }, Want::Value)?
+            .objective
+            .expect("an objective"))
+    };
+    let zero = vec![0.0; gradient.len()];
+    let certificate = measure(&value, &zero, objective, &gradient, &span, &settings, |_, _| {});
+    check_in_five(&certificate.unwrap_or_else(|e| panic!("{e}")));
+}
+
+/// A design inside the bounds that is flat nowhere.
+fn wavy(problem: &Problem) -> Vec<f64> {
+    (0..variables(problem)).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
+}
+
+#[test]
+fn the_gradient_is_exact_in_both_models_flat_and_wavy() {
+    for overrides in [&[][..], &MESHED] {
+        let problem = setup("shield_quick.toml", overrides).problem;
+        holds(&problem, &initial(&problem));
+        holds(&problem, &wavy(&problem));
+        node_gradient_holds(&problem);
+    }
+}
+
+#[test]
+fn the_gradient_is_exact_with_another_penalty_weighting_frequency_grid_and_force() {
+    let meshed: [&[&str]; 2] = [
+        &["analysis.penalty=0.3", "objective.weighting=\"volume\""],
+        &["analysis.frequency=\"0 Hz\"", "remesh.motion=\"along_design\"", "design.grid=[2, 3]"],
+    ];
+    let forced = ["remesh.force=[0.0, 0.0, 2e-6]", "remesh.stiffness=\"uniform\"", "design.grid=[13, 25]"];
+    for overrides in meshed.map(|more| [&MESHED[..], more].concat()).into_iter().chain([forced.to_vec()]) {
+        let problem = setup("shield_quick.toml", &overrides).problem;
+        holds(&problem, &wavy(&problem));
+    }
+}
+
+/// The quick shield with another `[design]` in place of its direction and grid.
+fn designed(design: &str, overrides: &[(&str, &str)]) -> Problem {
+    let mut text = read_text(&quick());
+    let start = text.find("direction = [").expect("a direction");
+    let end = text.find("lower = \"-5 mm\"").expect("a bound");
+    text.replace_range(start..end, &format!("{design}\n"));
+    setup_of(&changed(&text, overrides)).problem
+}
+
+const FILTERED: &str = "direction = \"normal\"\nfilter_radius = \"50 mm\"";
+
+#[test]
+fn the_gradient_is_exact_with_filtered_nodes_along_normals() {
+    let meshed =
+        [("model = \"impedance\"", "model = \"volume\""), ("\"remesh\"\n", "[\"plate\", \"remesh\"]\n")];
+    for overrides in [&[][..], &meshed] {
+        let problem = designed(FILTERED, overrides);
+        holds(&problem, &wavy(&problem));
+    }
+}
+
+#[test]
+fn the_gradient_is_exact_with_tied_nodes_and_a_fixed_rim() {
+    let free = designed("direction = [0, 0, -1]", &[]);
+    let tied = designed(
+        "direction = [0, 0, -1]\nfilter_radius = \"50 mm\"\nrim = \"fixed\"\n\
+         symmetry = [{ axis = \"y\", at = \"120 mm\" }]",
+        &[],
+    );
+    let [few, many] = [&tied, &free].map(variables);
+    assert!(2 * few < many + 20, "{few} of {many}");
+    holds(&tied, &wavy(&tied));
+    holds(&free, &wavy(&free));
+}
+
+#[test]
+fn normals_of_the_flat_plate_are_its_direction() {
+    let (along, normal) = (designed("direction = [0, 0, -1]", &[]), designed("direction = \"normal\"", &[]));
+    let p = wavy(&along);
+    let meshes = [&along, &normal].map(|problem| problem.moved(&p).expect("inside the bounds").mesh);
+    for (a, b) in meshes[0].points().iter().zip(meshes[1].points()) {
+        // Normals of flat triangles, carried through the elastic system: rounding of points below a metre.
+        assert!((0..3).all(|d| (a[d] - b[d]).abs() < 1e-14), "{a:?} {b:?}");
+    }
+}

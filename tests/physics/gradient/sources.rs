@@ -1,0 +1,203 @@
+//! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
+
+use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
+use fluxmorph_optimizer::verify::{Settings, certify_all};
+
+use super::{MESHED, check, wavy};
+use crate::problems::variables;
+use crate::support::{changed, parsed, setup, setup_of};
+
+/// Two directions: the chain is that of the linear elements, which are measured in five.
+fn brief() -> Settings {
+    Settings { directions: 2, ..Settings::default() }
+}
+
+fn all_hold(setup: &Setup, p: &[f64], settings: &Settings) {
+    let certificates =
+        certify_all(&setup.problem, p, settings, |_, _, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    check(&certificates.objective);
+    for constraint in &certificates.constraints {
+        println!("{}", constraint.name);
+        check(&constraint.certificate);
+    }
+}
+
+#[test]
+fn the_gradient_of_quadratic_elements_is_exact_around_an_impedance_surface() {
+    let setup = setup("shield_quick.toml", &["analysis.order=2", "mesh.shield.refinement=0.3"]);
+    all_hold(&setup, &wavy(&setup.problem), &brief());
+}
+
+#[test]
+fn the_gradient_of_quadratic_elements_is_exact_in_a_conductor_and_for_its_loss() {
+    let mut overrides = MESHED.to_vec();
+    overrides.extend([
+        "analysis.order=2",
+        "analysis.penalty=0.4",
+        "mesh.shield.refinement=0.25",
+        "mesh.shield.skin=[\"2 mm\"]",
+        "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]",
+    ]);
+    let setup = setup("shield_quick.toml", &overrides);
+    all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..brief() });
+}
+
+/// A magnet above an iron plate; the magnet's lower face moves, and the field energy of magnet and gap with it.
+fn magnet(order: u8) -> String {
+    format!(
+        r#"
+        [mesh]
+        generator = "boxes"
+        [mesh.boxes]
+        box = [[0, 0, "-30 mm"], ["40 mm", "40 mm", "50 mm"]]
+        growth = 2
+        [[mesh.boxes.regions]]
+        name = "gap"
+        box = [[0, 0, 0], ["20 mm", "20 mm", "10 mm"]]
+        size = "5 mm"
+        [[mesh.boxes.regions]]
+        name = "magnet"
+        box = [[0, 0, "10 mm"], ["10 mm", "10 mm", "20 mm"]]
+        [[mesh.boxes.regions]]
+        name = "around"
+        box = [["10 mm", 0, "10 mm"], ["20 mm", "20 mm", "20 mm"]]
+        [[mesh.boxes.regions]]
+        name = "iron"
+        box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", 0]]
+        [[mesh.boxes.regions]]
+        name = "observation"
+        box = [[0, 0, "-20 mm"], ["20 mm", "20 mm", "-10 mm"]]
+        [analysis]
+        frequency = 0
+        order = {order}
+        [materials.iron]
+        relative_permeability = 200
+        [materials.ferrite]
+        relative_permeability = 1.05
+        [regions.iron]
+        material = "iron"
+        [regions.magnet]
+        material = "ferrite"
+        remanence = ["0.1 T", 0, "0.4 T"]
+        [boundaries]
+        flux_parallel = ["x_max", "y_max", "z_min", "z_max"]
+        [objective]
+        kind = "flux_density_squared"
+        weighting = "volume"
+        region = "observation"
+        [[constraints]]
+        kind = "energy"
+        upper_ratio = 2
+        [[constraints]]
+        kind = "energy"
+        name = "magnet_alone"
+        region = "magnet"
+        upper_ratio = 2
+        [design]
+        surface = "magnet|gap"
+        direction = [0, 0, -1]
+        lower = "-2 mm"
+        upper = "2 mm"
+        [remesh]
+        region = ["magnet", "gap"]
+        free = ["magnet|around", "gap|around"]
+        slide = ["x_min", "y_min"]
+        "#
+    )
+}
+
+#[test]
+fn the_gradient_with_a_magnet_that_moves_is_exact() {
+    for order in [1, 2] {
+        let setup = setup_of(&magnet(order));
+        let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
+        assert_eq!(setup.problem.constraints.len(), 2);
+        all_hold(&setup, &p, &brief());
+    }
+}
+
+/// A block of metal in a uniform field, whose upper face moves: every kind of function of the field.
+const APPLIED: &str = r#"
+    [mesh]
+    generator = "boxes"
+    [mesh.boxes]
+    box = [[0, 0, 0], ["40 mm", "40 mm", "40 mm"]]
+    growth = 2
+    [[mesh.boxes.regions]]
+    name = "around"
+    box = [[0, 0, 0], ["15 mm", "15 mm", "15 mm"]]
+    size = "5 mm"
+    [[mesh.boxes.regions]]
+    name = "block"
+    box = [[0, 0, 0], ["10 mm", "10 mm", "10 mm"]]
+    [[mesh.boxes.regions]]
+    name = "observation"
+    box = [[0, 0, "20 mm"], ["10 mm", "10 mm", "25 mm"]]
+    [analysis]
+    frequency = "200 Hz"
+    order = 2
+    [materials.metal]
+    relative_permeability = 3
+    conductivity = "1e7 S/m"
+    density = "7 g/cm3"
+    [regions.block]
+    material = "metal"
+    [boundaries]
+    flux_parallel = ["x_min", "y_min"]
+    flux_normal = ["z_min"]
+    uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = [0, 0, "0.1 T"] }
+    [objective]
+    kind = "uniformity"
+    weighting = "volume"
+    region = "observation"
+    target = [0, 0, "0.12 T"]
+    [[constraints]]
+    kind = "field_component"
+    region = "observation"
+    direction = [1, 0, 2]
+    upper_ratio = 2
+    [[constraints]]
+    kind = "energy"
+    upper_ratio = 2
+    [[constraints]]
+    kind = "loss"
+    region = "block"
+    upper_ratio = 2
+    [[constraints]]
+    kind = "mass"
+    region = "block"
+    upper_ratio = 2
+    [design]
+    surface = "block|around"
+    direction = "normal"
+    lower = "-1 mm"
+    upper = "1 mm"
+    [remesh]
+    region = ["block", "around"]
+    slide = ["x_min", "y_min", "z_min"]
+"#;
+
+#[test]
+fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
+    let setup = setup_of(APPLIED);
+    let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
+    assert_eq!(setup.problem.constraints.len(), 4);
+    all_hold(&setup, &p, &brief());
+}
+
+#[test]
+fn conditions_on_planes_and_faces_that_cannot_hold_are_refused() {
+    for (from, to, says) in [
+        // Nothing lets the nodes on z = 0 slide in it: as a free face they would leave it.
+        (
+            r#"slide = ["x_min", "y_min", "z_min"]"#,
+            "slide = [\"x_min\", \"y_min\"]\nfree = [\"z_min\"]",
+            "at right angles to z would lose its nodes",
+        ),
+        (r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#, "share the face"),
+    ] {
+        let (config, source) = parsed(&changed(APPLIED, &[(from, to)]));
+        let error = set_up(&config, &source, Purpose::Optimisation).err().expect(says).to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}

@@ -1,0 +1,22 @@
+//! Numbers: fields, losses and gradients against closed forms, references, finite differences and published tables, through
+//! the library and the binary. `--nocapture` prints what each test measures.
+//!
+//! `convergence`: fitted orders, the matrix against its weak form; `verification`: the rows of docs/verification.md;
+//! `gradient`: Taylor remainders of the whole chain; `paper`, `gallery`: the shipped configurations; `constraints`,
+//! `solvers`, `starts`: what must not change a result; `guards`: numerical failures.
+
+mod constraints;
+mod convergence;
+mod gallery;
+mod gradient;
+mod guards;
+mod meshes;
+mod orders;
+mod paper;
+mod problems;
+mod references;
+mod solvers;
+mod starts;
+#[path = "../support/mod.rs"]
+mod support;
+mod verification;

@@ -1,0 +1,163 @@
+//! All ways to solve the linear systems give one field, one objective and one gradient; so do factors and solutions that
+//! are kept from design to design.
+
+use fluxmorph_optimizer::memory::Memory;
+use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
+use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
+
+use crate::problems::variables;
+use crate::support::{norm, relative_difference, setup};
+
+/// A meshed plate, coarse: skin layers, ψ, interfaces.
+const MESHED: (&str, &[&str]) = (
+    "shield.toml",
+    &["mesh.shield.refinement=0.3", "mesh.shield.growth=2.5", "mesh.shield.skin=[4e-4,1.2e-3,2.5e-3,5e-3]"],
+);
+
+/// Deviation of objective and gradient that solutions to 1e-11 leave: the adjoint weighs a residual by far less than the
+/// 1e3 in between.
+const SAME: f64 = 1e-8;
+
+fn problem((name, settings): (&str, &[&str]), more: &[&str]) -> Problem {
+    let settings: Vec<&str> = settings.iter().chain(more).copied().collect();
+    setup(name, &settings).problem
+}
+
+/// A design in the middle of nowhere, `step` times away from flat.
+fn design(problem: &Problem, step: f64) -> Vec<f64> {
+    (0..variables(problem)).map(|k| 1e-3 * step * (1.0 + (k as f64).sin())).collect()
+}
+
+fn evaluated(problem: &Problem, memory: &mut Memory, step: f64) -> Analysis {
+    let p = design(problem, step);
+    problem.evaluate_with(memory, &p, Want::Gradient).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Relative deviation of objective and gradient.
+fn deviation(a: &Analysis, b: &Analysis) -> f64 {
+    let objective = |a: &Analysis| a.objective.expect("an objective");
+    let gradient = |a: &Analysis| a.gradient.clone().expect("asked for");
+    let gradient = relative_difference(&gradient(a), &gradient(b));
+    gradient.max((objective(a) / objective(b) - 1.0).abs())
+}
+
+fn every_method_agrees(case: (&str, &[&str]), more: &[&str], methods: &[Method]) {
+    let of = |method: Method| {
+        let setting = format!("analysis.linear_solver.method=\"{}\"", method.name());
+        let settings: Vec<&str> = more.iter().copied().chain([setting.as_str()]).collect();
+        let problem = problem(case, &settings);
+        let analysis = evaluated(&problem, &mut Memory::default(), 1.0);
+        assert!(analysis.worst_residual <= 1e-9, "{method:?}: {:e}", analysis.worst_residual);
+        assert!(analysis.solver_events.is_empty(), "{method:?}: {:?}", analysis.solver_events);
+        analysis
+    };
+    let direct = of(Method::Direct);
+    for &method in methods {
+        let deviation = deviation(&of(method), &direct);
+        assert!(deviation < SAME, "{method:?} differs by {deviation:e}");
+    }
+}
+
+const FACTORS: [Method; 4] =
+    [Method::DirectSingle, Method::RealFactor, Method::RealFactorSingle, Method::Incomplete];
+
+#[test]
+fn every_method_gives_the_same_objective_and_gradient_with_eddy_currents() {
+    every_method_agrees(MESHED, &[], &FACTORS);
+}
+
+#[test]
+fn every_method_gives_the_same_objective_and_gradient_with_an_impedance_surface() {
+    every_method_agrees(("shield_quick.toml", &[]), &[], &FACTORS);
+}
+
+#[test]
+fn every_method_gives_the_same_objective_and_gradient_in_statics() {
+    every_method_agrees(MESHED, &["analysis.frequency=0"], &FACTORS);
+}
+
+#[test]
+fn two_levels_give_the_same_objective_and_gradient_of_quadratic_elements() {
+    every_method_agrees(("shield_quick.toml", &[]), &["analysis.order=2"], &[Method::TwoLevel]);
+}
+
+/// Factors serve several designs.
+const REUSED: &str = "analysis.linear_solver.reuse=while_it_pays";
+
+#[test]
+fn designs_that_share_factors_and_solutions_have_the_results_of_their_own() {
+    let problem = problem(MESHED, &[REUSED]);
+    let mut memory = Memory::default();
+    let (mut kept, mut own) = (0, 0);
+    for step in [0.0, 1.0, 3.0, 3.5, 3.6, 3.61] {
+        let shared = evaluated(&problem, &mut memory, step);
+        let cold = evaluated(&problem, &mut Memory::default(), step);
+        let deviation = deviation(&shared, &cold);
+        assert!(deviation < SAME, "after {step} mm: {deviation:e}");
+        assert!(shared.worst_residual <= 1e-9);
+        if shared.linear_iterations > cold.linear_iterations { kept += 1 } else { own += 1 }
+    }
+    // Both happen on the way, or the test says nothing.
+    assert!(kept > 0 && own > 0, "{kept} kept, {own} of their own");
+}
+
+#[test]
+fn a_factor_serves_a_frequency_close_by() {
+    let problem = problem(MESHED, &[REUSED]);
+    let (mesh, at_60) = (&problem.original, &problem.states[0]);
+    let at_61 = at_60.at_frequency(mesh, 61.0).expect("a frequency above zero");
+    let solved = |model: &FieldModel, memory: &mut LinearSolverCache| {
+        let mut system = model.prepare_with(model.assemble(mesh), memory).expect("a regular system");
+        let field = model.solve_prepared(&mut system, &model.load(mesh)).expect("it converges");
+        (field, system.into_cache())
+    };
+    let (_, memory) = solved(at_60, &mut LinearSolverCache::default());
+    let (shared, _) = solved(&at_61, &mut memory.without_initial_guess());
+    let (own, _) = solved(&at_61, &mut LinearSolverCache::default());
+    let (shared_count, own_count) = (shared.report().iterations, own.report().iterations);
+    assert!(shared_count > own_count, "{shared_count} iterations, {own_count} with an own factor");
+    let difference = norm(shared.values().iter().zip(own.values()).map(|(a, b)| (a - b).norm()));
+    assert!(difference < SAME * norm(own.values().iter().map(|v| v.norm())));
+}
+
+#[test]
+fn what_is_shared_between_frequencies_changes_no_result() {
+    const TWO: (&str, &[&str]) = ("shield_two_frequencies.toml", &[]);
+    let of = |reuse: &str| {
+        let setting = format!("analysis.linear_solver.reuse=\"{reuse}\"");
+        evaluated(&problem(TWO, &[&setting]), &mut Memory::default(), 1.0)
+    };
+    let deviation = deviation(&of("while_it_pays"), &of("never"));
+    assert!(deviation < SAME, "{deviation:e}");
+}
+
+#[test]
+fn a_method_that_does_not_converge_is_followed_by_a_more_robust_one() {
+    let problem = problem(MESHED, &[REUSED]);
+    let (mesh, model) = (&problem.original, &problem.states[0]);
+    let setup = |max_iterations| FieldModelSetup {
+        linear_solver: LinearSolverSettings {
+            method: LinearSolver::Fixed(Method::Incomplete),
+            max_iterations,
+            ..LinearSolverSettings::default()
+        },
+        ..model.setup().clone()
+    };
+    // Five iterations are too few for all but a complete factor of the matrix itself.
+    let hasty = FieldModel::new(mesh, setup(Some(5))).expect("a field model");
+    let (field, system) = hasty.solve(mesh).expect("the last of them converges");
+    assert_eq!(system.method(), Some(Method::Direct));
+    let steps: Vec<(Method, Method)> =
+        system.events().iter().map(|SolverEvent::FellBack { from, to, .. }| (*from, *to)).collect();
+    let ladder = [Method::Incomplete, Method::RealFactorSingle, Method::RealFactor, Method::Direct];
+    assert_eq!(steps, ladder.windows(2).map(|w| (w[0], w[1])).collect::<Vec<_>>());
+    assert!(field.report().residual <= 1e-9);
+
+    // Without memory for any factor there is nothing to fall back to.
+    let mut small = setup(Some(5));
+    small.linear_solver.factor_bytes = 1;
+    let error =
+        FieldModel::new(mesh, small).expect("a field model").solve(mesh).expect_err("it is too hasty");
+    assert!(matches!(error, SolverError::NotConverged { .. }), "{error}");
+}

@@ -1,0 +1,59 @@
+//! Small devices run through the library, on any disk; a run takes milliseconds.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use fluxmorph::config::{Config, Source};
+use fluxmorph::observer::Silent;
+use fluxmorph::output::{Disk, OlderRun, RunResult};
+use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph_optimizer::Error;
+
+use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS};
+use crate::support::{self, changed, parsed};
+
+/// Where the runs write.
+pub(crate) const FOLDER: &str = "/runs/block";
+
+fn into_folder((mut config, source): (Config, Source)) -> (Config, Source) {
+    config.output.directory = PathBuf::from(FOLDER);
+    (config, source)
+}
+
+/// The block with some texts replaced.
+pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, Source) {
+    into_folder(parsed(&changed(BLOCK, changes)))
+}
+
+/// The block with a bound on its volume.
+pub(crate) fn constrained() -> (Config, Source) {
+    block(&[CONSTRAINT])
+}
+
+/// The block with steps so cautious that the mesh has several references.
+pub(crate) fn with_rounds() -> (Config, Source) {
+    block(&[
+        ROUNDS,
+        ("max_evaluations = 6", "max_evaluations = 12"),
+        ("ftol_rel = 0", "ftol_rel = 1e-4"),
+        ("verify_refinement = 0", "verify_refinement = 0\nfields = \"improved\""),
+    ])
+}
+
+/// A shipped configuration.
+pub(crate) fn shipped(name: &str) -> (Config, Source) {
+    into_folder(support::config(name, &[]))
+}
+
+/// Runs a configuration from its start.
+pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, Source)) -> Result<RunResult, Error> {
+    let options =
+        Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
+    session::run(config, source, options, &mut Silent)
+}
+
+/// Goes on with the run on a disk.
+pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
+    let options = Options { disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
+    session::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
+}

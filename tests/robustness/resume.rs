@@ -1,0 +1,114 @@
+//! Runs cut at every evaluation, and cut again.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use fluxmorph::config::{Config, Source};
+use fluxmorph::journal;
+use fluxmorph::output::Disk;
+use fluxmorph::session::Limits;
+
+use crate::disk::SimulatedDisk;
+use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, with_rounds};
+use crate::support::essence::{Essence, assert_same, essence};
+
+/// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
+fn cut_behind(files: &BTreeMap<PathBuf, Vec<u8>>, evaluations: usize) -> SimulatedDisk {
+    let disk = SimulatedDisk::default();
+    disk.create_dir(&Path::new(FOLDER).join("fields")).expect("made");
+    for (path, bytes) in files {
+        // What is written at the end is not there yet.
+        let name = path.to_string_lossy();
+        if name == "result.json" || name.starts_with("optimum") {
+            continue;
+        }
+        let bytes = match name.as_ref() {
+            "journal.jsonl" => cut_journal(bytes, evaluations),
+            "manifest.json" => {
+                String::from_utf8_lossy(bytes).replace("\"stopped\"", "\"running\"").into_bytes()
+            }
+            _ => bytes.clone(),
+        };
+        let mut file = disk.create(&Path::new(FOLDER).join(path)).expect("made");
+        file.write_all(&bytes).expect("written");
+    }
+    disk
+}
+
+/// The header and so many records of a journal, and half of the next.
+fn cut_journal(bytes: &[u8], records: usize) -> Vec<u8> {
+    let mut lines = bytes.split_inclusive(|&byte| byte == b'\n');
+    let mut kept: Vec<u8> = lines.by_ref().take(1 + records).flatten().copied().collect();
+    kept.extend(lines.next().map_or(&[][..], |next| &next[..next.len() / 2]));
+    kept
+}
+
+fn count(bytes: &[u8]) -> usize {
+    journal::parse(bytes).expect("a journal").records.len()
+}
+
+fn whole_run(device: &(Config, Source)) -> (BTreeMap<PathBuf, Vec<u8>>, Essence) {
+    let disk = SimulatedDisk::default();
+    run(&disk.shared(), device).unwrap_or_else(|e| panic!("{e}"));
+    let files = disk.files(FOLDER.as_ref());
+    let own = essence(&files);
+    (files, own)
+}
+
+#[test]
+fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
+    let kept = |fields: &str| {
+        block(&[("verify_refinement = 0", &format!("verify_refinement = 0\nfields = \"{fields}\""))])
+    };
+    for (name, device) in [
+        ("plain", block(&[])),
+        ("constrained", constrained()),
+        ("rounds", with_rounds()),
+        ("last", kept("first_last")),
+        ("none", kept("none")),
+        ("shield", shipped("shield_quick.toml")),
+    ] {
+        let (files, expected) = whole_run(&device);
+        let count = count(&files[Path::new("journal.jsonl")]);
+        assert!(count >= 5, "{name}: {count}");
+        for cut in 0..=count {
+            let disk = cut_behind(&files, cut);
+            resume(&disk.shared(), Limits::default()).unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
+            assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, &format!("{name}, cut at {cut}"));
+        }
+    }
+}
+
+/// The quick shield, which keeps the fields of its first and its last evaluation alone.
+fn shipped_with(evaluations: usize) -> (Config, Source) {
+    let (mut config, source) = shipped("shield_quick.toml");
+    config.optimizer.max_evaluations = evaluations;
+    (config, source)
+}
+
+#[test]
+fn the_rounds_of_the_device_are_there_to_be_tested() {
+    let (files, _) = whole_run(&with_rounds());
+    let records = journal::parse(&files[Path::new("journal.jsonl")]).expect("a journal").records;
+    let rounds: Vec<usize> = records.iter().map(|record| record.row.round).collect();
+    assert!(rounds.last() > Some(&1), "{rounds:?}");
+}
+
+#[test]
+fn a_run_may_be_cut_again_and_again() {
+    for device in [constrained(), with_rounds(), shipped_with(8)] {
+        let (files, expected) = whole_run(&device);
+        let count = count(&files[Path::new("journal.jsonl")]);
+        let mut disk = cut_behind(&files, 0);
+        for depth in 1..=5 {
+            // Each time one evaluation more, then it is cut within the next.
+            let limits = Limits { max_evaluations: Some(depth), max_time: None };
+            resume(&disk.shared(), limits).unwrap_or_else(|e| panic!("depth {depth}: {e}"));
+            disk = cut_behind(&disk.files(FOLDER.as_ref()), depth);
+        }
+        let limits = Limits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
+        resume(&disk.shared(), limits).unwrap_or_else(|e| panic!("at last: {e}"));
+        assert!(count > 5);
+        assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, "at last");
+    }
+}

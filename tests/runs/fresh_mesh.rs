@@ -1,0 +1,38 @@
+//! The check of a run's gain on a fresh mesh, as a user sees it.
+
+use crate::support::folder::{count, number, read_json};
+use crate::support::program::folder;
+use crate::support::shield::on_quick;
+
+#[test]
+fn a_run_reports_its_ratio_on_a_fresh_mesh() {
+    let home = folder();
+    let out = home.path().join("out");
+    on_quick("run", &out, &[])
+        .with(1, &["checking the best shape on a fresh mesh ...", "F/F0 on a fresh mesh"]);
+    let result = read_json(&out.join("result.json"));
+    let (ratio, verified) =
+        (number(&result, "/objective/ratio"), number(&result, "/objective/verified_ratio"));
+    println!("F/F0 {ratio:.4}, on a fresh mesh {verified:.4}");
+    // Coarse as the mesh is, its error hardly depends on the shape while the lines over the plate stay: measured 0.002.
+    assert!((ratio - verified).abs() <= 0.01, "{ratio} {verified}");
+    assert_eq!(number(&result, "/objective/verification/ratio"), verified);
+    assert_eq!(number(&result, "/objective/verification/refinement"), 1.25);
+    let [initial, best] =
+        ["initial", "best"].map(|key| number(&result, &format!("/objective/verification/{key}")));
+    assert_eq!(best / initial, verified);
+    assert!(count(&result, "/objective/verification/tets") > count(&result, "/mesh/tets"));
+    assert!(number(&result, "/timings_s/verification") > 0.0);
+}
+
+#[test]
+fn the_check_can_be_left_out_and_a_refinement_of_no_use_is_refused() {
+    let home = folder();
+    let out = home.path().join("out");
+    on_quick("run", &out, &["--max-evaluations", "3", "--set", "output.verify_refinement=0"]).exits_with(1);
+    let result = read_json(&out.join("result.json"));
+    assert!(result["objective"]["verified_ratio"].is_null());
+    assert!(result["objective"].get("verification").is_none());
+    on_quick("run", &out, &["--force", "--set", "output.verify_refinement=0.1"])
+        .with(3, &["output.verify_refinement", "0 for no check", "at least 0.5 and at most 4"]);
+}

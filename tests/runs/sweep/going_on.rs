@@ -1,0 +1,147 @@
+//! A second sweep into the same directory: what is finished stays, what was broken off goes on, what is new begins.
+
+use std::process::Child;
+
+use super::home::{Home, children_of};
+use crate::support::essence::assert_same;
+use crate::support::program::{Finished, JOURNAL, send, wait_for_lock, wait_until};
+use crate::support::with_mesh_file;
+
+/// What is swept.
+const SET: [&str; 2] = ["--set", "design.upper=2 mm,3 mm,4 mm"];
+const RUNS: [&str; 3] = ["design.upper=2mm", "design.upper=3mm", "design.upper=4mm"];
+
+/// A sweep whose runs are at work far longer than a test takes to find them there.
+fn start(home: &Home, further: &[&str]) -> Child {
+    let endless = ["--max-evaluations", "1000000"];
+    let arguments = [&["sweep", "block.toml", "--out", "out"], &SET[..], &endless, further].concat();
+    home.command(&arguments).spawn().expect("the program starts")
+}
+
+/// The same sweep with some evaluations more than any of its runs has, brought to its end in `out`: every run has the bits
+/// of an undisturbed one.
+#[track_caller]
+fn brought_to_its_end(home: &Home, further: &[&str], context: &str) -> Finished {
+    let most = RUNS.iter().map(|run| home.rows(&format!("out/{run}"))).max().expect("three runs");
+    let limit = (most + 4).to_string();
+    let set = [&SET[..], &["--max-evaluations", &limit]].concat();
+    let again = home.sweep("out", &[&set[..], further].concat()).exits_with(1);
+    home.sweep("expected", &set).exits_with(1);
+    for run in RUNS {
+        let [own, expected] = ["out", "expected"].map(|out| home.essence(&format!("{out}/{run}")));
+        assert_same(&own, &expected, &format!("{context}, {run}"));
+    }
+    again
+}
+
+#[test]
+fn finished_runs_are_skipped_and_further_values_begun() {
+    let home = Home::new();
+    let limit = ["--max-evaluations", "2"];
+    home.sweep("out", &[&["--set", "design.upper=2 mm,4 mm"], &limit[..]].concat()).with(1, &[]);
+    let journal = home.path("out/design.upper=2mm").join(JOURNAL);
+    let before = std::fs::metadata(&journal).and_then(|file| file.modified()).expect("a file");
+    // The program finds finished ones whatever they are called in the configuration, and with comments beside them.
+    home.edit("block.toml", "title = ", "# A comment.\ntitle = ");
+    let more = [SET, limit].concat();
+    let again = home.sweep("out", &more).with(1, &["[2/3] design.upper=3mm: begun"]);
+    let counts = (again.count("skipped, stopped: evaluations"), again.count("begun"));
+    assert_eq!(counts, (2, 1), "{}", again.stderr);
+    assert_eq!(std::fs::metadata(&journal).and_then(|file| file.modified()).expect("a file"), before);
+    assert_eq!(home.runs("out"), RUNS);
+    // Wider limits go on from where the narrow ones ended.
+    let wider = home.sweep("out", &[SET, ["--max-evaluations", "3"]].concat());
+    assert_eq!(wider.with(1, &[]).count("resumed"), 3);
+    assert_eq!(home.rows("out/design.upper=4mm"), 3);
+}
+
+#[test]
+fn another_sweep_is_not_mixed_in() {
+    let home = Home::new();
+    let (two, limit) = (["--set", "design.upper=2 mm,4 mm"], ["--max-evaluations", "1"]);
+    home.sweep("out", &[two, limit].concat()).with(1, &[]);
+    home.sweep("out", &[["--set", "design.lower=-2 mm,-4 mm"], limit].concat())
+        .with(5, &["it sweeps `design.upper`, this one `design.lower`", "--force"]);
+    home.sweep("out", &[["--set", "design.upper=2 mm,3 mm"], limit].concat())
+        .with(5, &["its combination `design.upper=4mm` is not among these"]);
+    let other = [two, limit, ["--set", "analysis.frequency=60 Hz"]].concat();
+    home.sweep("out", &other).with(5, &["out/design.upper=2mm` holds another run", "--force"]);
+    assert_eq!(home.json("out/design.upper=2mm/result.json")["frequencies_hz"][0], 50.0);
+    let replaced = home.sweep("out", &[&other[..], &["--force"]].concat()).with(1, &[]);
+    assert_eq!(replaced.count("begun"), 2);
+    assert_eq!(home.json("out/design.upper=2mm/result.json")["frequencies_hz"][0], 60.0);
+    // A run of the sweep stays under force.
+    assert_eq!(home.sweep("out", &[&other[..], &["--force"]].concat()).count("skipped"), 2);
+}
+
+#[test]
+fn another_mesh_in_the_same_file_is_noticed() {
+    let home = Home::new();
+    // A mesh to read: that of the optimum of a first run is as good as any.
+    home.fluxmorph(&["run", "block.toml", "--out", "first", "--max-evaluations", "2"]).exits_with(1);
+    home.fluxmorph(&["solve", "block.toml", "--out", "flat"]).exits_with(0);
+    home.write("block.toml", &with_mesh_file(&home.text("block.toml"), "device.msh"));
+    let mesh = |from: &str| {
+        std::fs::copy(home.path(from).join("optimum.msh"), home.path("device.msh")).expect("copied")
+    };
+    mesh("flat");
+    let set = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
+    home.sweep("out", &set).with(1, &[]);
+    assert_eq!(home.sweep("out", &set).with(1, &[]).count("skipped"), 2);
+    mesh("first");
+    home.sweep("out", &set).with(5, &["holds another run: its mesh file is another, or has changed since"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn killed_runs_go_on_and_end_as_if_they_had_not_been() {
+    let home = Home::slower();
+    let mut sweep = start(&home, &["--jobs", "2"]);
+    wait_until("both runs at work", || RUNS[..2].iter().all(|run| home.rows(&format!("out/{run}")) > 1));
+    let children = children_of(&sweep);
+    sweep.kill().expect("killed");
+    sweep.wait().expect("it has ended");
+    assert_eq!(children.len(), 2);
+    children.into_iter().for_each(|process| send("KILL", process));
+    RUNS[..2].iter().for_each(|run| wait_for_lock(&home.path("out").join(run)));
+    assert!(!home.path("out").join(RUNS[2]).exists(), "the third had not begun");
+    let again = brought_to_its_end(&home, &["--jobs", "2"], "killed");
+    assert_eq!((again.count(": resumed"), again.count(": begun")), (2, 1), "{}", again.stderr);
+}
+
+#[test]
+fn a_signal_reaches_the_runs_at_work_once_and_no_further_one_begins() {
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let home = Home::slower();
+        let sweep = start(&home, &[]);
+        wait_until("a run at work", || home.rows(&format!("out/{}", RUNS[0])) > 1);
+        send(signal, sweep.id());
+        let output = sweep.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        assert!(said.contains("design.upper=2mm: interrupted, ") && said.contains("are saved"), "{said}");
+        assert!(said.contains("go on with the same command"), "{said}");
+        // It came to its end in order: what it has computed is in a result.
+        assert_eq!(home.json("out/design.upper=2mm/result.json")["status"], "interrupted");
+        assert!(home.text("out/sweep.csv").contains("\n3 mm,not_begun,"), "{}", home.text("out/sweep.csv"));
+        if signal == "TERM" {
+            brought_to_its_end(&home, &[], signal)
+                .says(&["design.upper=2mm: resumed", "design.upper=3mm: begun"]);
+        }
+    }
+}
+
+#[test]
+fn a_run_that_another_process_works_on_is_left_to_it() {
+    let home = Home::slower();
+    let run = format!("out/{}", RUNS[0]);
+    let one = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
+    home.sweep("out", &one).with(1, &[]);
+    let mut resume = home.command(&["resume", &run, "--max-evaluations", "1000000", "--quiet"]);
+    let mut elsewhere = resume.spawn().expect("the program starts");
+    wait_until("its work", || home.rows(&run) > 1);
+    home.sweep("out", &one)
+        .with(5, &["design.upper=2mm: another process works on it", "design.upper=3mm: skipped"]);
+    elsewhere.kill().expect("killed");
+    elsewhere.wait().expect("it has ended");
+}

@@ -1,0 +1,127 @@
+//! The table, the page and the exit codes.
+
+use serde_json::Value;
+
+use super::home::Home;
+use crate::support::markup::{Element, elements};
+
+/// The cells of a line, quotes resolved.
+fn cells(line: &str) -> Vec<String> {
+    let (mut cells, mut cell, mut is_quoted) = (Vec::new(), String::new(), false);
+    for c in line.chars() {
+        match c {
+            '"' => is_quoted = !is_quoted,
+            ',' if !is_quoted => cells.push(std::mem::take(&mut cell)),
+            c => cell.push(c),
+        }
+    }
+    cells.push(cell);
+    cells
+}
+
+#[test]
+fn the_table_holds_the_numbers_of_the_results() {
+    let home = Home::new();
+    let set = ["--set", "design.upper=2 mm,4 mm", "--set", "optimizer.max_evaluations=2,3"];
+    let ended = home.sweep("out", &[&set[..], &["--json"]].concat()).with(1, &[]);
+    let table = home.text("out/sweep.csv");
+    let mut lines = table.lines();
+    let head = cells(lines.next().expect("a head"));
+    let expected = "design.upper optimizer.max_evaluations status stop_reason evaluations objective_initial \
+                    objective_best ratio verified_ratio worst_quality seconds peak_memory_bytes directory";
+    assert_eq!(head.join(" "), expected);
+    let printed = ended.json();
+    let mut ratios = Vec::new();
+    for (i, line) in lines.enumerate() {
+        let row = cells(line);
+        assert_eq!([&row[0], &row[1]], [["2 mm", "4 mm"][i / 2], ["2", "3"][i % 2]]);
+        let result = home.json(&format!("out/{}/result.json", row[12]));
+        let pointers = "/status /stop_reason /evaluations /objective/initial /objective/best /objective/ratio \
+                        /objective/verified_ratio /mesh/worst_quality_final /timings_s/total /peak_memory_bytes";
+        for (pointer, cell) in pointers.split(' ').zip(&row[2..]) {
+            let text = match result.pointer(pointer).expect(pointer) {
+                Value::Null => String::new(),
+                Value::String(text) => text.clone(),
+                number => number.to_string(),
+            };
+            assert_eq!(*cell, text, "{pointer}");
+        }
+        assert_eq!(printed["combinations"][i]["ratio"], result["objective"]["ratio"]);
+        assert_eq!(printed["combinations"][i]["directory"], row[12].as_str());
+        ratios.push(row[7].parse::<f64>().expect("a number"));
+    }
+    assert_eq!(ratios.len(), 4);
+    let best = (0..4).min_by(|&a, &b| ratios[a].total_cmp(&ratios[b]));
+    assert_eq!(printed["best"].as_u64(), best.map(|best| best as u64));
+}
+
+fn has(elements: &[Element], name: &str, attribute: &str, value: &str) -> bool {
+    elements.iter().any(|element| element.name == name && element.get(attribute) == Some(value))
+}
+
+#[test]
+fn the_page_is_well_formed_stands_alone_and_shows_the_best() {
+    let hostile = "title = '''</title><script>alert(1)</script>&'''";
+    let home = Home::with(&[("title = \"Block over a gap\"", hostile)]);
+    let set = ["--set", "design.upper=2 mm,3 mm,4 mm", "--max-evaluations", "3", "--jobs", "2"];
+    home.sweep("out", &set).with(1, &[]);
+    let page = home.text("out/sweep.html");
+    let elements = elements(&page);
+    for fragment in ["http://", "https://", "src=", "@import", "url(", "<script>alert"] {
+        assert!(!page.contains(fragment), "{fragment}");
+    }
+    for id in ["comparison", "over-value", "convergence", "files"] {
+        assert!(has(&elements, "section", "id", id), "{id}");
+    }
+    for chart in ["over-value", "convergence"] {
+        assert!(has(&elements, "figure", "data-chart", chart), "{chart}");
+    }
+    // Every drawing has a name for those who do not see it.
+    for drawing in elements.iter().filter(|element| element.name == "svg") {
+        assert!(drawing.get("aria-label").is_some_and(|label| label.len() > 15), "{drawing:?}");
+    }
+    assert_eq!(elements.iter().filter(|e| e.name == "tr" && e.get("class") == Some("marked")).count(), 1);
+    let curves =
+        elements.iter().filter(|e| e.name == "path" && e.get("class").is_some_and(|c| c.starts_with("k k")));
+    // One in the figure and one beside its name.
+    assert_eq!(curves.count(), 6);
+    for run in ["2mm", "3mm", "4mm"] {
+        let link = format!("design.upper%3D{run}/report.html");
+        assert!(has(&elements, "a", "href", &link), "{link}");
+        assert!(home.path(&format!("out/design.upper={run}/report.html")).is_file());
+    }
+    assert!(page.contains("3 of 3 combinations have ended") && page.contains("design.upper [mm]"));
+    // Made again of the same files it is the same.
+    home.sweep("out", &[&set[..], &["--compare"]].concat()).with(0, &["sweep.html"]);
+    assert_eq!(home.text("out/sweep.html"), page);
+}
+
+#[test]
+fn values_that_are_no_numbers_have_no_axis() {
+    let home = Home::with(&[("max_evaluations = 6", "max_evaluations = 1")]);
+    home.sweep("out", &["--set", "optimizer.algorithm=mma,ccsaq"]).with(1, &[]);
+    let page = home.text("out/sweep.html");
+    assert!(!page.contains("data-chart=\"over-value\"") && page.contains("data-chart=\"convergence\""));
+}
+
+#[test]
+fn one_that_fails_ends_no_other_and_the_worst_code_counts() {
+    let home = Home::new();
+    // The surface of the second one does not exist, which shows once the mesh is there.
+    let set = ["--set", "design.surface=face,nowhere", "--max-evaluations", "1"];
+    let ended = home.sweep("out", &[&set[..], &["--quiet"]].concat()).with(
+        3,
+        &[
+            "design.surface=nowhere: failed with exit code 3, error: there is no surface",
+            "out/logs/design.surface=nowhere.log",
+        ],
+    );
+    assert_eq!(ended.count("design.surface=face"), 0, "only errors are told:\n{}", ended.stderr);
+    assert_eq!(home.runs("out"), ["design.surface=face"]);
+    assert!(home.text("out/logs/design.surface=nowhere.log").contains("nowhere"));
+    assert!(home.text("out/sweep.csv").contains("\nnowhere,not_begun,,"));
+    assert!(home.text("out/sweep.html").contains("1 of 2 combinations have ended"));
+    // All converge: the lower bound of the change is one that any step keeps.
+    let converged = ["--set", "optimizer.ftol_rel=0.9,0.8", "--max-evaluations", "20"];
+    home.sweep("converged", &converged).with(0, &[": converged, F/F0"]);
+}

@@ -1,0 +1,101 @@
+//! Small devices as files of configuration, and what an undisturbed run of them leaves.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::essence::{Essence, essence};
+use super::folder::files;
+use super::program::{command, finish};
+use super::{changed, repository};
+
+/// An iron block over a gap in a uniform field, whose lower face moves: a run takes milliseconds.
+pub(crate) const BLOCK: &str = include_str!("block.toml");
+
+/// A bound on the volume of the block.
+pub(crate) const CONSTRAINT: (&str, &str) =
+    ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]");
+
+/// Steps of the block so cautious that the mesh has several references.
+pub(crate) const ROUNDS: (&str, &str) = ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = [");
+
+/// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
+pub(crate) const MOTION: &str = r#"title = "lifted"
+[mesh]
+generator = "block"
+[mesh.block]
+size = ["40 mm", "40 mm", "40 mm"]
+cells = [4, 4, 4]
+[remesh]
+region = "block"
+free = ["z_max"]
+[[morph.motion]]
+nodes = [["20 mm", "20 mm", "40 mm"]]
+displacement = ["0 mm", "0 mm", "5 mm"]
+"#;
+
+/// What is run.
+#[derive(Clone, Debug)]
+pub(crate) struct Device {
+    pub(crate) name: &'static str,
+    pub(crate) config: PathBuf,
+    further: Vec<String>,
+}
+
+/// The block with changes, written into a folder.
+pub(crate) fn written(name: &'static str, folder: &Path, changes: &[(&str, &str)]) -> Device {
+    let config = folder.join(format!("{name}.toml"));
+    std::fs::write(&config, changed(BLOCK, changes)).expect("written");
+    Device { name, config, further: Vec::new() }
+}
+
+/// The block with a constraint and several references of its mesh.
+pub(crate) fn block(folder: &Path, evaluations: usize) -> Device {
+    let evaluations = format!("max_evaluations = {evaluations}");
+    written("block", folder, &[CONSTRAINT, ROUNDS, ("max_evaluations = 6", &evaluations)])
+}
+
+/// The block on elements so small that an evaluation takes about a second.
+pub(crate) fn slow(folder: &Path) -> Device {
+    let changes = [
+        ("cells = [1, 1, 1]", "cells = [6, 6, 6]"),
+        ("cells = [2, 2, 1]", "cells = [10, 10, 6]"),
+        ("cells = [2, 2, 1]", "cells = [10, 10, 6]"),
+        ("max_evaluations = 6", "max_evaluations = 1000"),
+    ];
+    written("slow", folder, &changes)
+}
+
+/// A shipped configuration.
+pub(crate) fn shipped(name: &'static str, further: &[&str]) -> Device {
+    let config = repository("configs").join(format!("{name}.toml"));
+    Device { name, config, further: further.iter().map(|item| (*item).to_owned()).collect() }
+}
+
+/// A run that would go on for hours.
+pub(crate) fn endless() -> Device {
+    shipped("shield_quick", &[]).with("optimizer.max_evaluations=1000000").with("optimizer.ftol_rel=0")
+}
+
+impl Device {
+    /// The same with a key of the configuration set.
+    pub(crate) fn with(mut self, item: &str) -> Self {
+        self.further.extend(["--set".to_owned(), item.to_owned()]);
+        self
+    }
+
+    /// A command on it that writes into a directory; only its messages are read.
+    pub(crate) fn command(&self, name: &str, out: &Path) -> Command {
+        let mut command = command(&[&name, &self.config, &"--out", &out]);
+        command.args(&self.further).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    }
+
+    /// What a run that nothing disturbs leaves, and how long it took.
+    pub(crate) fn undisturbed(&self, folder: &Path) -> (Essence, Duration) {
+        let out = folder.join("undisturbed");
+        let clock = Instant::now();
+        finish(&mut self.command("run", &out)).completed();
+        (essence(&files(&out)), clock.elapsed())
+    }
+}
