@@ -1,7 +1,6 @@
 //! The program as a user meets it: the real binary on the shipped quick configuration, its files re-read by strict
 //! readers, its messages and exit codes. Every test works in its own temporary directory.
 
-mod bad_input;
 mod commands;
 mod determinism;
 mod folders;
