@@ -4,7 +4,7 @@
 //! # What the case is about; only where the edit does not say it.
 //! on shield_quick.toml            the sound base of this and all following cases
 //! - grid = [7, 13]                the first place of this text in the configuration, or else in the mesh file …
-//! + grid = [7, «1»]               … becomes this; marks stand around what must be underlined, and are taken out
+//! + grid = [7, «1»]               … becomes this, or nothing; marks stand around what must be underlined, and are taken out
 //! set design.lower=«"1 m"»        an override of the command line
 //! command run                     instead of `check`
 //! error: `design.grid[1]` is 1    what is said, without the frame around the excerpt: the message,
@@ -32,7 +32,8 @@ pub(crate) struct Case {
     /// File and line, for messages of the tests.
     pub(crate) at: String,
     base: String,
-    edits: Vec<(String, String)>,
+    /// From and to; `None` until a line of it is read.
+    edits: Vec<(String, Option<String>)>,
     pub(crate) set: Vec<String>,
     pub(crate) command: String,
     /// Lines of what is expected.
@@ -119,12 +120,12 @@ impl Case {
             command.clone_into(&mut self.command);
         } else if let Some(from) = rest("-") {
             match self.edits.last_mut() {
-                Some((all, to)) if to.is_empty() => *all += &format!("\n{from}"),
-                _ => self.edits.push((from.to_owned(), String::new())),
+                Some((all, None)) => *all += &format!("\n{from}"),
+                _ => self.edits.push((from.to_owned(), None)),
             }
         } else if let Some(more) = rest("+") {
             let (_, to) = self.edits.last_mut().unwrap_or_else(|| panic!("{}: no `-`", self.at));
-            *to += &format!("{}{more}", if to.is_empty() { "" } else { "\n" });
+            *to = Some(to.as_ref().map_or(more.to_owned(), |to| format!("{to}\n{more}")));
         } else {
             assert!(line.is_empty() || line.starts_with('#'), "{}: what is `{line}`?", self.at);
         }
@@ -141,7 +142,7 @@ impl Case {
         for (from, to) in &self.edits {
             let edited = if mesh.contains(from) { &mut mesh } else { &mut config };
             assert!(edited.contains(from), "{}: no `{from}`", self.at);
-            *edited = edited.replacen(from, to, 1);
+            *edited = edited.replacen(from, to.as_deref().unwrap_or_default(), 1);
         }
         (config, is_mesh.then_some(mesh))
     }

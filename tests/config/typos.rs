@@ -12,8 +12,9 @@ use crate::program::repository;
 
 /// Least share of typos for which the original is suggested.
 ///
-/// No suggestion can be right everywhere: a name of one or two letters (`x`, `mm`) keeps too little after an edit, and some
-/// names lie one letter apart (`x_min`, `y_min`), so that a typo of one is as near to the other. These are one in twenty.
+/// Not all: a name of one or two letters keeps too little after an edit, and where names lie one letter apart (`x_min`,
+/// `z_min`) a typo is as near to one as to the other. A distance that counts all edits alike leaves more of these open than
+/// one that knows the keyboard; one typo in twenty is granted for both.
 const RIGHT: f64 = 0.95;
 
 /// Least number of typos that are asked for, so that the share means something.

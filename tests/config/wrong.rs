@@ -128,9 +128,13 @@ fn wrong_form(text: &str, lines: &[String]) -> Option<&'static str> {
     if errors.iter().any(|error| error.starts_with(char::is_uppercase) || error.ends_with('.')) {
         return Some("a message is lower case without a full stop");
     }
-    let is_error = |line: Option<&String>| line.is_none_or(|line| line.starts_with("error: "));
-    let silent = (0..lines.len()).any(|at| is_error(lines.get(at)) && is_error(lines.get(at + 1)));
-    silent.then_some("a message says what would be right")
+    // In a label, in advice, or behind a colon.
+    let silent = |at: usize| {
+        lines[at].starts_with("error: ")
+            && !lines[at][7..].contains(": ")
+            && lines.get(at + 1).is_none_or(|next| next.starts_with("error: "))
+    };
+    (0..lines.len()).any(silent).then_some("a message says what would be right")
 }
 
 /// Why the first excerpt of a message does not underline the marked place: file, line, column and characters.
