@@ -19,8 +19,8 @@ use crate::program::{BESIDE, Ended, baseline, folder, least_limit, limited, text
 /// Memory of the promise for each byte of a mesh file [bytes].
 const PER_BYTE: u64 = 12;
 
-/// A name or line that does not end.
-const ENDLESS: [u8; 1 << 20] = [b'x'; 1 << 20];
+/// Length of a name or line that does not end [bytes].
+const ENDLESS: usize = 1 << 20;
 
 /// Writes a configuration and its mesh.
 fn write_mesh(home: &Path, mesh: &[u8]) {
@@ -78,7 +78,7 @@ const OF_MESHES: &[Kind] = &[
     ("nothing", &["no tetrahedron"], Mesh(|d| *d = Device::default())),
     ("control character", &["control character"], Mesh(|d| d.names[1].2 = "le\u{1b}[31mft".into())),
     ("empty name", &["is empty"], Mesh(|d| d.names[1].2 = String::new())),
-    ("endless name", &["longer than 255 bytes"], Mesh(|d| d.names[1].2 = "x".repeat(ENDLESS.len()))),
+    ("endless name", &["longer than 255 bytes"], Mesh(|d| d.names[1].2 = "x".repeat(ENDLESS))),
     ("name twice", &["`left` belongs to group 7"], Mesh(|d| d.names[2].2 = "left".into())),
     ("group named twice", &["declared a second time"], Mesh(|d| d.names.push((3, 7, "again".into())))),
 ];
@@ -96,7 +96,7 @@ const OF_HEADS: &[Kind] = &[
     ("another format", &["$MeshFormat", "solid"], File(|f| f.replace("$MeshFormat", "solid"))),
     ("version 1", &["version 1"], File(|f| f.replace("$MeshFormat\n", "$NOD\n"))),
     ("version 3", &["version 3.0"], File(|f| f.put(f.format(), 3, b"3.0"))),
-    ("endless version", &["the version 444"], File(|f| f.put(f.format(), 0, &[b'4'; ENDLESS.len()]))),
+    ("endless version", &["the version 444"], File(|f| f.put(f.format(), 0, &vec![b'4'; ENDLESS]))),
     ("file type 7", &["0 for ASCII or 1 for binary"], File(|f| f.put(f.format() + 4, 1, b"7"))),
     ("data size 4", &["only 8 is read"], File(|f| f.put(f.format() + 6, 1, b"4"))),
     (
@@ -160,8 +160,8 @@ const OF_SECTIONS: &[Kind] = &[
     ("end in capitals", &["end of the section", "$ENDNodes"], File(|f| f.replace("$EndNodes", "$ENDNodes"))),
     ("no end", &["section $Comments", "end of the section"], File(|f| f.add(b"$Comments\nand so on\n"))),
     ("escapes", &["section $\\u{1b}[31m"], File(|f| f.add(b"$\x1b[31m\nred\n"))),
-    ("endless section", &["section $xxx"], File(|f| f.add(&[b"$", &ENDLESS[..]].concat()))),
-    ("endless line", &["the head of a section"], File(|f| f.add(&ENDLESS))),
+    ("endless section", &["section $xxx"], File(|f| f.add(&[vec![b'$'], vec![b'x'; ENDLESS]].concat()))),
+    ("endless line", &["the head of a section"], File(|f| f.add(&vec![b'x'; ENDLESS]))),
     ("partitions", &["partitioned"], File(|f| f.add(b"$GhostElements\n0\n$EndGhostElements\n"))),
 ];
 
