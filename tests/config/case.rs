@@ -147,6 +147,11 @@ impl Case {
         (config, is_mesh.then_some(mesh))
     }
 
+    /// The base alone: its name, and the case without its edits and overrides.
+    pub(crate) fn sound(&self) -> (String, Self) {
+        (self.base.clone(), Self { edits: Vec::new(), set: Vec::new(), ..self.clone() })
+    }
+
     /// The configuration without marks.
     pub(crate) fn config(&self) -> String {
         unmarked("", &self.files().0).0

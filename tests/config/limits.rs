@@ -160,6 +160,8 @@ fn overrides_have_limits_too() {
     check(home.path(), &["--set", &long].repeat(10))
         .refuses(3, &["the overrides are longer than 1048576 bytes"]);
     check(home.path(), &["--set", "title=\u{1b}[31m"]).refuses(3, &["control character"]);
+    let lines = "analysis.frequency=50\nanalysis.penalty=3";
+    check(home.path(), &["--set", lines]).refuses(2, &["must be KEY=VALUE on one line"]);
     let deep = format!("{}=1", vec!["a"; 50_000].join("."));
     check(home.path(), &["--set", &deep]).refuses(3, &["recursion"]);
 }

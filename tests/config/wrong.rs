@@ -1,6 +1,6 @@
 //! Every wrong input is refused by the real binary at the marked place, with the message that the table holds.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::case::{Case, Marked, overwrite, read};
@@ -28,6 +28,21 @@ fn every_file_of_the_table_is_a_test() {
     let names: BTreeSet<String> =
         files.map(|file| file.expect("a file").file_name().to_string_lossy().replace(".txt", "")).collect();
     assert_eq!(names, GROUPS.iter().map(|group| (*group).to_owned()).collect());
+}
+
+/// Bases that are sound as a text, and refused once their mesh is known: for faults that show before.
+const TEXTS: [&str; 4] = ["bare.toml", "small.toml", "sound_v2.msh", "sound_v4.msh"];
+
+#[test]
+fn the_bases_are_sound() {
+    let cases = GROUPS.iter().flat_map(|group| read(&format!("wrong/{group}")));
+    let bases: BTreeMap<String, Case> = cases.map(|case| case.sound()).collect();
+    assert!(TEXTS.iter().all(|name| bases.contains_key(*name)));
+    for case in bases.iter().filter(|(name, _)| !TEXTS.contains(&name.as_str())).map(|(_, case)| case) {
+        let home = folder();
+        case.write(home.path());
+        limited(home.path(), None, &["check", "device.toml"]).succeeds();
+    }
 }
 
 /// Runs all cases of a group.
