@@ -46,7 +46,7 @@ test-pyvista:
 
 # Writes configs/fluxmorph.schema.json and the tables of docs/configuration.md, both from the types of the configuration
 generate:
-    cargo test --release --test schema -- --ignored write_the_files
+    cargo test --release --test config -- --ignored write_the_files
 
 # The documentation of the code, warnings are errors
 doc:

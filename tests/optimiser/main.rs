@@ -2,11 +2,9 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod coils;
-mod configuration_page;
 mod design_surface;
 mod driver;
 mod field_pieces;
 mod finite;
 mod geometric;
 mod guards;
-mod properties;

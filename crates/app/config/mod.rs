@@ -30,8 +30,6 @@ mod remesh;
 pub(crate) mod section;
 mod source;
 mod syntax;
-#[cfg(test)]
-mod tests;
 mod tree;
 
 use std::collections::{BTreeMap, HashSet};

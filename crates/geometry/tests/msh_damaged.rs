@@ -1,77 +1,9 @@
 //! Gmsh files that are damaged: refused at the right line or byte, with the node or element named, and never with a panic.
 
-use crate::msh_support::{Device, Form, Random, Version};
+use crate::msh_support::{Device, Form, Random, SOUND_V2, SOUND_V4, Version};
 use fluxmorph_geometry::io::msh::{MshError, Place, Subject};
 use fluxmorph_geometry::io::read_msh;
 use proptest::prelude::*;
-
-/// Two tets in two volumes, with a triangle between them.
-const V4: &str = "$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-2 1 \"face\"
-3 1 \"left\"
-3 2 \"right\"
-$EndPhysicalNames
-$Entities
-0 0 1 2
-1 0 0 0 1 1 1 1 1 0
-1 0 0 0 1 1 1 1 1 0
-2 0 0 0 1 1 1 1 2 0
-$EndEntities
-$Nodes
-2 5 1 5
-3 1 0 4
-1
-2
-3
-4
-0 0 0
-1 0 0
-0 1 0
-0 0 1
-3 2 0 1
-5
-1 1 1
-$EndNodes
-$Elements
-3 3 1 3
-2 1 2 1
-1 2 3 4
-3 1 4 1
-2 1 2 3 4
-3 2 4 1
-3 5 2 4 3
-$EndElements
-";
-
-/// The same in version 2.2.
-const V2: &str = "$MeshFormat
-2.2 0 8
-$EndMeshFormat
-$PhysicalNames
-3
-2 1 \"face\"
-3 1 \"left\"
-3 2 \"right\"
-$EndPhysicalNames
-$Nodes
-5
-1 0 0 0
-2 1 0 0
-3 0 1 0
-4 0 0 1
-5 1 1 1
-$EndNodes
-$Elements
-3
-1 2 2 1 1 2 3 4
-2 4 2 1 1 1 2 3 4
-3 4 2 2 2 5 2 4 3
-$EndElements
-";
 
 /// What is changed, where that is found, which subject is named, and a part of the message.
 type Damage = (&'static str, &'static str, usize, &'static str, &'static str);
@@ -252,7 +184,7 @@ fn refused(bytes: &[u8], what: &str) -> MshError {
 fn every_damage_is_refused_at_its_line_with_its_subject() {
     let mut wrong = Vec::new();
     let mut cases = 0;
-    for (text, damages) in [(V4, V4_DAMAGE), (V2, V2_DAMAGE)] {
+    for (text, damages) in [(SOUND_V4, V4_DAMAGE), (SOUND_V2, V2_DAMAGE)] {
         assert!(read_msh(text.as_bytes(), 1.0).is_ok());
         for &(from, to, line, subject, says) in damages {
             assert!(text.contains(from), "{from}");
@@ -273,7 +205,7 @@ fn every_damage_is_refused_at_its_line_with_its_subject() {
 
 #[test]
 fn a_third_tetrahedron_at_one_face_is_refused() {
-    let text = V2
+    let text = SOUND_V2
         .replacen("$Nodes\n5", "$Nodes\n6\n6 2 2 3", 1)
         .replacen("$Elements\n3", "$Elements\n4", 1)
         .replacen("$EndElements", "9 4 2 2 2 6 2 4 3\n$EndElements", 1);
@@ -284,7 +216,7 @@ fn a_third_tetrahedron_at_one_face_is_refused() {
 
 #[test]
 fn a_file_cut_off_anywhere_is_refused() {
-    for text in [V4, V2] {
+    for text in [SOUND_V4, SOUND_V2] {
         // Behind the last mark only the line end is missing.
         for end in 0..text.len() - 1 {
             refused(&text.as_bytes()[..end], &text[..end]);

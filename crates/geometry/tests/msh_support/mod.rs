@@ -57,7 +57,25 @@ pub(crate) struct Device {
     pub(crate) names: Vec<(i32, i32, String)>,
 }
 
+/// Two tetrahedra in two volumes with a triangle between them, in version 4.1.
+pub(crate) const SOUND_V4: &str = include_str!("sound_v4.msh");
+
+/// The same in version 2.2.
+pub(crate) const SOUND_V2: &str = include_str!("sound_v2.msh");
+
 impl Device {
+    /// The mesh of [`SOUND_V4`], with other tags of the volumes.
+    pub(crate) fn two_tets() -> Self {
+        let nodes = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]];
+        let names = [(2, 1, "face"), (3, 7, "left"), (3, 8, "right")];
+        Self {
+            nodes: (1..).zip(nodes).collect(),
+            tets: vec![(2, [1, 2, 3, 4], 7), (3, [5, 2, 4, 3], 8)],
+            triangles: vec![(1, [2, 3, 4], vec![1])],
+            names: names.map(|(dimension, tag, name)| (dimension, tag, name.to_owned())).to_vec(),
+        }
+    }
+
     /// A block of some cells with crooked nodes, random tags, regions and surfaces.
     pub(crate) fn random(random: &mut Random, tag_limit: u64) -> Self {
         let cells = [0; 3].map(|_| 1 + random.below(3) as usize);

@@ -1,0 +1,134 @@
+//! Colours, lines too long to be shown, faults found later, and that nothing is written for a wrong input.
+
+use std::fs;
+use std::process::Command;
+
+use crate::case::read;
+use crate::program::app::config::{Config, ConfigError, FaultReport};
+use crate::program::app::diagnostics::{Style, render};
+use crate::program::{assert_holds, folder, limited, text, write};
+
+/// The quick configuration with three faults.
+fn three_faults() -> String {
+    text("configs/shield_quick.toml")
+        .replace("\"60 Hz\"", "\"60 mm\"")
+        .replace("axis = \"z\"", "axis = \"w\"")
+        .replace("poisson = 0.3", "poisson = 0.5")
+}
+
+pub(crate) fn report(text: &str) -> FaultReport {
+    match Config::from_str(text, "device.toml") {
+        Err(ConfigError::Faults(report)) => *report,
+        other => panic!("{other:?}\n{text}"),
+    }
+}
+
+#[test]
+fn colours_change_nothing_but_colours() {
+    let found = report(&three_faults());
+    let (plain, coloured) = (render(&found, Style::Plain), render(&found, Style::Coloured));
+    assert!(!plain.contains('\u{1b}') && coloured.contains('\u{1b}'));
+    let bare: String = coloured
+        .split('\u{1b}')
+        .enumerate()
+        .map(|(at, part)| if at == 0 { part } else { part.split_once('m').expect("a sequence ends").1 })
+        .collect();
+    let trimmed = |text: &str| text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n");
+    assert_eq!(trimmed(&bare), trimmed(&plain));
+}
+
+#[test]
+fn no_color_and_no_terminal_leave_colours_out() {
+    let home = folder();
+    write(home.path(), "device.toml", three_faults());
+    let said = |no_color: bool| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
+        command.args(["check", "device.toml"]).current_dir(home.path()).env_remove("NO_COLOR");
+        if no_color {
+            command.env("NO_COLOR", "1");
+        }
+        String::from_utf8(command.output().expect("the binary starts").stderr).expect("UTF-8")
+    };
+    assert!(!said(true).contains('\u{1b}'));
+    assert_eq!(said(true), said(false));
+}
+
+#[test]
+fn a_long_line_is_cut_around_the_place() {
+    let quick = text("configs/shield_quick.toml");
+    let shown = |from: &str, to: &str| render(&report(&quick.replacen(from, to, 1)), Style::Plain);
+    let longest = |text: &str| text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
+    let lengths = "\"1.0 mm\", ".repeat(250);
+    let list = format!("initial = [{lengths}\"10 Hz\", {lengths}]\nupper = \"20 mm\"");
+    let text = shown("upper = \"20 mm\"", &list);
+    assert!(longest(&text) <= 160, "{text}");
+    assert!(text.contains("\"10 Hz\"") && text.contains("^^^^^^^ expected a length"), "{text}");
+    // A place that is longer than a line shows its start.
+    let text = shown("grid = [7, 13]", &format!("grid = [{}7]", "7, ".repeat(2499)));
+    assert!(longest(&text) <= 300, "{text}");
+    assert!(text.contains("has 2500 items"), "{text}");
+}
+
+#[test]
+fn a_later_fault_points_at_its_key() {
+    let small = text("fuzz/seeds/config/small.toml");
+    let (_, source) = Config::from_str(&small, "small.toml").expect("sound");
+    let faults = vec![
+        source.unknown_name("design.surface", "surface", "plate_bottom", &["plate_botom", "plate_top"]),
+        source.fault("boundaries.flux_parallel[1]", "`y_min` is not planar").expected("a planar surface"),
+        source.fault("output.directory", "a default has no place of its own"),
+    ];
+    assert!(source.check(vec![]).is_ok());
+    let text = source.check(faults).expect_err("three faults").to_string();
+    for part in [
+        "small.toml:26:11",
+        "did you mean `plate_botom`?",
+        "known: plate_botom, plate_top",
+        "small.toml:22:27",
+        "^^^^^^^ a planar surface",
+        "a default has no place of its own",
+        "3 faults in the configuration `small.toml`",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+}
+
+#[test]
+fn nothing_is_written_for_a_wrong_input() {
+    // One of each kind: no TOML, a wrong value, a name that the mesh does not have, a bound that breaks the mesh.
+    let bound = |case: &&crate::case::Case| case.expected[0].contains("the mesh breaks");
+    let places = read("wrong/names_and_places");
+    let of = |group: &str| read(&format!("wrong/{group}")).swap_remove(0);
+    let cases =
+        [of("syntax"), of("design"), places[0].clone(), places.iter().find(bound).expect("one").clone()];
+    for (case, command) in cases.iter().flat_map(|case| ["run", "solve", "gradient"].map(|c| (case, c))) {
+        // A solution does not move the mesh.
+        if command == "solve" && bound(&case) {
+            continue;
+        }
+        let home = folder();
+        case.write(home.path());
+        let ended = limited(home.path(), None, &[command, "device.toml", "--out", "out"]);
+        ended.refuses(3, &[&case.expected[0]]);
+        assert_holds(home.path(), &["device.toml"]);
+    }
+}
+
+#[test]
+fn the_bound_that_a_message_offers_can_be_used() {
+    let home = folder();
+    let config = text("configs/shield_quick.toml");
+    write(home.path(), "device.toml", config.replacen("[remesh]\n", "[remesh]\nrounds = 0\n", 1));
+    let check = |millimetres: f64, further: &[&str]| {
+        let bound = format!("design.upper={millimetres:?} mm");
+        limited(home.path(), None, &[&["check", "device.toml", "--set", &bound], further].concat())
+    };
+    let refused = check(40.0, &[]);
+    let (_, rest) = refused.stderr.split_once("nearer to zero than ").expect("an offer");
+    let offered: f64 = rest.split(' ').next().and_then(|word| word.parse().ok()).expect("a number");
+    // A micrometre to either side of the offer, which is rounded to a micrometre; up to the inversion itself.
+    let to_inversion = ["--set", "optimizer.minimum_quality=0"];
+    check(offered - 1e-3, &to_inversion).succeeds();
+    check(offered + 1e-3, &to_inversion).refuses(3, &["the mesh breaks"]);
+    assert!(fs::read_dir(home.path()).expect("a folder").count() == 1);
+}
