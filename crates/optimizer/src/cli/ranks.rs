@@ -11,7 +11,7 @@ use fluxmorph_geometry::ranks::{Member, Team};
 
 use super::exit::ExitCode;
 use super::launcher;
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::session;
 use crate::setup::Purpose;
@@ -86,7 +86,7 @@ impl Ranks {
     }
 
     /// Where this rank only follows: sets the problem up, follows until the first rank ends, and says how this one ended.
-    pub(super) fn followed(&self, config: &Config, source: &Source, purpose: Purpose) -> Option<ExitCode> {
+    pub(super) fn followed(&self, config: &Config, source: &SourceMap, purpose: Purpose) -> Option<ExitCode> {
         let team = self.team.as_ref().filter(|team| team.member() == Member::Follower)?;
         session::follow(team, config, source, purpose);
         Some(ExitCode::Success)

@@ -16,7 +16,7 @@ use std::time::Instant;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::ranks::{Member, Team};
 
-use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
+use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::driver;
 use crate::error::Error;
 use crate::exports;
@@ -63,7 +63,7 @@ pub struct Options<'a> {
 /// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
 pub fn run(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     options: Options<'_>,
     observer: &mut dyn Observer,
 ) -> Result<RunResult, Error> {
@@ -94,7 +94,7 @@ pub fn run(
 ///
 /// # Panics
 /// At the first rank.
-pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
+pub fn follow(team: &Team, config: &Config, source: &SourceMap, purpose: Purpose) {
     assert_eq!(team.member(), Member::Follower, "the first rank leads");
     let setup = set_up_watched(config, source, purpose, Some(team), &mut |_| ());
     let directory = config.output.directory.clone();
@@ -108,7 +108,7 @@ pub fn follow(team: &Team, config: &Config, source: &Source, purpose: Purpose) {
 /// As [`run`].
 pub fn solve(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     design: Option<Vec<f64>>,
     options: Options<'_>,
     observer: &mut dyn Observer,
@@ -186,7 +186,7 @@ pub fn solve(
 struct Session<'a> {
     command: &'static str,
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
     setup: Setup,
     directory: RunDirectory,
     manifest: Manifest,
@@ -199,7 +199,7 @@ impl<'a> Session<'a> {
     fn open(
         command: &'static str,
         config: &'a Config,
-        source: &'a Source,
+        source: &'a SourceMap,
         options: Options<'_>,
         (setup, clock): (Setup, Instant),
         observer: &mut dyn Observer,
@@ -376,7 +376,7 @@ impl<'a> Session<'a> {
 }
 
 /// A first design that the mesh cannot reach is a fault of the configuration.
-fn unreached(error: Error, config: &Config, source: &Source) -> Error {
+fn unreached(error: Error, config: &Config, source: &SourceMap) -> Error {
     match error {
         Error::DesignUnreached { .. } => placed(error, config, source),
         other => other,

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::advice::advice;
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
-    Remesh, Source,
+    Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::memory_estimate::{of_evaluation, of_run};
@@ -132,7 +132,7 @@ fn model_name(model: RegionModel) -> &'static str {
 /// When the configuration or the mesh is wrong.
 pub(super) fn summary<'a>(
     config: &'a Config,
-    source: &Source,
+    source: &SourceMap,
     older: OlderRun,
     told: Told<'_>,
 ) -> Result<Summary<'a>, Error> {
