@@ -5,7 +5,7 @@ mod support;
 
 use fluxmorph_geometry::io::read_vtu;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, Source};
+use fluxmorph_optimizer::config::{Algorithm, Config, ConfigError, Optimizer, SourceMap};
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
 use fluxmorph_optimizer::journal::Record;
 use fluxmorph_optimizer::observer::{Evaluation, Silent};
@@ -34,7 +34,7 @@ fn optimised(name: &str, settings: impl Fn(Optimizer) -> Optimizer) -> (Optimise
 const SQUARED: &str = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
 
 /// A shipped configuration with changes `(from, to)` in its text.
-fn changed_config(name: &str, changes: &[(&str, &str)]) -> (Config, Source) {
+fn changed_config(name: &str, changes: &[(&str, &str)]) -> (Config, SourceMap) {
     let mut text = std::fs::read_to_string(repository("configs").join(name)).expect("it is there");
     for (from, to) in changes {
         assert!(text.contains(from), "{from}");
@@ -276,8 +276,8 @@ fn what_regions_cannot_give_is_refused_at_its_key() {
     for (text, path, message) in cases {
         let (config, source) = changed_config("shield_quick.toml", &[("[design]", &constraint(text))]);
         let error = set_up(&config, &source, Purpose::Optimisation).expect_err(text);
-        let Error::Config(ConfigError::Faults(report)) = &error else { panic!("{error}") };
-        assert_eq!(report.faults[0].path, path, "{error}");
+        let Error::Config(ConfigError::Invalid(report)) = &error else { panic!("{error}") };
+        assert_eq!(report.diagnostics[0].path, path, "{error}");
         assert!(error.to_string().contains(message), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use fluxmorph_optimizer::config::{Config, ConfigError, FaultReport};
+use fluxmorph_optimizer::config::{Config, ConfigError, DiagnosticReport};
 use fluxmorph_optimizer::diagnostics::{Style, render};
 
 use crate::case::repository;
@@ -46,9 +46,9 @@ fn changed(changes: &[(&str, &str)]) -> String {
     text
 }
 
-fn report(text: &str) -> FaultReport {
+fn report(text: &str) -> DiagnosticReport {
     match Config::from_str(text, "device.toml") {
-        Err(ConfigError::Faults(report)) => *report,
+        Err(ConfigError::Invalid(report)) => *report,
         other => panic!("{other:?}"),
     }
 }
@@ -56,19 +56,19 @@ fn report(text: &str) -> FaultReport {
 #[test]
 fn twenty_faults_are_shown_and_the_rest_is_counted() {
     let found = report(&changed(CHANGES));
-    assert_eq!(found.faults.len(), CHANGES.len(), "{found}\none for each change");
+    assert_eq!(found.diagnostics.len(), CHANGES.len(), "{found}\none for each change");
     let shown = render(&found, Style::Plain);
     assert_eq!(shown.matches("error: ").count(), 20);
     assert!(shown.ends_with("24 faults in the configuration `device.toml`, 4 of them not shown"), "{shown}");
     // In the order of the text.
-    assert!(found.faults.is_sorted_by_key(|fault| fault.place.span.start));
+    assert!(found.diagnostics.is_sorted_by_key(|fault| fault.span.range.start));
 }
 
 #[test]
 fn every_change_alone_is_one_fault() {
     for change in CHANGES {
         let found = report(&changed(std::slice::from_ref(change)));
-        assert_eq!(found.faults.len(), 1, "{change:?}\n{found}");
+        assert_eq!(found.diagnostics.len(), 1, "{change:?}\n{found}");
     }
 }
 

@@ -120,8 +120,8 @@ impl Tally {
 /// The names that the help of the fault at a word offers.
 fn offered(text: &str, says: &str) -> Vec<String> {
     let error = Config::from_str(text, "typo.toml").expect_err("a fault");
-    let ConfigError::Faults(report) = error else { panic!("{error}") };
-    let fault = report.faults.iter().find(|fault| fault.message.contains(says));
+    let ConfigError::Invalid(report) = error else { panic!("{error}") };
+    let fault = report.diagnostics.iter().find(|fault| fault.message.contains(says));
     let fault = fault.unwrap_or_else(|| panic!("no `{says}` in\n{report}"));
     named(fault.help.as_deref().unwrap_or_default())
 }
@@ -136,8 +136,8 @@ fn named(help: &str) -> Vec<String> {
 /// What the reader says that it knows in a place.
 fn known(text: &str, says: &str) -> Vec<String> {
     let error = Config::from_str(text, "typo.toml").expect_err("a fault");
-    let ConfigError::Faults(report) = error else { panic!("{error}") };
-    let fault = report.faults.iter().find(|fault| fault.message.contains(says));
+    let ConfigError::Invalid(report) = error else { panic!("{error}") };
+    let fault = report.diagnostics.iter().find(|fault| fault.message.contains(says));
     let fault = fault.unwrap_or_else(|| panic!("no `{says}` in\n{report}"));
     let expected = fault.expected.as_deref().unwrap_or_default();
     expected.trim_start_matches("known: ").split(", ").map(str::to_owned).collect()

@@ -31,10 +31,10 @@ fn known(table: &toml::Table, path: &[Step]) -> Vec<String> {
     let Some(inner) = value_at(&mut root, path).as_table_mut() else { return Vec::new() };
     inner.insert(UNKNOWN.to_owned(), true.into());
     let text = toml::to_string(&root).expect("a table can be written");
-    let Err(ConfigError::Faults(report)) = Config::from_str(&text, "probe.toml") else {
+    let Err(ConfigError::Invalid(report)) = Config::from_str(&text, "probe.toml") else {
         panic!("{path:?}: an unknown key was accepted")
     };
-    let fault = report.faults.iter().find(|fault| fault.message.contains(UNKNOWN));
+    let fault = report.diagnostics.iter().find(|fault| fault.message.contains(UNKNOWN));
     let known =
         fault.and_then(|fault| fault.expected.as_deref()).unwrap_or_else(|| panic!("{path:?}: {report}"));
     known.trim_start_matches("known: ").split(", ").map(str::to_owned).collect()

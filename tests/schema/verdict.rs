@@ -22,8 +22,8 @@ pub(crate) fn judge(validator: &Validator, table: &toml::Table) -> Verdict {
     let text = toml::to_string(table).expect("a table can be written");
     let faults = match Config::from_str(&text, "changed.toml") {
         Ok(_) => Vec::new(),
-        Err(ConfigError::Faults(report)) => {
-            report.faults.into_iter().map(|fault| (fault.path, fault.message)).collect()
+        Err(ConfigError::Invalid(report)) => {
+            report.diagnostics.into_iter().map(|fault| (fault.path, fault.message)).collect()
         }
         Err(other) => panic!("{other}"),
     };

@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::config::{Config, SourceMap};
 use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 
 /// A file of the repository.
@@ -14,7 +14,7 @@ pub(crate) fn repository(path: &str) -> PathBuf {
 }
 
 /// A shipped configuration with overrides `key=value`.
-pub(crate) fn config(name: &str, overrides: &[&str]) -> (Config, Source) {
+pub(crate) fn config(name: &str, overrides: &[&str]) -> (Config, SourceMap) {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     Config::from_file(&repository("configs").join(name), &overrides).unwrap_or_else(|e| panic!("{e}"))
 }

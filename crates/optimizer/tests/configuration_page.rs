@@ -271,8 +271,8 @@ fn known_keys() -> BTreeSet<(String, String)> {
 /// What the reader says it knows in a table, from its answer to an unknown key.
 fn known_to_reader(table: &str, text: &str) -> Vec<String> {
     let error = Config::from_str(text, "probe.toml").expect_err("an unknown key");
-    let ConfigError::Faults(report) = error else { panic!("{error}") };
-    let fault = report.faults.iter().find(|fault| fault.message.contains("unknown key `zzzzzzzzzz`"));
+    let ConfigError::Invalid(report) = error else { panic!("{error}") };
+    let fault = report.diagnostics.iter().find(|fault| fault.message.contains("unknown key `zzzzzzzzzz`"));
     let known =
         fault.and_then(|fault| fault.expected.as_deref()).unwrap_or_else(|| panic!("{table}: {report}"));
     known.trim_start_matches("known: ").split(", ").map(str::to_owned).collect()

@@ -1,5 +1,6 @@
 //! Every key of every table, for advice on keys that are unknown where they stand.
 
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use serde_json::Value;
@@ -14,14 +15,20 @@ pub(in crate::config) fn known_keys() -> &'static KnownKeys {
     static KEYS: LazyLock<KnownKeys> = LazyLock::new(|| {
         let document = document();
         let mut keys = KnownKeys::default();
-        collect("", &document, &document, &mut keys);
+        collect("", &document, &document, &mut keys, &mut BTreeSet::new());
         keys
     });
     &KEYS
 }
 
-/// Enters the tables inside a table.
-fn collect(path: &str, table: &Value, document: &Value, known: &mut KnownKeys) {
+/// Enters the tables inside a table, each definition where it comes first.
+fn collect<'d>(
+    path: &str,
+    table: &'d Value,
+    document: &'d Value,
+    known: &mut KnownKeys,
+    entered: &mut BTreeSet<&'d str>,
+) {
     for (key, property) in table["properties"].as_object().into_iter().flatten() {
         let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
         let forms = [
@@ -31,13 +38,11 @@ fn collect(path: &str, table: &Value, document: &Value, known: &mut KnownKeys) {
         ];
         for (schema, header) in forms {
             let name = schema["$ref"].as_str().and_then(|name| name.strip_prefix(DEFINITIONS));
-            let Some(inner) = name.filter(|name| !name.ends_with(SUFFIX)).map(|name| &document["$defs"][name]) else {
-                continue;
-            };
-            let Some(keys) = inner["properties"].as_object() else { continue };
-            if known.enter(&header, keys.keys()) {
-                collect(&path, inner, document, known);
-            }
+            let Some(name) = name.filter(|name| !name.ends_with(SUFFIX)) else { continue };
+            let inner = &document["$defs"][name];
+            let Some(keys) = inner["properties"].as_object().filter(|_| entered.insert(name)) else { continue };
+            known.enter(&header, keys.keys());
+            collect(&path, inner, document, known, entered);
         }
     }
 }

@@ -17,13 +17,9 @@ impl KnownKeys {
     /// No table.
     pub(super) const NONE: Self = Self(Vec::new());
 
-    /// Enters a table; whether it is new.
-    pub(in crate::config) fn enter<'k>(&mut self, header: &str, keys: impl Iterator<Item = &'k String>) -> bool {
-        let is_new = self.0.iter().all(|(known, _)| known != header);
-        if is_new {
-            self.0.push((header.to_owned(), keys.cloned().collect()));
-        }
-        is_new
+    /// Enters a table.
+    pub(in crate::config) fn enter<'k>(&mut self, header: &str, keys: impl Iterator<Item = &'k String>) {
+        self.0.push((header.to_owned(), keys.cloned().collect()));
     }
 
     /// The header and the keys of the table at a key path, such as `coils[0]`.

@@ -163,6 +163,9 @@ impl Design {
 
 /// The vector `direction` of a table, scaled to length one.
 pub(super) fn unit_vector(section: &Section<'_>, vector: [f64; 3]) -> Option<[f64; 3]> {
+    if vector.iter().any(|component| component.is_nan()) {
+        return None;
+    }
     let largest = vector.iter().fold(0.0_f64, |largest, component| largest.max(component.abs()));
     if largest < 1e-100 {
         section.wrong(

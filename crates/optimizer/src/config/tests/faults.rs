@@ -2,9 +2,9 @@
 
 use super::*;
 
-pub(super) fn report(text: &str) -> FaultReport {
+pub(super) fn report(text: &str) -> DiagnosticReport {
     match Config::from_str(text, "small.toml") {
-        Err(ConfigError::Faults(report)) => *report,
+        Err(ConfigError::Invalid(report)) => *report,
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("accepted:\n{text}"),
     }
@@ -267,14 +267,14 @@ fn every_fault_is_named_at_its_place() {
         assert!(SMALL.contains(from), "{from}");
         let text = SMALL.replacen(from, to, 1);
         let report = report(&text);
-        let fault = report.faults.iter().find(|fault| fault.path == *path && fault.message.contains(message));
+        let fault = report.diagnostics.iter().find(|fault| fault.path == *path && fault.message.contains(message));
         let fault = fault.unwrap_or_else(|| panic!("{to}: {path}: {message}\n{report}"));
-        let found = line_of(&text, fault.place.span.start);
+        let found = line_of(&text, fault.span.range.start);
         assert!(*line == 0 || found == *line, "{to}: line {found}, not {line}\n{report}");
         assert!(fault.message.chars().next().is_some_and(|c| !c.is_uppercase()), "{}", fault.message);
         assert!(!fault.message.ends_with('.'), "{}", fault.message);
         if *line > 0 && !path.is_empty() {
-            assert_eq!(report.faults.len(), 1, "{to}: one change, one fault\n{report}");
+            assert_eq!(report.diagnostics.len(), 1, "{to}: one change, one fault\n{report}");
             assert!(fault.expected.is_some() || fault.help.is_some(), "{to}: says what to do\n{report}");
         }
     }
@@ -288,7 +288,7 @@ fn all_faults_are_reported_at_once_in_the_order_of_the_text() {
         .replace("[7, 13]", "[7, 1]")
         .replace("[optimizer]", "[optimizer]\nalgoritm = \"mma\"");
     let report = report(&text);
-    let paths: Vec<_> = report.faults.iter().map(|fault| fault.path.as_str()).collect();
+    let paths: Vec<_> = report.diagnostics.iter().map(|fault| fault.path.as_str()).collect();
     assert_eq!(
         paths,
         ["analysis.frequency", "regions.plate.material", "design.grid[1]", "optimizer.algoritm"]
@@ -311,7 +311,7 @@ fn a_long_list_of_faults_is_cut() {
 #[test]
 fn an_empty_text_misses_its_tables() {
     let report = report("");
-    let paths: Vec<_> = report.faults.iter().map(|fault| fault.path.as_str()).collect();
+    let paths: Vec<_> = report.diagnostics.iter().map(|fault| fault.path.as_str()).collect();
     assert_eq!(paths, ["mesh", "analysis"]);
     assert!(report.to_string().contains("missing key `mesh`"));
 }
@@ -368,7 +368,7 @@ fn faults_of_boxes_stand_at_their_keys() {
         frequency = 0
     "#;
     let report = report(text);
-    let paths: Vec<_> = report.faults.iter().map(|fault| fault.path.as_str()).collect();
+    let paths: Vec<_> = report.diagnostics.iter().map(|fault| fault.path.as_str()).collect();
     let expected = [
         "mesh.boxes.growth",
         "mesh.boxes.regions[0].box",
@@ -398,7 +398,7 @@ fn a_generator_needs_its_own_table_and_no_other() {
 #[test]
 fn a_design_needs_a_remesh_table_and_an_optimisation_all_three() {
     let without = SMALL.replace("[remesh]\nregion = \"remesh\"\nslide = [\"x_min\"]\n", "");
-    assert_eq!(report(&without).faults[0].path, "remesh");
+    assert_eq!(report(&without).diagnostics[0].path, "remesh");
 
     let text = "[mesh]\ngenerator = \"shield\"\n[analysis]\nfrequency = 60\n";
     let (config, source) = Config::from_str(text, "small.toml").expect("enough to solve");

@@ -106,7 +106,7 @@ const SHIPPED: [&str; 5] = [
     "shield_two_frequencies.toml",
 ];
 
-fn shipped(name: &str) -> (Config, Source) {
+fn shipped(name: &str) -> (Config, SourceMap) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(name);
     Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -256,8 +256,8 @@ fn a_later_fault_points_at_its_key() {
     let (_, source) = Config::from_str(SMALL, "small.toml").expect("a good configuration");
     let faults = vec![
         source.unknown_name("design.surface", "surface", "plate_bottom", &["plate_botom", "plate_top"]),
-        source.fault("boundaries.flux_parallel[1]", "`y_min` is not planar").expected("a planar surface"),
-        source.fault("output.directory", "a default has no place of its own"),
+        source.diagnostic("boundaries.flux_parallel[1]", "`y_min` is not planar").expected("a planar surface"),
+        source.diagnostic("output.directory", "a default has no place of its own"),
     ];
     assert!(source.check(vec![]).is_ok());
     let text = source.check(faults).expect_err("three faults").to_string();

@@ -35,7 +35,7 @@ motion = [{ nodes = [[0, 0, 0.08]], displacement = [0, 0, 0.01] }]
 /// The same motion by a design.
 const DESIGNED: &str = "[[morph.motion]]\ndesign = \"alternating\"\n[optimizer]";
 
-fn config(text: &str) -> (Config, Source) {
+fn config(text: &str) -> (Config, SourceMap) {
     Config::from_str(text, "morph.toml").unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -67,7 +67,7 @@ fn only_a_motion_alone_may_be_without_a_field_problem() {
     ];
     for (table, text) in tables {
         let report = report(&format!("{MORPH}{text}"));
-        let fault = report.faults.iter().find(|fault| fault.path == "analysis");
+        let fault = report.diagnostics.iter().find(|fault| fault.path == "analysis");
         let help = fault.and_then(|fault| fault.help.as_deref()).unwrap_or_default();
         assert!(help.contains(&format!("`{table}`")), "{report}");
     }
@@ -88,8 +88,8 @@ fn a_case_is_the_configuration_with_its_tables_laid_over_it() {
     assert_eq!(own.increments, Increments::Auto(AutoWord::Auto));
     assert_eq!(own.motion.len(), 1);
     // A fault that shows later points at the line of the case.
-    let fault = source.case(0).fault("remesh.poisson", "too soft");
-    assert_eq!(line_of(source.text(), fault.place.span.start), 21);
+    let fault = source.case(0).diagnostic("remesh.poisson", "too soft");
+    assert_eq!(line_of(source.text(), fault.span.range.start), 21);
 }
 
 #[test]
@@ -158,11 +158,11 @@ fn every_fault_of_a_motion_is_found_once_at_its_place() {
         let text = MORPH.replacen(from, to, 1);
         assert_ne!(text, MORPH, "{from}");
         let report = report(&text);
-        let found: Vec<_> = report.faults.iter().filter(|fault| fault.path == path).collect();
+        let found: Vec<_> = report.diagnostics.iter().filter(|fault| fault.path == path).collect();
         assert_eq!(found.len(), 1, "{from} -> {to}:\n{report}");
         assert!(found[0].message.contains(message), "{}", found[0].message);
         if line > 0 {
-            assert_eq!(line_of(&text, found[0].place.span.start), line, "{report}");
+            assert_eq!(line_of(&text, found[0].span.range.start), line, "{report}");
         }
     }
 }

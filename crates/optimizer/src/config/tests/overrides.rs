@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn with(overrides: &[&str]) -> Result<(Config, Source), ConfigError> {
+fn with(overrides: &[&str]) -> Result<(Config, SourceMap), ConfigError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("small.toml");
     std::fs::write(&path, SMALL).expect("a file");
