@@ -130,7 +130,7 @@ impl Group for Frequencies {
         // A list with a fault is not handed out.
         let several = written.frequencies.unwrap_or_else(|| vec![f64::NAN]);
         if several.is_empty() {
-            section.wrong("frequencies", "`analysis.frequencies` is an empty list", "at least one frequency");
+            section.check_not_empty("frequencies", "at least one frequency");
             return Self::One(f64::NAN);
         }
         if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {

@@ -120,6 +120,7 @@ table! {
         #[also(not_empty)]
         points: Vec<[f64; 3]> = length(FINITE), need "[[\"0 mm\", \"0 mm\", \"-50 mm\"]]";
     }
+    check = |_, section| section.check_not_empty("points", "at least one point of three lengths");
 }
 
 impl Objective {

@@ -1,9 +1,11 @@
 //! What is wrong where a text is no TOML: the parser's own words at its own place, one fault a line.
 //!
-//! Three slips get advice of their own, since everybody makes them: a quote that is not closed, a number with a unit and
-//! without quotes, and a key or table that is there twice.
+//! Slips that everybody makes get advice: a quote or a list that is not closed, a number with a unit and without quotes, and
+//! a key or table that is there twice.
 
 use std::ops::Range;
+
+use toml::de::DeTable;
 
 use super::diagnostic::{Diagnostic, Span};
 use super::tree::shown;
@@ -17,40 +19,56 @@ pub(super) fn diagnostics(document: usize, text: &str, errors: &[toml::de::Error
     let mut errors: Vec<(Range<usize>, &str)> =
         errors.iter().map(|error| (error.span().unwrap_or(0..0), error.message().trim())).collect();
     errors.sort_by_key(|(range, _)| range.start);
-    errors.dedup_by_key(|(range, _)| start_of_line(text, range.start));
-    let diagnostic = |(range, message): (Range<usize>, &str)| {
-        let said = format!("not valid TOML: {}", shown(&message.replace('\n', ", ")));
-        let diagnostic = Diagnostic::new("", Span { document, range: range.clone() }, said);
-        advise(diagnostic, text, range, message)
-    };
-    errors.into_iter().take(MOST_LINES).map(diagnostic).collect()
+    errors.dedup_by_key(|(range, _)| line_of(text, range.start).start);
+    let mut found = Vec::new();
+    for (range, message) in errors.into_iter().take(MOST_LINES) {
+        let line = &text[line_of(text, range.start)];
+        let is_duplicate = message.starts_with("duplicate key");
+        // Where a line is sound by itself, something above it is not closed.
+        let follows = !is_duplicate && DeTable::parse(line).is_ok();
+        if follows && !found.is_empty() {
+            break;
+        }
+        let said = message.replace('\n', ", ").replace(char::is_control, " ");
+        let diagnostic = Diagnostic::new("", Span { document, range: range.clone() }, format!("not valid TOML: {said}"));
+        found.push(match advice(text, &range, line) {
+            _ if is_duplicate => duplicate(diagnostic, text, range),
+            Some(advice) => diagnostic.help(advice),
+            None if follows => diagnostic.help("a list or a table above this line is not closed"),
+            None => diagnostic,
+        });
+        // Under a header that is there twice all keys are there twice.
+        if follows || is_duplicate && line.trim_start().starts_with('[') {
+            break;
+        }
+    }
+    found
 }
 
-/// The fault with advice on the slip that it comes from.
-fn advise(diagnostic: Diagnostic, text: &str, range: Range<usize>, message: &str) -> Diagnostic {
-    let line = text[start_of_line(text, range.start)..].lines().next().unwrap_or_default();
-    let value = line.split_once('=').map_or("", |(_, value)| value.split('#').next().unwrap_or_default().trim());
-    if message.starts_with("duplicate key") {
-        let document = diagnostic.span.document;
-        let diagnostic = diagnostic.help("take one of the two out, or write their keys together");
-        return match first_of(text, &range) {
-            Some(range) => diagnostic.secondary(Span { document, range }, "it stands here first"),
-            None => diagnostic,
-        };
+/// What to do about a text or a quantity without its quotes.
+fn advice(text: &str, range: &Range<usize>, line: &str) -> Option<String> {
+    let value = text.get(range.clone()).unwrap_or_default();
+    if is_number_with_unit(value) {
+        return Some(format!("put quotes around it: \"{}\"", shown(value)));
     }
-    if is_number_with_unit(value) && !value.contains('"') {
-        return diagnostic.help(format!("put quotes around it: \"{}\"", shown(value)));
+    let is_open = line.matches('"').count() % 2 == 1 && !line.contains("\"\"\"");
+    is_open.then(|| "a text needs a quote at each of its ends".to_owned())
+}
+
+/// A key or a header that is there twice, with the first place.
+fn duplicate(diagnostic: Diagnostic, text: &str, range: Range<usize>) -> Diagnostic {
+    let document = diagnostic.span.document;
+    let diagnostic = diagnostic.help("take one of the two out, or write their keys together");
+    match first_of(text, &range) {
+        Some(range) => diagnostic.secondary(Span { document, range }, "it stands here first"),
+        None => diagnostic,
     }
-    if line.matches('"').count() % 2 == 1 && !line.contains("\"\"\"") {
-        return diagnostic.help("a text needs a quote at each of its ends");
-    }
-    diagnostic
 }
 
 /// Where the key, or the header, at a place stands first.
 fn first_of(text: &str, range: &Range<usize>) -> Option<Range<usize>> {
     let name = text.get(range.clone())?;
-    let own = start_of_line(text, range.start);
+    let own = line_of(text, range.start).start;
     let is_header = text[own..].trim_start().starts_with('[');
     let mut first = None;
     let mut start = 0;
@@ -70,8 +88,9 @@ fn first_of(text: &str, range: &Range<usize>) -> Option<Range<usize>> {
     first
 }
 
-/// The first byte of the line that holds a byte.
-fn start_of_line(text: &str, byte: usize) -> usize {
-    let before = text.as_bytes().get(..byte).unwrap_or(text.as_bytes());
-    before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
+/// The line that holds a byte, without its end.
+fn line_of(text: &str, byte: usize) -> Range<usize> {
+    let byte = byte.min(text.len());
+    let start = text.as_bytes()[..byte].iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    start..text[start..].find('\n').map_or(text.len(), |length| start + length)
 }

@@ -166,10 +166,7 @@ impl Group for Target {
                 "one of surface, line, nodes, box and design",
             ),
         }
-        if written.nodes.as_ref().is_some_and(Vec::is_empty) {
-            let message = format!("`{}.nodes` is an empty list", section.path());
-            section.wrong("nodes", message, "at least one point of three lengths");
-        }
+        section.check_not_empty("nodes", "at least one point of three lengths");
         let corners = written.corners.and_then(|corners| flat_box(section, "box", corners));
         let TargetKeys { surface, line, nodes, design, .. } = written;
         let target = design.map(Self::Design).or(line.map(Self::Line)).or(nodes.map(Self::Nodes));
