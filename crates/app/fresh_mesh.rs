@@ -10,7 +10,7 @@
 
 use fluxmorph_geometry::tet4::Point;
 
-use crate::config::{Config, MeshConfig, Source};
+use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::Observer;
@@ -98,7 +98,7 @@ pub struct Gain<'a> {
     /// Its configuration.
     pub config: &'a Config,
     /// Where that stands.
-    pub source: &'a Source,
+    pub source: &'a SourceMap,
     /// How it ended.
     pub stop_reason: StopReason,
     /// Its initial and its best shape.
@@ -255,7 +255,7 @@ mod tests {
     use crate::config::BlockMesh;
 
     /// The coarse shield; without its control grid every node is a variable.
-    fn quick(variables_on_nodes: bool) -> (Config, Source) {
+    fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
         let (mut config, source) = Config::from_file(&path, &[]).expect("a shipped configuration");
         if variables_on_nodes && let Some(design) = &mut config.design {
@@ -289,7 +289,7 @@ mod tests {
 
     fn verified(
         config: &Config,
-        source: &Source,
+        source: &SourceMap,
         shapes: &Shapes,
         stop_reason: StopReason,
         interrupted: bool,

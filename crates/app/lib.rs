@@ -5,7 +5,6 @@
 
 pub mod cli;
 pub mod config;
-pub mod diagnostics;
 mod error;
 mod exit_code;
 mod exports;
@@ -18,10 +17,10 @@ pub mod morph;
 pub mod observer;
 pub mod output;
 pub mod report;
-pub mod schema;
 pub mod session;
 pub mod setup;
 pub mod sweep;
 
+pub use config::{diagnostics, schema};
 pub use error::Error;
 pub use exit_code::ExitCode;

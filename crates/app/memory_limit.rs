@@ -9,7 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::config::{Config, ConfigError, MeshConfig, Source};
+use crate::config::{Config, ConfigError, MeshConfig, SourceMap};
 use crate::output::OlderRun;
 
 /// Bytes for each tetrahedron of the leanest set-up: mesh, adjacency, and pattern of a linear problem without motion.
@@ -33,7 +33,7 @@ struct Room {
 ///
 /// # Errors
 /// A fault at the key of the mesh.
-pub(crate) fn check_mesh(config: &Config, source: &Source) -> Result<(), ConfigError> {
+pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), ConfigError> {
     let Some(room) = room() else { return Ok(()) };
     let cases = config.morph.iter().flat_map(|morph| &morph.cases).enumerate();
     let cases = cases.filter_map(|(i, case)| Some((&case.config.as_ref()?.mesh, source.case(i))));
@@ -62,7 +62,7 @@ pub(crate) fn check_mesh(config: &Config, source: &Source) -> Result<(), ConfigE
 ///
 /// # Errors
 /// A fault at the mesh.
-pub(crate) fn check_problem(estimate: usize, source: &Source, older: OlderRun) -> Result<(), ConfigError> {
+pub(crate) fn check_problem(estimate: usize, source: &SourceMap, older: OlderRun) -> Result<(), ConfigError> {
     match room() {
         Some(room) if older == OlderRun::Keep => {
             refuse_beyond(room, source, ("mesh", "solving the problem"), estimate as u64)
@@ -82,7 +82,7 @@ fn beyond(room: Room, needed: u64) -> String {
 
 fn refuse_beyond(
     room: Room,
-    source: &Source,
+    source: &SourceMap,
     (key, what): (&str, &str),
     needed: u64,
 ) -> Result<(), ConfigError> {
@@ -91,7 +91,7 @@ fn refuse_beyond(
     }
     let message = format!("{what} needs {}", beyond(room, needed));
     let fault = source
-        .fault(key, message)
+        .diagnostic(key, message)
         .expected("a mesh that fits into memory")
         .help("take a coarser mesh or a larger machine, or go on with --force");
     Err(source.error(vec![fault]))

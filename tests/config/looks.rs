@@ -4,7 +4,7 @@ use std::fs;
 use std::process::Command;
 
 use crate::case::read;
-use crate::program::app::config::{Config, ConfigError, FaultReport};
+use crate::program::app::config::{Config, ConfigError, DiagnosticReport};
 use crate::program::app::diagnostics::{Style, render};
 use crate::program::{assert_holds, folder, limited, text, write};
 
@@ -16,9 +16,9 @@ fn three_faults() -> String {
         .replace("poisson = 0.3", "poisson = 0.5")
 }
 
-pub(crate) fn report(text: &str) -> FaultReport {
+pub(crate) fn report(text: &str) -> DiagnosticReport {
     match Config::from_str(text, "device.toml") {
-        Err(ConfigError::Faults(report)) => *report,
+        Err(ConfigError::Invalid(report)) => *report,
         other => panic!("{other:?}\n{text}"),
     }
 }
@@ -75,8 +75,10 @@ fn a_later_fault_points_at_its_key() {
     let (_, source) = Config::from_str(&small, "small.toml").expect("sound");
     let faults = vec![
         source.unknown_name("design.surface", "surface", "plate_bottom", &["plate_botom", "plate_top"]),
-        source.fault("boundaries.flux_parallel[1]", "`y_min` is not planar").expected("a planar surface"),
-        source.fault("output.directory", "a default has no place of its own"),
+        source
+            .diagnostic("boundaries.flux_parallel[1]", "`y_min` is not planar")
+            .expected("a planar surface"),
+        source.diagnostic("output.directory", "a default has no place of its own"),
     ];
     assert!(source.check(vec![]).is_ok());
     let text = source.check(faults).expect_err("three faults").to_string();

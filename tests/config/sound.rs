@@ -3,7 +3,7 @@
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SphereParameters};
 
 use crate::case::{Case, overwrite, read};
-use crate::program::app::config::{Config, MeshConfig, Source, resolved_toml};
+use crate::program::app::config::{Config, MeshConfig, SourceMap, resolved_toml};
 use crate::program::app::setup::build_mesh;
 use crate::program::{folder, text};
 

@@ -167,7 +167,7 @@ fn named(help: Option<&str>) -> Vec<String> {
 /// What the reader knows in a place, and what it offers there, from the fault that says some words.
 fn answer(text: &str, says: &str) -> (Vec<String>, Vec<String>) {
     let report = report(text);
-    let fault = report.faults.iter().find(|fault| fault.message.contains(says));
+    let fault = report.diagnostics.iter().find(|fault| fault.message.contains(says));
     let fault = fault.unwrap_or_else(|| panic!("no `{says}` in\n{report}"));
     let known = fault.expected.as_deref().unwrap_or_default().trim_start_matches("known: ");
     (known.split(", ").map(str::to_owned).collect(), named(fault.help.as_deref()))

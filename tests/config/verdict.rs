@@ -43,8 +43,8 @@ pub(crate) fn judge(validator: &Validator, table: &toml::Table) -> Verdict {
             }
             Vec::new()
         }
-        Err(ConfigError::Faults(report)) => {
-            report.faults.into_iter().map(|fault| (fault.path, fault.message)).collect()
+        Err(ConfigError::Invalid(report)) => {
+            report.diagnostics.into_iter().map(|fault| (fault.path, fault.message)).collect()
         }
         Err(other) => panic!("{other}"),
     };

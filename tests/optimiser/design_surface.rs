@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use fluxmorph::config::{Config, Source};
+use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::setup::{Purpose, set_up, variable_count};
 
 /// The quick shield with another `[design]` in place of its surface, direction and grid.
-fn designed(design: &str) -> (Config, Source) {
+fn designed(design: &str) -> (Config, SourceMap) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let mut text = std::fs::read_to_string(path).unwrap();
     let start = text.find("surface = \"plate_bottom\"").unwrap();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use fluxmorph::config::{Config, Source};
+use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::observer::Silent;
 use fluxmorph::output::{Disk, OlderRun, RunResult};
 use fluxmorph::session::{self, Limits, Options, SavedRun};
@@ -15,23 +15,23 @@ use crate::support::{self, changed, parsed};
 /// Where the runs write.
 pub(crate) const FOLDER: &str = "/runs/block";
 
-fn into_folder((mut config, source): (Config, Source)) -> (Config, Source) {
+fn into_folder((mut config, source): (Config, SourceMap)) -> (Config, SourceMap) {
     config.output.directory = PathBuf::from(FOLDER);
     (config, source)
 }
 
 /// The block with some texts replaced.
-pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, Source) {
+pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, SourceMap) {
     into_folder(parsed(&changed(BLOCK, changes)))
 }
 
 /// The block with a bound on its volume.
-pub(crate) fn constrained() -> (Config, Source) {
+pub(crate) fn constrained() -> (Config, SourceMap) {
     block(&[CONSTRAINT])
 }
 
 /// The block with steps so cautious that the mesh has several references.
-pub(crate) fn with_rounds() -> (Config, Source) {
+pub(crate) fn with_rounds() -> (Config, SourceMap) {
     block(&[
         ROUNDS,
         ("max_evaluations = 6", "max_evaluations = 12"),
@@ -41,12 +41,12 @@ pub(crate) fn with_rounds() -> (Config, Source) {
 }
 
 /// A shipped configuration.
-pub(crate) fn shipped(name: &str) -> (Config, Source) {
+pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
     into_folder(support::config(name, &[]))
 }
 
 /// Runs a configuration from its start.
-pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, Source)) -> Result<RunResult, Error> {
+pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
     let options =
         Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
     session::run(config, source, options, &mut Silent)

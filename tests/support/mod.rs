@@ -14,7 +14,7 @@ pub(crate) mod whole;
 
 use std::path::PathBuf;
 
-use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::config::{Config, SourceMap};
 use fluxmorph_optimizer::setup::{Purpose, Setup, set_up};
 
 /// A file of the repository.
@@ -56,7 +56,7 @@ pub(crate) fn write_into_page(page: &str, name: &str, table: &str) {
 }
 
 /// A shipped configuration with overrides `key=value`.
-pub(crate) fn config(name: &str, overrides: &[&str]) -> (Config, Source) {
+pub(crate) fn config(name: &str, overrides: &[&str]) -> (Config, SourceMap) {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     Config::from_file(&repository("configs").join(name), &overrides).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -68,7 +68,7 @@ pub(crate) fn setup(name: &str, overrides: &[&str]) -> Setup {
 }
 
 /// A configuration of this text.
-pub(crate) fn parsed(text: &str) -> (Config, Source) {
+pub(crate) fn parsed(text: &str) -> (Config, SourceMap) {
     Config::from_str(text, "test.toml").unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -8,7 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::template::Template;
 use super::{examples, exit};
-use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, Source, parse_quantity};
+use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::output::OlderRun;
@@ -298,7 +298,7 @@ impl CommonArgs {
     ///
     /// # Errors
     /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
-    pub fn load(&self) -> Result<(Config, Source), Error> {
+    pub fn load(&self) -> Result<(Config, SourceMap), Error> {
         let (mut config, source) = Config::from_file(&self.config, &self.overrides).map_err(with_names)?;
         if !self.work.allow_outside {
             let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
@@ -336,7 +336,7 @@ impl RunArgs {
     ///
     /// # Errors
     /// When the configuration cannot be read or is wrong.
-    pub fn load(&self) -> Result<(Config, Source), Error> {
+    pub fn load(&self) -> Result<(Config, SourceMap), Error> {
         let (mut config, source) = self.common.load()?;
         if let Some(evaluations) = self.limits.max_evaluations {
             config.optimizer.max_evaluations = evaluations;

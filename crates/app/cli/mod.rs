@@ -88,7 +88,7 @@ fn done(cli: &Cli) -> ExitCode {
 /// What is shown for an error on standard error.
 fn message(error: &Error) -> String {
     match error {
-        Error::Config(ConfigError::Faults(report)) | Error::Design(DesignFileError::Fault(report)) => {
+        Error::Config(ConfigError::Invalid(report)) | Error::Design(DesignFileError::Fault(report)) => {
             diagnostics::render(report, Style::for_stderr())
         }
         other => match blame::keys_of_advice(other) {

@@ -12,7 +12,7 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::session;
@@ -89,7 +89,7 @@ impl Ranks {
 
     /// Where this rank is a worker: sets the problem up, executes commands until the first rank ends, and says how this one
     /// ended.
-    pub(super) fn run_worker(&self, config: &Config, source: &Source, purpose: Purpose) -> Option<ExitCode> {
+    pub(super) fn run_worker(&self, config: &Config, source: &SourceMap, purpose: Purpose) -> Option<ExitCode> {
         let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
         session::serve(group, config, source, purpose);
         Some(ExitCode::Success)

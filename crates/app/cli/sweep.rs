@@ -102,7 +102,7 @@ fn tell_faults(error: &Error) {
 
 fn rendered(fault: &ConfigError) -> String {
     match fault {
-        ConfigError::Faults(report) => diagnostics::render(report, Style::for_stderr()),
+        ConfigError::Invalid(report) => diagnostics::render(report, Style::for_stderr()),
         other => other.to_string(),
     }
 }

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::report::verdict;
 use super::tune::{Found, nothing_to_search, tune};
 use super::{CaseReport, MorphReport, Parameters, Walk, csv, walk};
-use crate::config::{Config, Morph, Paper, Source, resolved_toml};
+use crate::config::{Config, Morph, Paper, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::observer::RunObserver;
 use crate::output::{Manifest, RunDirectory, RunStatus, StopReason, peak_memory_bytes, to_json};
@@ -27,7 +27,7 @@ use crate::setup::{MotionSetup, set_up_motion};
 struct Job<'a> {
     name: &'a str,
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
     morph: &'a Morph,
     paper: Option<Paper>,
     setup: MotionSetup,
@@ -43,7 +43,7 @@ struct Job<'a> {
 /// refuses, and files that cannot be written, with the manifest completed.
 pub fn morph(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     parameters: Parameters,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
@@ -111,7 +111,7 @@ pub struct MotionSummary {
 ///
 /// # Errors
 /// Faults of the configuration, and whatever the elastic map refuses.
-pub fn inspected(config: &Config, source: &Source) -> Result<Vec<MotionSummary>, Error> {
+pub fn inspected(config: &Config, source: &SourceMap) -> Result<Vec<MotionSummary>, Error> {
     if config.morph.is_none() {
         return Ok(Vec::new());
     }
@@ -129,11 +129,11 @@ pub fn inspected(config: &Config, source: &Source) -> Result<Vec<MotionSummary>,
 }
 
 /// Every case, set up; the tuner has one: the configuration itself.
-fn jobs<'a>(config: &'a Config, source: &'a Source, parameters: Parameters) -> Result<Vec<Job<'a>>, Error> {
+fn jobs<'a>(config: &'a Config, source: &'a SourceMap, parameters: Parameters) -> Result<Vec<Job<'a>>, Error> {
     let own = config.morphing(source)?.morph;
     if parameters == Parameters::Tuned && own.motion.is_empty() {
         let fault = source
-            .fault(
+            .diagnostic(
                 "morph",
                 "there is no [[morph.motion]] outside of the cases: what to tune for is not clear",
             )
@@ -158,7 +158,7 @@ fn jobs<'a>(config: &'a Config, source: &'a Source, parameters: Parameters) -> R
 /// A run directory that is open, and the motions to be made.
 struct Session<'a> {
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
     parameters: Parameters,
     jobs: Vec<Job<'a>>,
     directory: RunDirectory,

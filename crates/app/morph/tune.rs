@@ -14,7 +14,7 @@ use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
 use super::table::aligned;
-use crate::config::{Config, Increments, Remesh, Source, StiffnessLaw, Subregion, Tune, TunedParameter};
+use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::observer::Observer;
 use crate::setup::{MotionSetup, set_up_motion};
@@ -123,7 +123,7 @@ pub(super) fn nothing_to_search(settings: &Tune, setup: &MotionSetup) -> Option<
 /// Whatever the elastic map refuses at the parameters of the configuration.
 pub(super) fn tune(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     setup: &MotionSetup,
     interrupted: &dyn Fn() -> bool,
     observer: &mut dyn Observer,

@@ -7,7 +7,7 @@ use fluxmorph_geometry::io::open_regular;
 use serde_json::Value;
 
 use super::json_place;
-use crate::config::{Document, Fault, FaultReport, Faulty, Place};
+use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
 const LARGEST: u64 = 256 * 1024 * 1024;
@@ -36,7 +36,7 @@ pub enum DesignFileError {
     },
     /// The file holds something else at one place.
     #[error("{0}")]
-    Fault(Box<FaultReport>),
+    Fault(Box<DiagnosticReport>),
     /// The design does not fit the problem.
     #[error(
         "the design `{path}` has {found} values, but the problem has {expected} design variables; give one value [m] for \
@@ -66,11 +66,11 @@ pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileE
     }
     let text = std::str::from_utf8(&bytes)
         .map_err(|error| content(format!("it is not UTF-8 text at byte {}", error.valid_up_to())))?;
-    let faulty = |span: std::ops::Range<usize>, message: String| {
+    let faulty = |range: std::ops::Range<usize>, message: String| {
         let document = Document::whole(path.display().to_string(), text);
-        let fault = Fault::new("", Place { document: 0, span }, message)
+        let fault = Diagnostic::new("", Span { document: 0, range }, message)
             .help("give a result.json or a JSON array of lengths in metres");
-        DesignFileError::Fault(Box::new(FaultReport::of_file(Faulty::Design, document, fault)))
+        DesignFileError::Fault(Box::new(DiagnosticReport::of_file(Subject::Design, document, fault)))
     };
     let value: Value = serde_json::from_str(text).map_err(|error| {
         let span = json_place::at_line(text, error.line(), error.column());

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::process::{hostname, utc_timestamp};
 use super::{OutputError, RunDirectory};
-use crate::config::{Optimizer, Source};
+use crate::config::{Optimizer, SourceMap};
 
 /// The mark by which a run directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -204,7 +204,7 @@ impl Manifest {
 
     /// The same with the configuration and the overrides of the command line.
     #[must_use]
-    pub fn reading(mut self, source: &Source) -> Self {
+    pub fn reading(mut self, source: &SourceMap) -> Self {
         self.config = source.documents().first().map(|document| FileHash {
             path: document.name.clone(),
             blake3: blake3_hex(document.text.as_bytes()),

@@ -40,7 +40,7 @@ mod words;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::output::{Disk, Manifest, RunDirectory};
 use crate::session;
@@ -52,7 +52,7 @@ pub struct ReportedRun {
     directory: RunDirectory,
     manifest: Manifest,
     config: Config,
-    source: Source,
+    source: SourceMap,
 }
 
 impl ReportedRun {
@@ -81,7 +81,7 @@ impl ReportedRun {
     }
 
     /// The configuration of the run, which names the mesh that is made or read again.
-    pub fn config(&self) -> (&Config, &Source) {
+    pub fn config(&self) -> (&Config, &SourceMap) {
         (&self.config, &self.source)
     }
 

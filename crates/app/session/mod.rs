@@ -18,7 +18,7 @@ use std::time::Instant;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
-use crate::config::{Config, FieldsKept, MeshConfig, Source, resolved_toml};
+use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::exports;
 use crate::fresh_mesh::{self, Check, Gain, Shapes};
@@ -61,7 +61,7 @@ pub struct Options<'a> {
 /// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
 pub fn run(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
@@ -79,7 +79,7 @@ pub fn run(
 ///
 /// # Panics
 /// At the first rank.
-pub fn serve(group: &RankGroup, config: &Config, source: &Source, purpose: Purpose) {
+pub fn serve(group: &RankGroup, config: &Config, source: &SourceMap, purpose: Purpose) {
     assert_eq!(group.role(), Role::Worker, "the first rank leads");
     let setup = set_up_watched(config, source, purpose, Some(group), &mut |_| ());
     let directory = config.output.directory.clone();
@@ -91,7 +91,7 @@ pub fn serve(group: &RankGroup, config: &Config, source: &Source, purpose: Purpo
 struct Session<'a> {
     command: &'static str,
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
     setup: Setup,
     /// Steps that took the mesh near the first design.
     approach: Vec<RoundEvent>,

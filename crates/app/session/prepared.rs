@@ -6,7 +6,7 @@ use std::time::Instant;
 use fluxmorph_geometry::parallel::RankGroup;
 
 use super::{Options, Session, mesh_hash};
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::observer::RunObserver;
@@ -23,7 +23,7 @@ pub(super) struct Prepared<'a> {
     /// Steps that took the mesh near the first design.
     pub(super) approach: Vec<RoundEvent>,
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
     options: Options<'a>,
     clock: Instant,
 }
@@ -32,7 +32,7 @@ impl<'a> Prepared<'a> {
     /// Sets a problem up that fits into the memory.
     pub(super) fn new(
         config: &'a Config,
-        source: &'a Source,
+        source: &'a SourceMap,
         purpose: Purpose,
         options: Options<'a>,
         observer: &mut dyn RunObserver,

@@ -8,7 +8,7 @@ use fluxmorph_geometry::parallel::RankGroup;
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session};
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::journal::{Contents, Identity, Journal, Rest};
 use crate::observer::RunObserver;
@@ -37,7 +37,7 @@ pub struct SavedRun {
     directory: RunDirectory,
     manifest: Manifest,
     config: Config,
-    source: Source,
+    source: SourceMap,
 }
 
 impl SavedRun {
@@ -59,7 +59,7 @@ impl SavedRun {
     }
 
     /// The configuration that the run was started with.
-    pub fn config(&self) -> (&Config, &Source) {
+    pub fn config(&self) -> (&Config, &SourceMap) {
         (&self.config, &self.source)
     }
 }
@@ -135,7 +135,7 @@ fn not_resumable(directory: &RunDirectory, cause: String) -> Error {
 pub(crate) fn configuration(
     directory: &RunDirectory,
     manifest: &Manifest,
-) -> Result<(Config, Source), Error> {
+) -> Result<(Config, SourceMap), Error> {
     let path = directory.config();
     let bytes = match directory.disk().read(&path, LARGEST[0]) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {

@@ -4,7 +4,7 @@ use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
 use super::summary::{constraints, terms};
 use super::{Options, Session};
-use crate::config::{Config, FieldsKept, Source};
+use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
 use crate::exports;
 use crate::observer::RunObserver;
@@ -20,7 +20,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem};
 /// As [`super::run`].
 pub fn solve(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     design: Option<Vec<f64>>,
     options: Options<'_>,
     observer: &mut dyn RunObserver,

@@ -10,13 +10,13 @@ use fluxmorph_solver::{NonConvergence, SolverError};
 
 use super::functional;
 use super::mesh::surface_names;
-use crate::config::{CoilShape, Config, ConfigError, Fault, RemeshExtent, Source};
+use crate::config::{CoilShape, Config, ConfigError, Diagnostic, RemeshExtent, SourceMap};
 use crate::error::Error;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::geometric::GeometricError;
 
 /// The error at the key that it comes from, where there is one.
-pub(crate) fn placed(error: Error, config: &Config, source: &Source) -> Error {
+pub(crate) fn placed(error: Error, config: &Config, source: &SourceMap) -> Error {
     let blame = Blame { config, source };
     let Error::Optimizer(cause) = &error else { return error };
     let fault = match cause {
@@ -26,7 +26,7 @@ pub(crate) fn placed(error: Error, config: &Config, source: &Source) -> Error {
         OptimizerError::Mesh(error) => blame.mesh(error),
         OptimizerError::Constraint { name, .. } => blame.constraint(name, cause),
         OptimizerError::FirstDesign { .. } | OptimizerError::DesignUnreached { .. } => {
-            Some(with_advice(source.fault("design.initial", error.to_string())))
+            Some(with_advice(source.diagnostic("design.initial", error.to_string())))
         }
         _ => None,
     };
@@ -74,12 +74,12 @@ fn plane_advice(fault: &PlaneFault) -> Option<&'static str> {
 /// Gathers what independent parts of a set-up find at fault.
 pub(super) struct Gathered<'a> {
     config: &'a Config,
-    source: &'a Source,
-    faults: Vec<Fault>,
+    source: &'a SourceMap,
+    faults: Vec<Diagnostic>,
 }
 
 impl<'a> Gathered<'a> {
-    pub(super) fn new(config: &'a Config, source: &'a Source, faults: Vec<Fault>) -> Self {
+    pub(super) fn new(config: &'a Config, source: &'a SourceMap, faults: Vec<Diagnostic>) -> Self {
         Self { config, source, faults }
     }
 
@@ -90,8 +90,8 @@ impl<'a> Gathered<'a> {
     pub(super) fn take<T>(&mut self, made: Result<T, Error>) -> Result<Option<T>, Error> {
         match made.map_err(|error| placed(error, self.config, self.source)) {
             Ok(value) => Ok(Some(value)),
-            Err(Error::Config(ConfigError::Faults(report))) => {
-                for fault in report.faults {
+            Err(Error::Config(ConfigError::Invalid(report))) => {
+                for fault in report.diagnostics {
                     if !self.faults.contains(&fault) {
                         self.faults.push(fault);
                     }
@@ -111,7 +111,7 @@ impl<'a> Gathered<'a> {
 }
 
 /// The same fault with what its message says to do, behind the last semicolon, as its help.
-pub(super) fn with_advice(mut fault: Fault) -> Fault {
+pub(super) fn with_advice(mut fault: Diagnostic) -> Diagnostic {
     if let Some((message, advice)) = fault.message.rsplit_once("; ") {
         fault.help = Some(advice.to_owned());
         fault.message = message.to_owned();
@@ -121,12 +121,12 @@ pub(super) fn with_advice(mut fault: Fault) -> Fault {
 
 struct Blame<'a> {
     config: &'a Config,
-    source: &'a Source,
+    source: &'a SourceMap,
 }
 
 impl Blame<'_> {
-    fn at(&self, path: &str, error: &dyn std::fmt::Display) -> Option<Fault> {
-        Some(with_advice(self.source.fault(path, error.to_string())))
+    fn at(&self, path: &str, error: &dyn std::fmt::Display) -> Option<Diagnostic> {
+        Some(with_advice(self.source.diagnostic(path, error.to_string())))
     }
 
     /// The key path of a surface in a list of the configuration whose path starts like that.
@@ -150,13 +150,13 @@ impl Blame<'_> {
         Some(format!("coils[{index}].{key}"))
     }
 
-    fn solver(&self, error: &SolverError) -> Option<Fault> {
+    fn solver(&self, error: &SolverError) -> Option<Diagnostic> {
         match error {
             SolverError::TwoConditions { surfaces: [first, second], .. } => {
                 let second = self.surface("boundaries", second)?;
                 let fault = self.at(&second, error)?;
                 Some(match self.surface("boundaries", first) {
-                    Some(first) => fault.other(self.source.place(&first), "it shares a face with this one"),
+                    Some(first) => fault.secondary(self.source.span(&first), "it shares a face with this one"),
                     None => fault,
                 })
             }
@@ -168,7 +168,7 @@ impl Blame<'_> {
                     fault.help = Some(advice.to_owned());
                 }
                 Some(match self.surface("boundaries", surface) {
-                    Some(surface) => fault.other(self.source.place(&surface), "the surface is named here"),
+                    Some(surface) => fault.secondary(self.source.span(&surface), "the surface is named here"),
                     None => fault,
                 })
             }
@@ -194,7 +194,7 @@ impl Blame<'_> {
         }
     }
 
-    fn remesh(&self, error: &RemeshError) -> Option<Fault> {
+    fn remesh(&self, error: &RemeshError) -> Option<Diagnostic> {
         let extent = match self.config.remesh.as_ref()?.extent {
             RemeshExtent::Regions(_) => "remesh.region",
             RemeshExtent::Box(_) => "remesh.box",
@@ -219,7 +219,7 @@ impl Blame<'_> {
         }
     }
 
-    fn geometric(&self, error: &GeometricError) -> Option<Fault> {
+    fn geometric(&self, error: &GeometricError) -> Option<Diagnostic> {
         match error {
             GeometricError::NoElements { region } | GeometricError::Boxed { region } => {
                 self.region(region, error)
@@ -229,7 +229,7 @@ impl Blame<'_> {
         }
     }
 
-    fn mesh(&self, error: &MeshError) -> Option<Fault> {
+    fn mesh(&self, error: &MeshError) -> Option<Diagnostic> {
         match error {
             MeshError::UnknownRegion { name, .. } => self.region(name, error),
             MeshError::UnknownSurface { name, .. } | MeshError::NoInterface { name } => {
@@ -240,7 +240,7 @@ impl Blame<'_> {
     }
 
     /// A fault of a region where objective, constraints or `[regions]` name it.
-    fn region(&self, name: &str, error: &dyn std::fmt::Display) -> Option<Fault> {
+    fn region(&self, name: &str, error: &dyn std::fmt::Display) -> Option<Diagnostic> {
         let named = functional::regions(self.config).into_iter().find(|(_, own)| *own == name);
         let path = match named {
             Some((path, _)) => path,
@@ -249,7 +249,7 @@ impl Blame<'_> {
         self.at(&path, error)
     }
 
-    fn constraint(&self, name: &str, error: &OptimizerError) -> Option<Fault> {
+    fn constraint(&self, name: &str, error: &OptimizerError) -> Option<Diagnostic> {
         let index = self.config.constraints.iter().position(|constraint| constraint.name == name)?;
         self.at(&format!("constraints[{index}].upper_ratio"), error)
     }

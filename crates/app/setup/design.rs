@@ -6,7 +6,7 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
 
 use super::millimetres;
-use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, Source};
+use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 use fluxmorph_optimizer::design::{
     Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
@@ -15,7 +15,7 @@ use fluxmorph_optimizer::design::{
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     design: &config::Design,
     mesh: &Mesh,
 ) -> Result<DesignSurface, Error> {
@@ -67,7 +67,7 @@ pub(super) fn surface(
     let surface = DesignSurface::new(mesh, &setup).map_err(|error| fault(source, design, error))?;
     if surface.variable_count() == 0 {
         let fault = source
-            .fault("design", "no node of the design surface can move")
+            .diagnostic("design", "no node of the design surface can move")
             .expected("a surface with nodes off its rim and off the planes that it must keep")
             .help("take rim = \"free\", or another surface or direction");
         return Err(source.error(vec![fault]).into());
@@ -93,7 +93,7 @@ pub(super) fn triangles(design: &config::Design, mesh: &Mesh) -> Result<Vec<[Nod
 
 /// The same surface on the mesh without the regions that impedance surfaces replace.
 pub(super) fn on_remaining(
-    source: &Source,
+    source: &SourceMap,
     surface: &DesignSurface,
     full_mesh: &Mesh,
     mesh: &Mesh,
@@ -112,7 +112,7 @@ pub(super) fn on_remaining(
         surface.nodes().len()
     );
     let fault = source
-        .fault("design.surface", message)
+        .diagnostic("design.surface", message)
         .expected("a surface between such a region and a meshed one, or model = \"volume\"");
     Err(source.error(vec![fault]).into())
 }
@@ -146,13 +146,13 @@ fn out_of_body(
     }
 }
 
-fn unclear_side(source: &Source, mesh: &Mesh, name: &str, triangle: [NodeId; 3]) -> Error {
+fn unclear_side(source: &SourceMap, mesh: &Mesh, name: &str, triangle: [NodeId; 3]) -> Error {
     let place = fluxmorph_geometry::tet4::centroid(triangle.map(|n| mesh.point(n)));
     let message = format!(
         "which side of `{name}` is the body that the design thickens is not clear at {}",
         millimetres(place)
     );
-    let fault = source.fault("design.direction", message).expected(
+    let fault = source.diagnostic("design.direction", message).expected(
         "a surface with a [regions] entry on one side and air on the other, or a direction of three numbers",
     );
     source.error(vec![fault]).into()
@@ -163,21 +163,21 @@ fn mirror(plane: &config::SymmetryPlane) -> Mirror {
 }
 
 /// The fault at the key that the surface does not fit.
-fn fault(source: &Source, design: &config::Design, error: DesignError) -> Error {
+fn fault(source: &SourceMap, design: &config::Design, error: DesignError) -> Error {
     let names = design.surface.join("`, `");
     let fault = match error {
-        DesignError::Empty => source.fault("design.surface", format!("the surface `{names}` has no triangles")),
+        DesignError::Empty => source.diagnostic("design.surface", format!("the surface `{names}` has no triangles")),
         DesignError::NoExtent { .. } => source
-            .fault("design.direction", format!("a control grid cannot be laid across `design.direction` on `{names}`"))
+            .diagnostic("design.direction", format!("a control grid cannot be laid across `design.direction` on `{names}`"))
             .expected("the direction that stands most upright on the surface, or no design.grid"),
         DesignError::Folded { point, axis } => source
-            .fault(
+            .diagnostic(
                 "design.grid",
                 format!("a control grid cannot be laid over `{names}`: at {} it turns back along {axis}", millimetres(point)),
             )
             .expected("a surface that is a height over two coordinates, or design.filter_radius instead of design.grid"),
         DesignError::NoPartner { what, point, axis, at, distance } => source
-            .fault(
+            .diagnostic(
                 "design.symmetry",
                 format!(
                     "the {what} at {} has no partner in the mirror {axis} = {:.3} mm: the nearest lies {:.3e} mm from its \
@@ -190,10 +190,10 @@ fn fault(source: &Source, design: &config::Design, error: DesignError) -> Error 
             .expected("a surface and a mesh that are symmetric about the plane")
             .help("check `at`, mesh one half and mirror it, or leave the symmetry out"),
         DesignError::WideFilter { .. } => source
-            .fault("design.filter_radius", error.to_string())
+            .diagnostic("design.filter_radius", error.to_string())
             .help("take a smaller radius, or a coarser mesh on the surface"),
         // Of a mirror plane.
-        _ => source.fault("design.symmetry", error.to_string()),
+        _ => source.diagnostic("design.symmetry", error.to_string()),
     };
     source.error(vec![fault]).into()
 }

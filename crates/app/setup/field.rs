@@ -10,8 +10,8 @@ use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, 
 
 use super::blame::Gathered;
 use crate::config::{
-    self, Config, FactorReuse, Fault, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel, SolverMethod,
-    Source,
+    self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel, SolverMethod,
+    SourceMap,
 };
 use crate::error::Error;
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -233,13 +233,13 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
 }
 
 /// The coils on the mesh, or the faults of all of them.
-pub(super) fn coils(config: &Config, source: &Source, mesh: &Mesh) -> Result<Vec<coil::Coil>, Error> {
+pub(super) fn coils(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<Vec<coil::Coil>, Error> {
     let mut gathered = Gathered::new(config, source, Vec::new());
     let mut coils = Vec::new();
     for (i, written) in config.coils.iter().enumerate() {
         let made = coil(written, mesh).map_err(|error| match error {
             Error::Optimizer(OptimizerError::Solver(SolverError::Parameter { ref what, .. })) => {
-                source.error(vec![source.fault(&format!("coils[{i}].{what}"), error.to_string())]).into()
+                source.error(vec![source.diagnostic(&format!("coils[{i}].{what}"), error.to_string())]).into()
             }
             other => other,
         });
@@ -250,12 +250,12 @@ pub(super) fn coils(config: &Config, source: &Source, mesh: &Mesh) -> Result<Vec
 }
 
 /// Every region that no coil can be, and every phase that means nothing.
-pub(super) fn coil_faults(config: &Config, source: &Source) -> Vec<Fault> {
+pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     let is_static = config.analysis.frequencies().contains(&0.0);
     for (i, coil) in config.coils.iter().enumerate() {
         if is_static && coil.phase != 0.0 {
-            let fault = source.fault(&format!("coils[{i}].phase"), "a static current has no phase");
+            let fault = source.diagnostic(&format!("coils[{i}].phase"), "a static current has no phase");
             faults.push(
                 fault.expected("no phase, or frequencies above 0 Hz; a reversed current is a negative one"),
             );
@@ -263,7 +263,7 @@ pub(super) fn coil_faults(config: &Config, source: &Source) -> Vec<Fault> {
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
         if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
-            let fault = source.fault(&path, format!("`{name}` is replaced by its impedance surface"));
+            let fault = source.diagnostic(&path, format!("`{name}` is replaced by its impedance surface"));
             faults.push(fault.expected("a region that is meshed"));
         } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
             && super::material(config, name).conductivity > 0.0
@@ -272,7 +272,7 @@ pub(super) fn coil_faults(config: &Config, source: &Source) -> Vec<Fault> {
                 "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
             );
             faults.push(
-                source.fault(&path, message).expected("a material without conductivity for the winding"),
+                source.diagnostic(&path, message).expected("a material without conductivity for the winding"),
             );
         }
     }

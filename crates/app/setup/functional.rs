@@ -7,7 +7,7 @@ use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional};
 
 use crate::config::{
-    self, BodyKind, Config, Fault, Limit as Written, ObjectiveKind, RegionModel, Source, UpperBound,
+    self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, UpperBound,
 };
 use crate::error::Error;
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -42,7 +42,7 @@ pub(super) fn regions(config: &Config) -> Vec<(String, &str)> {
 }
 
 /// What objective and constraints ask of regions that these cannot give.
-pub(super) fn faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     let known = |name: &&str| topology.region(name).is_ok();
     for (path, functional) in functionals(config) {
@@ -53,7 +53,7 @@ pub(super) fn faults(config: &Config, source: &Source, topology: &Topology) -> V
                 let message = format!("`{region}` does not conduct, so it has no eddy-current loss");
                 faults.push(
                     source
-                        .fault(&format!("{path}.region"), message)
+                        .diagnostic(&format!("{path}.region"), message)
                         .expected("a region whose material conducts"),
                 );
             }
@@ -61,7 +61,7 @@ pub(super) fn faults(config: &Config, source: &Source, topology: &Topology) -> V
             let message = format!("`{region}` is replaced by its impedance surface");
             faults.push(
                 source
-                    .fault(&format!("{path}.region"), message)
+                    .diagnostic(&format!("{path}.region"), message)
                     .expected("a region that is meshed, such as air"),
             );
         }
@@ -70,7 +70,7 @@ pub(super) fn faults(config: &Config, source: &Source, topology: &Topology) -> V
         let Written::Body { kind: BodyKind::Mass, region, .. } = &constraint.limit else { continue };
         if known(&region.as_str()) && density(config, region).is_none() {
             let message = format!("the mass of `{region}` is limited, but its material has no density");
-            let fault = source.fault(&format!("constraints[{k}].kind"), message);
+            let fault = source.diagnostic(&format!("constraints[{k}].kind"), message);
             faults.push(match config.regions.get(region) {
                 Some(entry) => fault.help(format!(
                     "add a line like: density = \"7850 kg/m3\" to [materials.{}], or limit the volume",
@@ -102,7 +102,7 @@ pub(super) fn objective(
             Ok(Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? })
         })
         .collect::<Result<_, Error>>()?;
-    Ok(Some(WeightedSum { goal: objective.goal.into(), terms }))
+    Ok(Some(WeightedSum { goal: objective.goal, terms }))
 }
 
 /// A functional on the states that it is taken at, with the weight one.
@@ -169,7 +169,7 @@ pub(super) fn observed(
 /// The constraints of a configuration on its states and its shape.
 pub(super) fn constraints(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     [full_mesh, mesh]: [&Mesh; 2],
     states: &[FieldModel],
     shape: &Shape,
@@ -203,7 +203,7 @@ pub(super) fn constraints(
                 };
                 let measure = |bound: geometric::Bound| {
                     geometric::ThicknessBound::new(shape, bound).map_err(|error| {
-                        let fault = source.fault(&format!("constraints[{k}].kind"), error.to_string());
+                        let fault = source.diagnostic(&format!("constraints[{k}].kind"), error.to_string());
                         source.error(vec![fault.help("limit design.lower and design.upper instead")])
                     })
                 };
@@ -223,7 +223,7 @@ pub(super) fn constraints(
     if let Some(twice) = constraints.iter().find(|constraint| !names.insert(constraint.name.as_str())) {
         let message = format!("two constraints are named `{}`", twice.name);
         return Err(source
-            .error(vec![source.fault("constraints", message).expected("a different name for each")])
+            .error(vec![source.diagnostic("constraints", message).expected("a different name for each")])
             .into());
     }
     Ok(constraints)

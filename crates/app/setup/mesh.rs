@@ -16,7 +16,7 @@ use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use super::blame::with_advice;
 use crate::config::{
-    CoilPath, CoilShape, Config, ConfigError, Document, Fault, LengthUnit, MeshConfig, Place, Source, Target,
+    CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span, Target,
 };
 use crate::error::Error;
 use crate::output::OutputError;
@@ -28,7 +28,7 @@ pub(super) struct Built {
 }
 
 /// Builds or reads the mesh of a configuration.
-pub(super) fn build(config: &Config, source: &Source) -> Result<Built, Error> {
+pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error> {
     let generated = |mesh: Result<Mesh, MeshError>| match mesh {
         Ok(mesh) => Ok(Built { mesh, notices: Vec::new() }),
         Err(error) => Err(parameter_fault(error, source)),
@@ -57,14 +57,14 @@ pub(crate) fn unit(config: &Config) -> LengthUnit {
 }
 
 /// A parameter that a generator refuses becomes a fault at its key.
-fn parameter_fault(error: MeshError, source: &Source) -> Error {
+fn parameter_fault(error: MeshError, source: &SourceMap) -> Error {
     let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
     let path = format!("mesh.{parameter}");
-    source.error(vec![source.fault(&path, format!("{path} = {value}")).expected(expected)]).into()
+    source.error(vec![source.diagnostic(&path, format!("{path} = {value}")).expected(expected)]).into()
 }
 
 /// A fault of a mesh file is shown at the key that names it.
-fn file_fault(error: MeshError, source: &Source) -> Error {
+fn file_fault(error: MeshError, source: &SourceMap) -> Error {
     match error {
         MeshError::Msh { path, cause } => msh_fault(&path, &cause, source).into(),
         MeshError::File { path, cause } => OutputError::io("read", path)(cause).into(),
@@ -73,9 +73,9 @@ fn file_fault(error: MeshError, source: &Source) -> Error {
 }
 
 /// A fault of a mesh file is shown in the file where that is text, and at the key that names it.
-fn msh_fault(path: &Path, error: &MshError, source: &Source) -> ConfigError {
+fn msh_fault(path: &Path, error: &MshError, source: &SourceMap) -> ConfigError {
     let file = path.display().to_string();
-    let mut fault = with_advice(source.fault("mesh.file", format!("mesh file `{file}`, {error}")));
+    let mut fault = with_advice(source.diagnostic("mesh.file", format!("mesh file `{file}`, {error}")));
     if path.extension().is_some_and(|extension| extension == "geo") {
         fault.help = Some("this is the geometry: `gmsh -3 -format msh41` makes the mesh of it".to_owned());
     }
@@ -84,9 +84,9 @@ fn msh_fault(path: &Path, error: &MshError, source: &Source) -> ConfigError {
     };
     let document = Document { name: file, text: excerpt.text.clone(), first_line };
     let (source, number) = source.with_document(document);
-    let place = Place { document: number, span: excerpt.span.clone() };
-    let named = fault.place.clone();
-    source.error(vec![Fault { place, ..fault }.other(named, "the file is named here")])
+    let span = Span { document: number, range: excerpt.span.clone() };
+    let named = fault.span.clone();
+    source.error(vec![Diagnostic { span, ..fault }.secondary(named, "the file is named here")])
 }
 
 /// Every surface that the configuration names, with the path of its key.
@@ -152,17 +152,17 @@ fn with_interfaces(mesh: Mesh, names: &[(String, &str)]) -> Result<Mesh, MeshErr
 }
 
 /// Every surface named that the mesh does not have, or that is empty.
-pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+pub(super) fn surface_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let surfaces: Vec<&str> = topology.surface_names().collect();
     let mut sides: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     sides.push(OUTSIDE);
     let fault = |(path, name): (String, &str)| match topology.surface(name) {
-        Ok([]) => Some(source.fault(&path, format!("the surface `{name}` has no triangles"))),
+        Ok([]) => Some(source.diagnostic(&path, format!("the surface `{name}` has no triangles"))),
         Ok(_) => None,
         Err(_) => Some(match topology.faces_between(name) {
             Err(MeshError::UnknownRegion { name, .. }) => source.unknown_name(&path, "region", &name, &sides),
             Err(MeshError::NoInterface { .. }) => source
-                .fault(&path, format!("the two sides of `{name}` have no face in common"))
+                .diagnostic(&path, format!("the two sides of `{name}` have no face in common"))
                 .expected("two regions that touch, or a region that reaches the outside"),
             _ => source.unknown_name(&path, "surface", name, &surfaces),
         }),
@@ -171,7 +171,7 @@ pub(super) fn surface_faults(config: &Config, source: &Source, topology: &Topolo
 }
 
 /// Every condition on a surface that does not lie at the outside of the mesh.
-pub(super) fn inner_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+pub(super) fn inner_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let outer: HashSet<[NodeId; 3]> =
         topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
     surface_names(config)
@@ -182,7 +182,7 @@ pub(super) fn inner_faults(config: &Config, source: &Source, topology: &Topology
         })
         .map(|(path, name)| {
             source
-                .fault(&path, format!("the surface `{name}` has faces inside the mesh"))
+                .diagnostic(&path, format!("the surface `{name}` has faces inside the mesh"))
                 .expected("a surface at the outside of the mesh: conditions hold there")
         })
         .collect()

@@ -25,7 +25,7 @@ use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
 
-use crate::config::{self, Config, ConfigError, Fault, FaultReport, RegionModel, Source};
+use crate::config::{self, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap};
 use crate::error::Error;
 use blame::Gathered;
 use fluxmorph_optimizer::problem::Problem;
@@ -79,7 +79,7 @@ pub enum Purpose {
 /// # Errors
 /// [`Error::Config`] for a parameter that a generator refuses or a mesh file that is damaged, [`Error::Output`] for a mesh
 /// file that cannot be read.
-pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
+pub fn build_mesh(config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
     Ok(mesh::build(config, source)?.mesh)
 }
 
@@ -87,7 +87,7 @@ pub fn build_mesh(config: &Config, source: &Source) -> Result<Mesh, Error> {
 ///
 /// # Errors
 /// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
-pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setup, Error> {
+pub fn set_up(config: &Config, source: &SourceMap, purpose: Purpose) -> Result<Setup, Error> {
     set_up_watched(config, source, purpose, None, &mut |_| ())
 }
 
@@ -98,7 +98,7 @@ pub fn set_up(config: &Config, source: &Source, purpose: Purpose) -> Result<Setu
 /// As [`set_up`].
 pub fn set_up_watched(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     purpose: Purpose,
     team: Option<&RankGroup>,
     progress: &mut dyn Progress,
@@ -111,7 +111,7 @@ pub fn set_up_watched(
 
 fn made(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     purpose: Purpose,
     team: Option<&RankGroup>,
     progress: &mut dyn Progress,
@@ -141,7 +141,7 @@ fn made(
     let motion_alone = purpose == Purpose::Inspection && config.morph.is_some();
     if free && conductors.is_empty() && !motion_alone {
         let fault = source
-            .fault("boundaries", "no surface has a condition: the potential is known up to a constant only")
+            .diagnostic("boundaries", "no surface has a condition: the potential is known up to a constant only")
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
         gathered.take::<()>(Err(source.error(vec![fault]).into()))?;
     }
@@ -200,9 +200,9 @@ fn made(
 ///
 /// # Errors
 /// [`Error::Config`] when the configuration has no design or names no surface of the mesh.
-pub fn variable_count(config: &Config, source: &Source) -> Result<usize, Error> {
+pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Error> {
     let Some(design) = &config.design else {
-        let fault = source.fault("design", "there is no [design], so a design has no meaning");
+        let fault = source.diagnostic("design", "there is no [design], so a design has no meaning");
         return Err(source.error(vec![fault]).into());
     };
     if let (Some([n, m]), []) = (design.grid, design.symmetry.as_slice()) {
@@ -250,20 +250,20 @@ const MOST_BESIDE: usize = 100;
 /// missing or faulty is empty, and left out.
 pub fn with_names(error: ConfigError) -> ConfigError {
     match error {
-        ConfigError::Faults(report) => ConfigError::Faults(Box::new(report_with_names(*report))),
+        ConfigError::Invalid(report) => ConfigError::Invalid(Box::new(report_with_names(*report))),
         other => other,
     }
 }
 
-fn report_with_names(report: FaultReport) -> FaultReport {
-    let FaultReport { source, mut faults, of, unfinished } = report;
-    let of_mesh = |fault: &Fault| {
+fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
+    let DiagnosticReport { source, diagnostics: mut faults, of, unfinished } = report;
+    let of_mesh = |fault: &Diagnostic| {
         let path = fault.path.as_str();
         path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
     };
     let is_short = faults.len() <= MOST_BESIDE;
     let Some(config) = unfinished.filter(|_| is_short && !faults.iter().any(of_mesh)) else {
-        return FaultReport { source, faults, of, unfinished: None };
+        return DiagnosticReport { source, diagnostics: faults, of, unfinished: None };
     };
     let confined = source.confined(config::OutputNamedBy::User).is_ok();
     if confined && crate::memory_limit::check_mesh(&config, &source).is_ok() {
@@ -271,43 +271,43 @@ fn report_with_names(report: FaultReport) -> FaultReport {
             Ok(built) => {
                 let found = names(&config, &source, built.mesh.topology());
                 // A place that has a fault already says enough.
-                let new = |fault: &Fault| faults.iter().all(|known| known.place != fault.place);
-                let found: Vec<Fault> = found.into_iter().filter(new).collect();
+                let new = |fault: &Diagnostic| faults.iter().all(|known| known.span != fault.span);
+                let found: Vec<Diagnostic> = found.into_iter().filter(new).collect();
                 faults.extend(found);
-                faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
+                faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
             }
             // Places of the mesh file belong to the texts of its own report, behind those of the configuration.
-            Err(Error::Config(ConfigError::Faults(mut of_mesh))) => {
-                of_mesh.faults.splice(0..0, faults);
+            Err(Error::Config(ConfigError::Invalid(mut of_mesh))) => {
+                of_mesh.diagnostics.splice(0..0, faults);
                 return *of_mesh;
             }
             Err(_) => {}
         }
     }
-    FaultReport { source, faults, of, unfinished: None }
+    DiagnosticReport { source, diagnostics: faults, of, unfinished: None }
 }
 
 /// Every name of the configuration that the mesh does not have, every region named that is empty, and every one that cannot
 /// be used as it is.
-fn name_faults(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+fn name_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = names(config, source, topology);
     faults.extend(field::coil_faults(config, source));
     faults.extend(mesh::inner_faults(config, source, topology));
     faults.extend(functional::faults(config, source, topology));
-    faults.sort_by_key(|fault| (fault.place.document, fault.place.span.start));
+    faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
     faults
 }
 
 /// Every name of the configuration that the mesh does not have, and every region named that is empty; empty names are left
 /// out.
-fn names(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
+fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     let mut region = |path: String, name: &str| match topology.region(name) {
         _ if name.is_empty() => {}
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
-            faults.push(source.fault(&path, format!("the region `{name}` has no elements")));
+            faults.push(source.diagnostic(&path, format!("the region `{name}` has no elements")));
         }
         Ok(_) => {}
     };
@@ -337,7 +337,7 @@ fn names(config: &Config, source: &Source, topology: &Topology) -> Vec<Fault> {
 }
 
 /// Every probe point that no element holds, before a run is spent on it.
-fn probe_faults(config: &Config, source: &Source, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Fault> {
+fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     let points: Vec<(usize, usize, [f64; 3])> = config
         .probes
@@ -371,7 +371,7 @@ fn probe_faults(config: &Config, source: &Source, full_mesh: &Mesh, mesh: &Mesh)
                 )
             }
         };
-        faults.push(source.fault(&format!("probes[{i}].points[{j}]"), message).expected(expected));
+        faults.push(source.diagnostic(&format!("probes[{i}].points[{j}]"), message).expected(expected));
     }
     faults
 }

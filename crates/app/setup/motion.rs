@@ -10,7 +10,7 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
 use super::{field, mesh, millimetres, name_faults, shape};
-use crate::config::{Config, DesignMotion, DesignWord, Fault, Morphing, PrescribedMotion, Source, Target};
+use crate::config::{Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target};
 use crate::error::Error;
 use crate::morph::path::{NodeMotion, Path, Transform};
 
@@ -35,11 +35,11 @@ pub struct MotionSetup {
 ///
 /// # Errors
 /// All faults of names and places at once; then whatever the mesh refuses.
-pub fn set_up_motion(config: &Config, source: &Source) -> Result<MotionSetup, Error> {
+pub fn set_up_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
     made(config, source).map_err(|error| super::blame::placed(error, config, source))
 }
 
-fn made(config: &Config, source: &Source) -> Result<MotionSetup, Error> {
+fn made(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
     let Morphing { morph, remesh } = config.morphing(source)?;
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;
@@ -68,7 +68,7 @@ fn made(config: &Config, source: &Source) -> Result<MotionSetup, Error> {
         }
     }
     if morph.motion.is_empty() {
-        let fault = source.fault("morph.motion", "no motion is prescribed");
+        let fault = source.diagnostic("morph.motion", "no motion is prescribed");
         faults.push(fault.expected("at least one table [[morph.motion]]"));
     }
     source.check(faults)?;
@@ -98,7 +98,7 @@ fn transform_of(motion: &PrescribedMotion) -> Transform {
 }
 
 /// The nodes of a surface, line, list or box; a fault where there is none.
-fn nodes_of(source: &Source, path: &str, target: &Target, mesh: &Mesh) -> Result<Vec<NodeId>, Box<Fault>> {
+fn nodes_of(source: &SourceMap, path: &str, target: &Target, mesh: &Mesh) -> Result<Vec<NodeId>, Box<Diagnostic>> {
     let topology = mesh.topology();
     let [lower, upper] = mesh.bounding_box();
     let near = NEAR * norm(sub(upper, lower));
@@ -135,7 +135,7 @@ fn nodes_of(source: &Source, path: &str, target: &Target, mesh: &Mesh) -> Result
                         let place =
                             nearest.map_or_else(|| "nowhere".to_owned(), |(n, _)| millimetres(mesh.point(n)));
                         let message = format!("there is no node at {}", millimetres(point));
-                        let fault = source.fault(&format!("{path}.nodes[{i}]"), message);
+                        let fault = source.diagnostic(&format!("{path}.nodes[{i}]"), message);
                         return Err(Box::new(
                             fault.expected(format!("a node of the mesh; the nearest is at {place}")),
                         ));
@@ -148,7 +148,7 @@ fn nodes_of(source: &Source, path: &str, target: &Target, mesh: &Mesh) -> Result
     };
     if nodes.is_empty() {
         let fault =
-            source.fault(&format!("{path}.{key}"), format!("`{path}.{key}` holds no node of the mesh"));
+            source.diagnostic(&format!("{path}.{key}"), format!("`{path}.{key}` holds no node of the mesh"));
         let range = format!(
             "places inside the mesh, which goes from {} to {}",
             millimetres(lower),
@@ -162,18 +162,18 @@ fn nodes_of(source: &Source, path: &str, target: &Target, mesh: &Mesh) -> Result
 /// The nodes of the design surface and where a design moves them.
 fn design_motion(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     path: &str,
     motion: &DesignMotion,
     full_mesh: &Mesh,
     mesh: &Mesh,
 ) -> Result<Vec<(NodeId, NodeMotion)>, Error> {
     let path = format!("{path}.design");
-    let refused = |fault: Fault| -> Error { source.error(vec![fault]).into() };
+    let refused = |fault: Diagnostic| -> Error { source.error(vec![fault]).into() };
     let Some(design) = &config.design else {
         return Err(refused(
             source
-                .fault(&path, "there is no [design], so a design has no meaning")
+                .diagnostic(&path, "there is no [design], so a design has no meaning")
                 .help("add a table [design]"),
         ));
     };
@@ -194,7 +194,7 @@ fn design_motion(
     if values.len() != count {
         let message = format!("`{path}` has {} lengths", values.len());
         return Err(refused(
-            source.fault(&path, message).expected(format!("one for each of {count} design variables")),
+            source.diagnostic(&path, message).expected(format!("one for each of {count} design variables")),
         ));
     }
     let displacement = surface.displacement(&values).into_iter().map(NodeMotion::Straight);

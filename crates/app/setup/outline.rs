@@ -9,7 +9,7 @@ use fluxmorph_remesh::KinematicConstraint;
 
 use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
-use crate::config::{Config, Source};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
@@ -48,7 +48,7 @@ pub struct OutlinedDesign {
 ///
 /// # Errors
 /// Faults of names and of the mesh, as [`super::set_up`].
-pub fn outline(config: &Config, source: &Source) -> Result<Outline, Error> {
+pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
     let full_mesh = mesh::build(config, source)?.mesh;
     source.check(name_faults(config, source, full_mesh.topology()))?;
     let (mesh, _) = field::without_impedance_regions(config, &full_mesh)?;
@@ -73,7 +73,7 @@ fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
 
 fn outlined(
     config: &Config,
-    source: &Source,
+    source: &SourceMap,
     full_mesh: &Mesh,
     mesh: &Mesh,
     node_of: &[Option<NodeId>],
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use crate::setup::{Purpose, set_up};
 
-    fn shield(name: &str) -> (Config, Source) {
+    fn shield(name: &str) -> (Config, SourceMap) {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
         Config::from_file(&path, &["mesh.shield.refinement=0.5".to_owned()]).expect("a shipped configuration")
     }

@@ -13,7 +13,7 @@ use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
 use crate::config::{
-    self, Config, Design, DesignDirection, DirectionWord, Fault, Remesh, RemeshExtent, Source, StiffnessLaw,
+    self, Config, Design, DesignDirection, DirectionWord, Diagnostic, Remesh, RemeshExtent, SourceMap, StiffnessLaw,
 };
 use crate::error::Error;
 use fluxmorph_optimizer::design::DesignSurface;
@@ -25,7 +25,7 @@ const LEAST_QUALITY_SHARE: f64 = 0.05;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
-    pub(super) source: &'a Source,
+    pub(super) source: &'a SourceMap,
     pub(super) design: &'a Design,
     pub(super) remesh: &'a Remesh,
     /// With all regions.
@@ -98,7 +98,7 @@ pub(super) fn shape(
         .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
-        let fault = source.fault("design.initial", format!("design.initial has not {n} values"));
+        let fault = source.diagnostic("design.initial", format!("design.initial has not {n} values"));
         faults.push(fault.expected(format!("one value for each of the {n} design variables")));
         Vec::new()
     });
@@ -108,7 +108,7 @@ pub(super) fn shape(
             "the worst element of the undeformed mesh has the quality {quality:.3e}, below optimizer.minimum_quality = \
              {minimum}"
         );
-        let fault = source.fault("optimizer.minimum_quality", message);
+        let fault = source.diagnostic("optimizer.minimum_quality", message);
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
     source.check(faults)?;
@@ -126,7 +126,7 @@ pub(super) fn shape(
 
 /// Subregions, boundary kinds and design nodes (ascending) of the elastic body.
 pub(super) fn remesh_setup(
-    source: &Source,
+    source: &SourceMap,
     remesh: &Remesh,
     mesh: &Mesh,
     design_nodes: &[NodeId],
@@ -169,14 +169,14 @@ pub(super) fn remesh_setup(
     };
     // A region that an impedance surface replaces has no elements left, and is no part of the body.
     subregions.retain(|part| !part.elements.is_empty());
-    let outside: Vec<Fault> = remesh
+    let outside: Vec<Diagnostic> = remesh
         .subregions
         .iter()
         .enumerate()
         .filter(|(_, own)| subregions.iter().all(|part| part.name != own.name))
         .map(|(i, own)| {
             source
-                .fault(
+                .diagnostic(
                     &format!("remesh.subregions[{i}].name"),
                     format!("the region `{}` is no part of the remesh region", own.name),
                 )
@@ -189,7 +189,7 @@ pub(super) fn remesh_setup(
             RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
             RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
         };
-        let fault = source.fault(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+        let fault = source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
         return Err(source.error(vec![fault]).into());
     }
     for part in &mut subregions {
@@ -228,7 +228,7 @@ pub(super) fn remesh_setup(
 
 /// The axis of the design's direction where the motion is to follow it.
 pub(super) fn guidance(
-    source: &Source,
+    source: &SourceMap,
     design: Option<&Design>,
     remesh: &Remesh,
 ) -> Result<KinematicConstraint, Error> {
@@ -242,7 +242,7 @@ pub(super) fn guidance(
             Some(axis) => Ok(KinematicConstraint::Axis(axis)),
             None => {
                 let fault = source
-                    .fault("remesh.motion", "the design does not move along a coordinate axis")
+                    .diagnostic("remesh.motion", "the design does not move along a coordinate axis")
                     .expected("motion = \"free\", or a design.direction along x, y or z");
                 Err(source.error(vec![fault]).into())
             }
@@ -296,14 +296,14 @@ fn overlap_faults(
     moving: &[ElementId],
     model: &FieldModel,
     observed: &[(String, Vec<ElementId>)],
-) -> Vec<Fault> {
+) -> Vec<Diagnostic> {
     let Inputs { source, mesh, .. } = *inputs;
     let moves = |e: &ElementId| moving.binary_search(e).is_ok();
     let mut faults = Vec::new();
     for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
         faults.push(
             source
-                .fault(path, "the observation region lies inside the remesh region and would move")
+                .diagnostic(path, "the observation region lies inside the remesh region and would move")
                 .expected("an observation region that no remesh region holds")
                 .help("take the region out of remesh.region, or shrink remesh.box"),
         );
@@ -312,7 +312,7 @@ fn overlap_faults(
         let place = centroid(mesh.vertices(e));
         faults.push(
             source
-                .fault(
+                .diagnostic(
                     &coil_at(config, mesh, e),
                     format!("a coil reaches into the remesh region, at {}", millimetres(place)),
                 )
@@ -349,7 +349,7 @@ fn held_node_fault(
     surface: &DesignSurface,
     map: &ElasticMap,
     model: &FieldModel,
-) -> Option<Fault> {
+) -> Option<Diagnostic> {
     let (space, unknowns) = (model.space(), model.unknowns());
     let moves = |node: NodeId| may_move(surface, map, node);
     let place = |node: NodeId| millimetres(space.position(inputs.mesh, node));
@@ -358,7 +358,7 @@ fn held_node_fault(
             "a surface with a condition that is curved, oblique or has an applied field would move at {}",
             place(node)
         );
-        let fault = inputs.source.fault("remesh", message);
+        let fault = inputs.source.diagnostic("remesh", message);
         return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
     }
     let leaves = |node: NodeId, axis: usize| match surface.nodes().binary_search(&node) {
@@ -375,13 +375,13 @@ fn held_node_fault(
         ["x", "y", "z"][axis],
         place(node)
     );
-    let fault = inputs.source.fault("remesh", message);
+    let fault = inputs.source.diagnostic("remesh", message);
     Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
 }
 
 /// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
 /// solved.
-fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
+fn check_bounds(source: &SourceMap, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
     // A rank that follows gives no orders: the first one checks.
     let is_worker = share.is_some_and(|share| share.group.role() == Role::Worker);
     if shape.limits.rounds > 0 || is_worker {
@@ -393,7 +393,7 @@ fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Re
     {
         faults.push(
             source
-                .fault("design.initial", format!("the first design breaks the mesh: {error}"))
+                .diagnostic("design.initial", format!("the first design breaks the mesh: {error}"))
                 .help("allow remesh.rounds, or start nearer to the undeformed shape"),
         );
     }
@@ -410,7 +410,7 @@ fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Re
                     );
                     faults.push(
                         source
-                            .fault(key, message)
+                            .diagnostic(key, message)
                             .expected(format!("at least {least:.2e} (optimizer.minimum_quality)"))
                             .help(
                                 "narrow the bound, lower optimizer.minimum_quality, or allow remesh.rounds",
@@ -425,7 +425,7 @@ fn check_bounds(source: &Source, shape: &Shape, share: Option<&Ownership>) -> Re
                 );
                 faults.push(
                     source
-                        .fault(key, message)
+                        .diagnostic(key, message)
                         .expected(format!("a bound nearer to zero than {:.3} mm", at * fraction))
                         .help(
                             "allow remesh.rounds, narrow the bound, enlarge the remesh region, take another \

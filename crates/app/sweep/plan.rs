@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::state::{fingerprint, mesh_file};
 use super::{Combination, Setting, SweepError, combinations};
-use crate::config::{Config, ConfigError, FaultReport, Goal, OutputNamedBy, Source, resolved_toml};
+use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::memory_limit;
 use crate::output::{FileHash, LimitsInForce, OlderRun, blake3_hex};
@@ -87,13 +87,13 @@ impl Sweep {
         let settings =
             request.set.iter().map(|typed| Setting::parse(typed)).collect::<Result<Vec<_>, _>>()?;
         let mut planned = Vec::new();
-        let mut faulty = Faulty::default();
+        let mut faulty = Subject::default();
         let mut known: BTreeMap<String, usize> = BTreeMap::new();
         let mut first = None;
         for combination in combinations(&settings)? {
             let (config, source) = match read(request, &combination.overrides) {
                 Ok(read) => read,
-                Err(ConfigError::Faults(report)) => {
+                Err(ConfigError::Invalid(report)) => {
                     faulty.push(&combination.name, report);
                     continue;
                 }
@@ -158,7 +158,7 @@ fn beside(directory: &Path) -> PathBuf {
 }
 
 /// The configuration of one combination, as `run` would read it.
-fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, Source), ConfigError> {
+fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMap), ConfigError> {
     let (config, source) = Config::from_file(request.config, overrides)?;
     if request.outside == Outside::Refused {
         let by = if request.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
@@ -173,19 +173,19 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, Source),
 
 /// Combinations that cannot be read.
 #[derive(Default)]
-struct Faulty {
+struct Subject {
     count: usize,
     /// Key and message of every fault so far.
     known: BTreeSet<(String, String)>,
     /// Combinations with faults that none before has.
-    reports: Vec<(String, Box<FaultReport>)>,
+    reports: Vec<(String, Box<DiagnosticReport>)>,
 }
 
-impl Faulty {
-    fn push(&mut self, name: &str, report: Box<FaultReport>) {
+impl Subject {
+    fn push(&mut self, name: &str, report: Box<DiagnosticReport>) {
         self.count += 1;
         let before = self.known.len();
-        self.known.extend(report.faults.iter().map(|fault| (fault.path.clone(), fault.message.clone())));
+        self.known.extend(report.diagnostics.iter().map(|fault| (fault.path.clone(), fault.message.clone())));
         if self.known.len() > before && self.reports.len() < MOST_REPORTS {
             self.reports.push((name.to_owned(), report));
         }
@@ -196,7 +196,7 @@ impl Faulty {
             return Ok(());
         }
         // Looking up names takes the mesh: only for what is told.
-        let told = |(name, report)| (name, with_names(ConfigError::Faults(report)));
+        let told = |(name, report)| (name, with_names(ConfigError::Invalid(report)));
         let reports = self.reports.into_iter().map(told).collect();
         Err(SweepError::Faults { faulty: self.count, of: self.count + sound, reports })
     }

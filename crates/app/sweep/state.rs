@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Planned, Sweep};
-use crate::config::{Config, MeshConfig, Optimizer, Source, resolved_toml};
+use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
 use crate::output::{Disk, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason};
 use crate::session;
 use crate::setup::build_mesh;
@@ -109,7 +109,7 @@ impl<'a> States<'a> {
         &mut self,
         planned: &Planned,
         mut config: Config,
-        source: &Source,
+        source: &SourceMap,
         manifest: &Manifest,
     ) -> bool {
         let (MeshConfig::File { path, .. }, Some(now), Some(MeshHash { blake3, .. })) =

@@ -3,7 +3,8 @@
 use fluxmorph_solver::Functional;
 
 /// Which way is better.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Goal {
     /// The smaller value.
     Minimise,

@@ -12,11 +12,11 @@ use serde_json::Value;
 use super::quick_path;
 
 /// Panics when it is told of an evaluation.
-struct Faulty {
+struct Subject {
     at: usize,
 }
 
-impl Observer for Faulty {
+impl Observer for Subject {
     fn evaluation(&mut self, evaluation: &Evaluation) {
         assert!(evaluation.evaluation != self.at, "a fault of the program");
     }
@@ -41,7 +41,7 @@ fn run(directory: &Path, observer: &mut dyn Observer) -> Result<(), fluxmorph_op
 fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let [broken, sound] = ["broken", "sound"].map(|name| folder.path().join(name));
-    let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 2 })));
+    let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Subject { at: 2 })));
     assert!(caught.is_err(), "the panic is not swallowed");
     assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
     assert!(!broken.join("result.json").exists());
@@ -67,6 +67,6 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
 fn a_panic_before_the_first_evaluation_is_kept_leaves_a_failed_manifest() {
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("broken");
-    assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 0 }))).is_err());
+    assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Subject { at: 0 }))).is_err());
     assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::advice::advice;
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
-    Remesh, Source,
+    Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::fresh_mesh;
@@ -133,7 +133,7 @@ fn model_name(model: RegionModel) -> &'static str {
 /// When the configuration or the mesh is wrong.
 pub(super) fn summary<'a>(
     config: &'a Config,
-    source: &Source,
+    source: &SourceMap,
     older: OlderRun,
     progress: &mut dyn Progress,
 ) -> Result<Summary<'a>, Error> {

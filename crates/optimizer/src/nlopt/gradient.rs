@@ -119,7 +119,8 @@ pub enum Outcome<E> {
 }
 
 /// Gradient methods of NLopt.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Algorithm {
     /// Method of moving asymptotes.
     Mma,
@@ -138,6 +139,18 @@ pub enum Algorithm {
 impl Algorithm {
     /// All of them.
     pub const ALL: [Self; 6] = [Self::Mma, Self::Ccsaq, Self::Slsqp, Self::Lbfgs, Self::Tnewton, Self::Var2];
+
+    /// What the method is called in short.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mma => "mma",
+            Self::Ccsaq => "ccsaq",
+            Self::Slsqp => "slsqp",
+            Self::Lbfgs => "lbfgs",
+            Self::Tnewton => "tnewton",
+            Self::Var2 => "var2",
+        }
+    }
 
     /// Whether the method keeps inequality constraints.
     pub fn takes_constraints(self) -> bool {

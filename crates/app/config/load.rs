@@ -1,0 +1,186 @@
+//! Reads a configuration: a text with overrides laid over it, all tables, and the cases of a sweep.
+
+use std::collections::HashSet;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use fluxmorph_geometry::io::open_regular;
+
+use super::schema::keys::known_keys;
+use super::section::{Context, Section};
+use super::table::Table;
+use super::tables::Config;
+use super::text::cases::{case_count, case_trees};
+use super::text::diagnostic::{self, Diagnostic, Span};
+use super::text::source::{ConfigError, DiagnosticReport, Document, SourceMap};
+use super::text::tree;
+
+/// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
+const LARGEST_FILE: u64 = 1024 * 1024;
+
+/// Most values that the cases of a motion may repeat: every case is the whole configuration again, with the places of its
+/// values, and this many take a hundred megabytes.
+const MOST_REPEATED: usize = 500_000;
+
+/// Faults of a configuration from which on its cases are not read: each would find them again.
+const MANY_FAULTS: usize = 100;
+
+impl Config {
+    /// Read a file, and lay overrides `key=value` over it.
+    ///
+    /// Paths in the file are relative to its folder, and absolute in the result.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or with all faults of its content at once.
+    pub fn from_file(path: &Path, overrides: &[String]) -> Result<(Self, SourceMap), ConfigError> {
+        let text = read_text(path)?;
+        if overrides.iter().map(String::len).sum::<usize>() as u64 > LARGEST_FILE {
+            return Err(ConfigError::TooManyOverrides { limit: LARGEST_FILE });
+        }
+        let absolute = std::path::absolute(path)
+            .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
+        let directory = absolute.parent().map(Path::to_owned).unwrap_or_default();
+        let stem = path.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+        read(path.display().to_string(), text, directory, &stem, overrides)
+    }
+
+    /// Read again the text of a configuration that a run has saved: `name` stands for the file in messages, paths are
+    /// relative to `directory`, `stem` is the name of the file that it was read from, without extension.
+    ///
+    /// # Errors
+    /// All faults of the text at once.
+    pub fn again(
+        name: String,
+        text: String,
+        directory: PathBuf,
+        stem: &str,
+        overrides: &[String],
+    ) -> Result<(Self, SourceMap), ConfigError> {
+        read(name, text, directory, stem, overrides)
+    }
+
+    /// Read a text; `name` stands for the file in messages, and paths stay relative.
+    ///
+    /// # Errors
+    /// All faults of the text at once.
+    pub fn from_str(text: &str, name: &str) -> Result<(Self, SourceMap), ConfigError> {
+        let stem = Path::new(name).file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+        read(name.to_owned(), text.to_owned(), PathBuf::new(), &stem, &[])
+    }
+}
+
+/// The configuration as TOML with every default written out, in SI; it reads back as the same [`Config`].
+pub fn resolved_toml(config: &Config) -> String {
+    toml::to_string(config).expect("every value of a configuration has a TOML form")
+}
+
+fn read_text(path: &Path) -> Result<String, ConfigError> {
+    if let Some(extension) = path.extension().filter(|e| *e == "geo" || *e == "msh") {
+        let extension = extension.to_string_lossy().into_owned();
+        return Err(ConfigError::GmshFile { path: path.to_owned(), extension });
+    }
+    let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
+    let mut bytes = Vec::new();
+    // One byte more than allowed tells a file that is too large, without trusting the size it reports.
+    let file = open_regular(path).map_err(unreadable)?;
+    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(ConfigError::TooLarge { path: path.to_owned(), limit: LARGEST_FILE });
+    }
+    String::from_utf8(bytes).map_err(|error| ConfigError::NotText {
+        path: path.to_owned(),
+        offset: error.utf8_error().valid_up_to(),
+    })
+}
+
+fn read(
+    name: String,
+    text: String,
+    directory: PathBuf,
+    stem: &str,
+    overrides: &[String],
+) -> Result<(Config, SourceMap), ConfigError> {
+    let mut documents = vec![Document::whole(name, text)];
+    documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
+    let bare = SourceMap::of_documents(documents, directory, stem);
+    let root = parse_documents(&bare).map_err(|diagnostics| bare.error(diagnostics))?;
+    let mut source = bare.of_tree(&root);
+    let (mut config, mut diagnostics) = read_tree(&root, &source);
+    let (count, values) = (case_count(&root), tree::value_count(&root));
+    if count.saturating_mul(values) > MOST_REPEATED {
+        let message = format!("{count} cases repeat a configuration of {values} values");
+        let most = format!("at most {MOST_REPEATED} values in all cases together");
+        diagnostics.push(source.diagnostic("morph.case", message).expected(most));
+        diagnostic::sort(&mut diagnostics);
+        return Err(source.error(diagnostics));
+    }
+    if diagnostics.len() > MANY_FAULTS {
+        return Err(source.error(diagnostics));
+    }
+    source.cases = read_cases(root, &bare, config.as_mut(), &mut diagnostics).into();
+    match config {
+        Some(config) if diagnostics.is_empty() => Ok((config, source)),
+        unfinished => {
+            diagnostic::sort(&mut diagnostics);
+            let unfinished = unfinished.map(Box::new);
+            let report = DiagnosticReport { unfinished, ..DiagnosticReport::new(source, diagnostics) };
+            Err(ConfigError::Invalid(Box::new(report)))
+        }
+    }
+}
+
+/// Reads the cases of a sweep, and enters them; the places of each.
+fn read_cases(
+    root: tree::Table,
+    bare: &SourceMap,
+    mut config: Option<&mut Config>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<SourceMap> {
+    let mut known: HashSet<Diagnostic> = diagnostics.iter().cloned().collect();
+    let mut sources = Vec::new();
+    for (index, tree) in case_trees(root).enumerate() {
+        let (tree, overlay) = match tree {
+            Ok(tree) => tree,
+            Err(diagnostic) => {
+                diagnostics.push(*diagnostic);
+                continue;
+            }
+        };
+        let (case, own) = read_tree(&tree, bare);
+        // What is wrong without the case has been said.
+        diagnostics.extend(own.into_iter().filter(|diagnostic| known.insert(diagnostic.clone())));
+        sources.push(bare.of_tree(&tree));
+        let slot = config.as_mut().and_then(|config| config.morph.as_mut()?.cases.get_mut(index));
+        if let (Some(slot), Some(case)) = (slot, case) {
+            slot.complete(overlay, case);
+        }
+    }
+    sources
+}
+
+/// The configuration of one tree, and its faults in the order of the text; none where a table is missing that all others
+/// rest on.
+fn read_tree(tree: &tree::Table, source: &SourceMap) -> (Option<Config>, Vec<Diagnostic>) {
+    let context = Context::new(known_keys);
+    let root = Section::new(String::new(), tree, Span { document: 0, range: 0..0 }, &context);
+    let mut config = Config::read_keys(&root);
+    config.complete(&root, source);
+    root.finish();
+    let diagnostics = context.sink.into_sorted();
+    let rests = |diagnostic: &Diagnostic| ["mesh", "analysis"].contains(&diagnostic.path.as_str());
+    ((!diagnostics.iter().any(rests)).then_some(config), diagnostics)
+}
+
+/// Parse the file and lay the overrides over it.
+fn parse_documents(source: &SourceMap) -> Result<tree::Table, Vec<Diagnostic>> {
+    let mut root = tree::Table::new();
+    let mut diagnostics = Vec::new();
+    for (index, document) in source.documents.iter().enumerate() {
+        match tree::parse(index, &document.text) {
+            Ok(table) if index == 0 => root = table,
+            Ok(table) => diagnostics.extend(tree::overlay(&mut root, table, "").err().map(|one| *one)),
+            Err(errors) => diagnostics.extend(errors),
+        }
+    }
+    if diagnostics.is_empty() { Ok(root) } else { Err(diagnostics) }
+}

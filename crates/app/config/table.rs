@@ -1,0 +1,240 @@
+//! The declarations of the configuration: `table!` for the keys of a table, `one_of!` for a value of several forms.
+//!
+//! A key is declared once. From its line follow the field of the struct with its documentation, how it is read with all
+//! diagnostics, its default, its part of the JSON schema and of `docs/configuration.md`, and its place among the known keys:
+//!
+//! ```text
+//! table! {
+//!     /// What the table is.
+//!     pub struct Name {
+//!         /// What the key does [m].
+//!         optional: Option<f64> = length(POSITIVE);
+//!         /// With a default, which the schema shows.
+//!         growth: f64 = number(GROWTHS) => 1.5;
+//!         /// With a default that depends on keys above, or that the schema leaves to the words.
+//!         outer: f64 = length(POSITIVE), else 5.0 * growth;
+//!         /// Required; the example is shown where the key is missing. Its name differs from that of the field.
+//!         corners["box"]: [f64; 3] = length(FINITE), need "[0, 0, 0]";
+//!         /// Keys that belong together, in the same table.
+//!         #[serde(flatten)]
+//!         extent: Extent = KEYS;
+//!     }
+//!     unused = |section| …;       // keys that have no use beside others
+//!     check = |table, section| …; // what is wrong with several keys together
+//!     rules = |rules| …;          // the same for the schema
+//! }
+//! ```
+//!
+//! The kinds are those of [`kinds`](super::value::kinds). `pub struct Name: Default` has a `Default` with every key left out.
+
+use super::schema::definitions::Definitions;
+use super::schema::description::Description;
+use super::section::{Context, Section};
+use super::text::diagnostic::Span;
+use super::text::tree;
+
+/// A table of the configuration.
+pub(in crate::config) trait Table: Sized {
+    /// Name of its definition in the schema.
+    const NAME: &'static str;
+    /// Lines that describe it.
+    const ABOUT: &'static [&'static str];
+
+    /// Reads its keys.
+    fn read_keys(section: &Section<'_>) -> Self;
+
+    /// Describes its keys.
+    fn describe_keys(description: &mut Description, definitions: &mut Definitions);
+}
+
+/// The table with every key left out.
+pub(in crate::config) fn left_out<T: Table>() -> T {
+    let (table, context) = (tree::Table::new(), Context::default());
+    T::read_keys(&Section::new(String::new(), &table, Span { document: 0, range: 0..0 }, &context))
+}
+
+/// Declares a table: see the documentation of the module.
+macro_rules! table {
+    ($(#[$($meta:tt)*])* $vis:vis struct $name:ident: Default { $($body:tt)* } $($rest:tt)*) => {
+        table! { $(#[$($meta)*])* $vis struct $name { $($body)* } $($rest)* }
+
+        impl Default for $name {
+            fn default() -> Self {
+                $crate::config::table::left_out()
+            }
+        }
+    };
+    (
+        $(#[doc = $about:literal])*
+        $(#[derive($($derive:ident),+)])?
+        $vis:vis struct $name:ident $(as $written:literal)? {
+            $(
+                $(#[doc = $meaning:literal])*
+                $(#[serde($($serde:tt)+)])?
+                $(#[also($($also:ident),+)])?
+                $field:ident $([$key:literal])? : $type:ty = $kind:expr
+                $(=> $default:expr)? $(, need $example:expr)? $(, else $own:expr)? ;
+            )*
+        }
+        $(unused = $unused:expr;)?
+        $(check = $check:expr;)?
+        $(rules = $rules:expr;)?
+    ) => {
+        $(#[doc = $about])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize $($(, $derive)+)?)]
+        $vis struct $name {
+            $(
+                $(#[doc = $meaning])*
+                $(#[serde(rename = $key)])?
+                $(#[serde($($serde)+)])?
+                pub $field: $type,
+            )*
+        }
+
+        impl $crate::config::table::Table for $name {
+            const NAME: &'static str = table!(@name $name $($written)?);
+            const ABOUT: &'static [&'static str] = &[$($about),*];
+
+            fn read_keys(section: &$crate::config::section::Section<'_>) -> Self {
+                #[allow(unused_imports, reason = "every declaration has the whole vocabulary")]
+                use $crate::config::value::kinds::*;
+                $(
+                    let unused: fn(&$crate::config::section::Section<'_>) -> Vec<&'static str> = $unused;
+                    section.hide(unused(section));
+                )?
+                $(
+                    let $field: $type = table!(
+                        @read section, table!(@name $field $($key)?), $kind;
+                        $(=> $default)? $(need $example)? $(else $own)?
+                    );
+                )*
+                #[allow(unused_mut, reason = "a check may complete a default")]
+                let mut table = Self { $($field),* };
+                $(
+                    let check: fn(&mut Self, &$crate::config::section::Section<'_>) = $check;
+                    check(&mut table, section);
+                )?
+                table
+            }
+
+            fn describe_keys(
+                description: &mut $crate::config::schema::description::Description,
+                definitions: &mut $crate::config::schema::definitions::Definitions,
+            ) {
+                #[allow(unused_imports, reason = "every declaration has the whole vocabulary")]
+                use $crate::config::value::kinds::*;
+                $(
+                    let field = $crate::config::value::Field {
+                        key: table!(@name $field $($key)?),
+                        meaning: &[$($meaning),*],
+                        also: &[$($($crate::config::value::Also::$also),+)?],
+                    };
+                    table!(
+                        @describe description, definitions, field, $type, $kind;
+                        $(=> $default)? $(need $example)? $(else $own)?
+                    );
+                )*
+                $(
+                    let rules: fn(
+                        $crate::config::schema::rules::Rules,
+                    ) -> $crate::config::schema::rules::Rules = $rules;
+                    description.add_rules(rules, definitions);
+                )?
+            }
+        }
+    };
+
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $name:literal) => { $name };
+
+    (@read $section:ident, $key:expr, $kind:expr;) => {
+        $crate::config::value::Plain::read_from($section, $key, &$kind)
+    };
+    (@read $section:ident, $key:expr, $kind:expr; => $default:expr) => {
+        $section.read($key, &$kind).unwrap_or_else(|| $default)
+    };
+    (@read $section:ident, $key:expr, $kind:expr; else $own:expr) => {
+        $section.read($key, &$kind).unwrap_or_else(|| $own)
+    };
+    (@read $section:ident, $key:expr, $kind:expr; need $example:expr) => {
+        $section.need($key, &$kind, $example)
+    };
+
+    (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr;) => {
+        <$type as $crate::config::value::Plain<_>>::describe(&$kind, $field, $description, $definitions);
+    };
+    (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr; => $default:expr) => {
+        let default: $type = $default;
+        let default = Some(serde_json::to_value(&default).unwrap_or_default());
+        $description.key::<$type, _>(&$kind, $field, default, $definitions);
+    };
+    (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr; else $own:expr) => {
+        $description.key::<$type, _>(&$kind, $field, None, $definitions);
+    };
+    (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr; need $example:expr) => {
+        $description.require($field.key);
+        $description.key::<$type, _>(&$kind, $field, None, $definitions);
+    };
+}
+pub(in crate::config) use table;
+
+/// Declares a value that is written in one of several forms, told apart by what is written: `if list`, `if text`, `if table`;
+/// the form without condition takes all else.
+macro_rules! one_of {
+    (
+        $(#[$meta:meta])*
+        $vis:vis enum $name:ident {
+            $(
+                $(#[doc = $meaning:literal])*
+                $(#[also($($also:ident),+)])?
+                $variant:ident($type:ty) = $kind:expr $(, if $shape:ident)?;
+            )+
+        }
+    ) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize)]
+        #[serde(untagged)]
+        $vis enum $name {
+            $($(#[doc = $meaning])* $variant($type),)+
+        }
+
+        impl $crate::config::value::Value<$crate::config::value::OneOf> for $name {
+            fn read(
+                _: &$crate::config::value::OneOf,
+                entry: &$crate::config::value::Entry<'_>,
+            ) -> Option<Self> {
+                use $crate::config::value::kinds::*;
+                $($(
+                    if entry.node.content.$shape().is_some() {
+                        return <$type as $crate::config::value::Value<_>>::read(&$kind, entry).map(Self::$variant);
+                    }
+                )?)+
+                $(one_of!(@rest $variant, $type, $kind, entry; $($shape)?);)+
+                None
+            }
+
+            fn schema(
+                _: &$crate::config::value::OneOf,
+                definitions: &mut $crate::config::schema::definitions::Definitions,
+            ) -> $crate::config::value::Keywords {
+                use $crate::config::value::kinds::*;
+                let forms = vec![$({
+                    let field = $crate::config::value::Field {
+                        key: "",
+                        meaning: &[$($meaning),*],
+                        also: &[$($($crate::config::value::Also::$also),+)?],
+                    };
+                    $crate::config::schema::description::property::<$type, _>(&$kind, field, None, definitions)
+                }),+];
+                $crate::config::value::any_of(forms)
+            }
+        }
+    };
+    (@rest $variant:ident, $type:ty, $kind:expr, $entry:ident; $shape:ident) => {};
+    (@rest $variant:ident, $type:ty, $kind:expr, $entry:ident;) => {
+        if let Some(value) = <$type as $crate::config::value::Value<_>>::read(&$kind, $entry) {
+            return Some(Self::$variant(value));
+        }
+    };
+}
+pub(in crate::config) use one_of;

@@ -1,0 +1,142 @@
+//! `[analysis]`: which field problems are solved, and how exactly.
+
+use serde::Serialize;
+
+use super::linear_solver::LinearSolver;
+use super::petsc::Petsc;
+use crate::config::schema::definitions::Definitions;
+use crate::config::section::Section;
+use crate::config::table::{left_out, table};
+use crate::config::value::{Entry, Group, Keywords, Value, Whole};
+
+table! {
+    /// Which field problem is solved, and how exactly. Every frequency is a problem of its own, and all share one mesh.
+    ///
+    /// The table is required, but for a motion alone: with `[morph]` it may be left out where there is none of `[[coils]]`,
+    /// `[objective]`, `[boundaries]`, `[[constraints]]`, `[materials]` and `[regions]`.
+    ///
+    /// ```toml
+    /// [analysis]
+    /// frequency = "60 Hz"
+    /// order = 1
+    /// linear_solver = { method = "automatic", factor_gib = 4 }
+    /// ```
+    pub struct Analysis {
+        /// One frequency or several.
+        #[serde(flatten)]
+        frequencies: Frequencies = KEYS;
+        /// Penalty reluctivity over reluctivity, ν_p / ν. With 1 the penalised operator is the Laplacian in uniform material,
+        /// which is what iterative solvers like best.
+        penalty: f64 = number(POSITIVE) => 1.0;
+        /// Polynomial degree of A and ψ in an element. 2 gives about eight times the unknowns, and far smaller errors on the
+        /// same mesh.
+        order: ElementOrder = integer(1, 2) => ElementOrder::Linear;
+        /// How the linear systems are solved.
+        linear_solver: LinearSolver = TABLE => LinearSolver::default();
+        /// How they are solved on several ranks.
+        petsc: Petsc = TABLE => Petsc::default();
+    }
+}
+
+table! {
+    /// The frequency as it is written.
+    pub(in crate::config) struct FrequencyKeys {
+        /// The one frequency that is analysed; 0: magnetostatics. It has no default, since none fits most devices. Either this
+        /// or `frequencies`.
+        frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
+        /// Several frequencies, each once: one field problem each, all on the same mesh. The first is the one whose fields and
+        /// results have plain names. Instead of `frequency`.
+        #[also(not_empty, each_once)]
+        frequencies: Option<Vec<f64>> = quantity(Frequency, NOT_NEGATIVE);
+    }
+    rules = |rules| rules.exactly_one(&["frequency", "frequencies"]);
+}
+
+/// The degree of the potentials in an element, written as its number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(into = "u8")]
+pub enum ElementOrder {
+    /// 1.
+    Linear,
+    /// 2.
+    Quadratic,
+}
+
+impl From<ElementOrder> for u8 {
+    fn from(order: ElementOrder) -> Self {
+        match order {
+            ElementOrder::Linear => 1,
+            ElementOrder::Quadratic => 2,
+        }
+    }
+}
+
+impl Value<Whole> for ElementOrder {
+    fn read(kind: &Whole, entry: &Entry<'_>) -> Option<Self> {
+        usize::read(kind, entry).map(|order| if order == 2 { Self::Quadratic } else { Self::Linear })
+    }
+
+    fn schema(kind: &Whole, definitions: &mut Definitions) -> Keywords {
+        usize::schema(kind, definitions)
+    }
+}
+
+/// One frequency or several [Hz]; 0: magnetostatic. Each is a field problem of its own.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Frequencies {
+    /// One.
+    #[serde(rename = "frequency")]
+    One(f64),
+    /// Several, each once.
+    #[serde(rename = "frequencies")]
+    Several(Vec<f64>),
+}
+
+impl Analysis {
+    /// What a motion of the mesh alone is read with: magnetostatic.
+    pub(super) fn static_field() -> Self {
+        Self { frequencies: Frequencies::One(0.0), ..left_out() }
+    }
+
+    /// All frequencies [Hz], at least one.
+    pub fn frequencies(&self) -> &[f64] {
+        match &self.frequencies {
+            Frequencies::One(frequency) => std::slice::from_ref(frequency),
+            Frequencies::Several(frequencies) => frequencies,
+        }
+    }
+
+    /// The first frequency [Hz].
+    pub fn frequency(&self) -> f64 {
+        self.frequencies()[0]
+    }
+}
+
+impl Group for Frequencies {
+    type Written = FrequencyKeys;
+
+    /// Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
+    fn of(written: FrequencyKeys, section: &Section<'_>) -> Self {
+        if !section.has("frequencies") {
+            if !section.has("frequency") {
+                section.missing(&["frequency"], "frequency = \"60 Hz\"");
+            }
+            return Self::One(written.frequency.unwrap_or(f64::NAN));
+        }
+        if section.has("frequency") {
+            let message = format!("`{}` has both `frequency` and `frequencies`", section.path());
+            section.clash(["frequency", "frequencies"], message, "one of them");
+        }
+        // A list with a fault is not handed out.
+        let several = written.frequencies.unwrap_or_else(|| vec![f64::NAN]);
+        if several.is_empty() {
+            section.check_not_empty("frequencies", "at least one frequency");
+            return Self::One(f64::NAN);
+        }
+        if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {
+            let message = format!("`analysis.frequencies` has {} Hz twice", several[twice]);
+            section.wrong(&format!("frequencies[{twice}]"), message, "each frequency once");
+        }
+        Self::Several(several)
+    }
+}

@@ -1,0 +1,457 @@
+//! `[[coils]]`: sources given by their analytic shape, or by a region of the mesh.
+
+use serde::Serialize;
+use serde_json::json;
+
+use crate::config::schema::rules::{Rules, Then};
+use crate::config::section::Section;
+use crate::config::table::{one_of, table};
+use crate::config::value::Group;
+use crate::config::value::choice::choice;
+use crate::config::value::kinds::WORD;
+
+table! {
+    /// A source of current: either with a `shape`, of uniform current density and given by it alone, so that the mesh need not
+    /// follow it, or a `region` of the mesh. A coil must lie outside of the part of the mesh that moves.
+    ///
+    /// Where the outside of the mesh cuts a coil, it must cut straight sides at right angles, on a flux-parallel surface; a
+    /// flux-normal plane may halve a coil's height, but no current may cross it. Anything else is an error that says where and
+    /// why.
+    ///
+    /// A `region` without `terminals` closes on itself: `center` and `axis` give any line through its hole, and positive
+    /// current runs counter-clockwise about it. The current has the direction of conduction and the same magnitude everywhere,
+    /// as in a stranded winding, less what is needed to free it of divergence; what is left of that, and the current through
+    /// cross-sections, is printed.
+    ///
+    /// ```toml
+    /// [[coils]]
+    /// name = "coil"
+    /// shape = "racetrack"
+    /// ampere_turns = "40 kA"
+    /// center = ["0 mm", "0 mm", "60 mm"]
+    /// half_window = ["60 mm", "160 mm"]
+    /// width = "20 mm"
+    /// height = "40 mm"
+    ///
+    /// [[coils]]
+    /// name = "winding"
+    /// region = "winding"
+    /// ampere_turns = "500 A"
+    /// phase = "90 deg"
+    /// terminals = ["y_min", "x_min"]
+    /// ```
+    pub struct Coil {
+        /// What the coil is called in messages and results; each name once.
+        name: String = TEXT, need "\"coil\"";
+        /// Amplitude of current times turns [A], not 0; positive is counter-clockwise about the axis, or from the first terminal
+        /// to the second.
+        #[also(not_zero)]
+        ampere_turns: f64 = quantity(Current, FINITE), need "\"40 kA\"";
+        /// Phase of the current [rad].
+        phase: f64 = quantity(Angle, FINITE) => 0.0;
+        /// Where the current flows.
+        #[serde(flatten)]
+        shape: CoilShape = KEYS;
+    }
+    check = Coil::check;
+}
+
+table! {
+    /// The keys that say where the current flows, for all shapes together.
+    pub(in crate::config) struct ShapeKeys {
+        /// The shape of the winding. Either this or `region`.
+        shape: Option<ShapeWord> = WORD;
+        /// Instead of `shape`: the region of the mesh that is the winding. It must not conduct at a frequency above 0.
+        region: Option<String> = TEXT;
+        /// Centre of the coil [m]; required with `shape`. Of a `region` without `terminals`: a point of a line through its hole.
+        center: Option<[f64; 3]> = length(FINITE);
+        /// Axis of the winding; the length of a vector does not matter.
+        axis: Axis = ONE_OF => Axis::default();
+        /// Racetrack and rectangular: direction of the first half size of the window, of which the part across the axis counts;
+        /// the second is at right angles to it, counter-clockwise. Default: the coordinate that follows the axis cyclically (x
+        /// for z), or its part across a slanted axis.
+        #[also(not_all_zero)]
+        direction: Option<[f64; 3]> = number(FINITE);
+        /// Racetrack and rectangular, required: inner half sizes along `direction` and across it [m].
+        half_window: Option<[f64; 2]> = length(POSITIVE);
+        /// Circular, required: inner radius [m].
+        radius: Option<f64> = length(POSITIVE);
+        /// Radial width of the winding [m]; required with `shape`.
+        width: Option<f64> = length(POSITIVE);
+        /// Axial height of the winding [m]; required with `shape`.
+        height: Option<f64> = length(POSITIVE);
+        /// Racetrack: how the straight sides meet. Default `"mitred"`.
+        corner: Option<CornerWord> = WORD;
+        /// Racetrack, instead of `corner`: concentric round corners with this inner radius [m], at most the smaller half size of
+        /// the window.
+        inner_radius: Option<f64> = length(POSITIVE);
+        /// With `region`: the surface where the current comes in, and the one where it goes out; both flux-parallel. Only
+        /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of the region are
+        /// in series: each carries all ampere-turns.
+        terminals: Option<[String; 2]> =
+            two_names("two surfaces: where the current comes in, where it goes out");
+    }
+    unused = ShapeKeys::unused;
+    rules = keys_of_the_shape;
+}
+
+const SIDES: [&str; 2] = ["direction", "half_window"];
+const CORNERS: [&str; 2] = ["corner", "inner_radius"];
+const BODY: [&str; 4] = ["center", "width", "height", "half_window"];
+const NOT_OF_A_REGION: [&str; 7] =
+    ["radius", "width", "height", "direction", "half_window", "corner", "inner_radius"];
+
+impl ShapeKeys {
+    /// The keys that go with other shapes.
+    fn unused(section: &Section<'_>) -> Vec<&'static str> {
+        match section.peek("shape", &WORD) {
+            _ if section.has("region") && !section.has("shape") => NOT_OF_A_REGION.to_vec(),
+            None | Some(ShapeWord::Racetrack) => vec!["radius"],
+            Some(ShapeWord::Rectangular) => [&["radius"], &CORNERS[..]].concat(),
+            Some(ShapeWord::Circular) => [SIDES, CORNERS].concat(),
+        }
+    }
+}
+
+/// Which keys go with which shape.
+fn keys_of_the_shape(rules: Rules) -> Rules {
+    rules
+        .exactly_one(&["shape", "region"])
+        .not_both(CORNERS)
+        .when("shape", &["racetrack"], Then { required: &BODY, refused: &["radius", "terminals"] })
+        .when(
+            "shape",
+            &["rectangular"],
+            Then { required: &BODY, refused: &["radius", "terminals", CORNERS[0], CORNERS[1]] },
+        )
+        .when(
+            "shape",
+            &["circular"],
+            Then {
+                required: &["center", "width", "height", "radius"],
+                refused: &["terminals", SIDES[0], SIDES[1], CORNERS[0], CORNERS[1]],
+            },
+        )
+        .with("region", Then { required: &[], refused: &NOT_OF_A_REGION })
+        .with("terminals", Then { required: &[], refused: &["center", "axis"] })
+        .add(json!({ "anyOf": [
+            { "required": ["shape"] }, { "required": ["terminals"] }, { "required": ["center"] },
+        ] }))
+}
+
+/// Where a coil's current flows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "shape", rename_all = "lowercase")]
+pub enum CoilShape {
+    /// Four straight sides.
+    Racetrack(Racetrack),
+    /// Four straight sides with mitred corners.
+    Rectangular(Rectangular),
+    /// A circle.
+    Circular(Circular),
+    /// A region of the mesh.
+    #[serde(untagged)]
+    Region(RegionCoil),
+}
+
+/// A coil with straight sides, as analytic source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Racetrack {
+    /// Centre of the coil [m].
+    pub center: [f64; 3],
+    /// Axis of the winding. Default z.
+    pub axis: Axis,
+    /// Direction of the first half size of the window. Default: the coordinate that follows the axis cyclically.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
+    /// Inner half sizes across the axis: along the direction, and across both [m].
+    pub half_window: [f64; 2],
+    /// Radial width of the winding [m].
+    pub width: f64,
+    /// Axial height of the winding [m].
+    pub height: f64,
+    /// How the straight sides meet. Default mitred: the rectangular coil of the paper.
+    #[serde(flatten)]
+    pub corner: Corner,
+}
+
+/// A rectangular coil, as analytic source; fields as those of [`Racetrack`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the fields are those of the racetrack")]
+pub struct Rectangular {
+    pub center: [f64; 3],
+    pub axis: Axis,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
+    pub half_window: [f64; 2],
+    pub width: f64,
+    pub height: f64,
+}
+
+/// A circular coil, as analytic source.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Circular {
+    /// Centre of the coil [m].
+    pub center: [f64; 3],
+    /// Axis of the winding. Default z.
+    pub axis: Axis,
+    /// Inner radius [m].
+    pub radius: f64,
+    /// Radial width of the winding [m].
+    pub width: f64,
+    /// Axial height of the winding [m].
+    pub height: f64,
+}
+
+/// A coil that is a region of the mesh.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RegionCoil {
+    /// Name of the region.
+    pub region: String,
+    /// The way of the current.
+    #[serde(flatten)]
+    pub path: CoilPath,
+}
+
+/// The way of the current in a region.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum CoilPath {
+    /// From one surface to another.
+    Terminals {
+        /// Names of the surfaces.
+        terminals: [String; 2],
+    },
+    /// Round a hole.
+    Closed {
+        /// A point of a line through the hole [m].
+        center: [f64; 3],
+        /// Direction of that line. Default z.
+        axis: Axis,
+    },
+}
+
+choice! {
+    /// Words for `shape`.
+    pub enum ShapeWord {
+        /// Four straight sides with corners of choice.
+        Racetrack = "racetrack",
+        /// Four straight sides with mitred corners.
+        Rectangular = "rectangular",
+        /// A circle.
+        Circular = "circular",
+    }
+}
+
+choice! {
+    /// A coordinate axis.
+    pub enum AxisWord {
+        /// x.
+        X = "x",
+        /// y.
+        Y = "y",
+        /// z.
+        Z = "z",
+    }
+}
+
+impl AxisWord {
+    /// Its coordinate: 0, 1 or 2.
+    pub fn index(self) -> usize {
+        match self {
+            Self::X => 0,
+            Self::Y => 1,
+            Self::Z => 2,
+        }
+    }
+}
+
+one_of! {
+    /// The axis of a coil or of a rotation: the name of a coordinate, or a vector.
+    #[derive(Copy)]
+    pub enum Axis {
+        /// A coordinate axis.
+        Coordinate(AxisWord) = WORD;
+        /// Along a vector of any length but zero.
+        #[also(not_all_zero)]
+        Vector([f64; 3]) = number(FINITE), if list;
+    }
+}
+
+impl Default for Axis {
+    fn default() -> Self {
+        Self::Coordinate(AxisWord::Z)
+    }
+}
+
+impl Axis {
+    /// A vector along the axis.
+    pub fn vector(self) -> [f64; 3] {
+        match self {
+            Self::Coordinate(word) => {
+                let mut vector = [0.0; 3];
+                vector[word.index()] = 1.0;
+                vector
+            }
+            Self::Vector(vector) => vector,
+        }
+    }
+}
+
+choice! {
+    /// Words for `corner`.
+    pub enum CornerWord {
+        /// The current turns on the diagonal.
+        Mitred = "mitred",
+    }
+}
+
+/// How the sides of a racetrack meet.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Corner {
+    /// Straight to the corner.
+    #[serde(rename = "corner")]
+    Sharp(CornerWord),
+    /// Concentric arcs with this inner radius [m].
+    #[serde(rename = "inner_radius")]
+    Round(f64),
+}
+
+impl Coil {
+    fn check(&mut self, section: &Section<'_>) {
+        if self.ampere_turns == 0.0 {
+            let message = format!("`{}.ampere_turns` is 0 A: the coil makes no field", section.path());
+            section.wrong("ampere_turns", message, "any current but 0 A");
+        }
+    }
+}
+
+impl Group for CoilShape {
+    type Written = ShapeKeys;
+
+    fn of(written: ShapeKeys, section: &Section<'_>) -> Self {
+        let (has_shape, has_region) = (section.has("shape"), section.has("region"));
+        if has_shape && has_region {
+            section.clash(
+                ["shape", "region"],
+                format!("`{}` has both `shape` and `region`", section.path()),
+                "shape with its dimensions, or region with its terminals",
+            );
+        } else if !has_shape && !has_region {
+            section.missing(&["shape", "region"], "shape = \"racetrack\", or region = \"winding\"");
+        }
+        check_axis(written.axis, section);
+        match written.region.clone() {
+            Some(region) if !has_shape => {
+                Self::Region(RegionCoil { region, path: CoilPath::of(written, section) })
+            }
+            _ => Self::analytic(written, section),
+        }
+    }
+}
+
+impl CoilShape {
+    fn analytic(written: ShapeKeys, section: &Section<'_>) -> Self {
+        let ShapeKeys { shape, center, axis, direction, half_window, radius, width, height, .. } = written;
+        let shape = shape.unwrap_or(ShapeWord::Racetrack);
+        if written.terminals.is_some() && !section.has("region") {
+            section.wrong(
+                "terminals",
+                format!("`{}` has terminals, but an analytic coil closes on itself", section.path()),
+                "region = \"NAME\" in place of shape, or no terminals",
+            );
+        }
+        let window = ("half_window", "[\"60 mm\", \"160 mm\"]");
+        let across = if shape == ShapeWord::Circular { ("radius", "\"60 mm\"") } else { window };
+        let center_example = "[\"0 mm\", \"0 mm\", \"60 mm\"]";
+        let required =
+            [("center", center_example), ("width", "\"20 mm\""), ("height", "\"40 mm\""), across];
+        for (key, example) in required.into_iter().filter(|(key, _)| !section.has(key)) {
+            section.missing(&[key], &format!("{key} = {example}"));
+        }
+        let center = center.unwrap_or([f64::NAN; 3]);
+        let [radius, width, height] = [radius, width, height].map(|value| value.unwrap_or(f64::NAN));
+        let direction = direction.filter(|direction| check_direction(*direction, axis, section));
+        let half_window = half_window.unwrap_or([f64::NAN; 2]);
+        match shape {
+            ShapeWord::Circular => Self::Circular(Circular { center, axis, radius, width, height }),
+            ShapeWord::Rectangular => {
+                Self::Rectangular(Rectangular { center, axis, direction, half_window, width, height })
+            }
+            ShapeWord::Racetrack => {
+                let corner = Corner::of(written.corner, written.inner_radius, half_window, section);
+                Self::Racetrack(Racetrack { center, axis, direction, half_window, width, height, corner })
+            }
+        }
+    }
+}
+
+impl CoilPath {
+    fn of(written: ShapeKeys, section: &Section<'_>) -> Self {
+        if section.has("terminals") {
+            for key in ["center", "axis"].into_iter().filter(|key| section.has(key)) {
+                section.wrong(
+                    key,
+                    format!("`{}` has terminals, and `{key}` of a coil that closes on itself", section.path()),
+                    "terminals, or center and axis of a line through the hole",
+                );
+            }
+            return Self::Terminals { terminals: written.terminals.unwrap_or_default() };
+        }
+        if !section.has("center") {
+            section.missing(
+                &["terminals", "center"],
+                "terminals = [\"in\", \"out\"], or center = [\"0 mm\", \"0 mm\", \"0 mm\"] with an axis for a closed coil",
+            );
+        }
+        Self::Closed { center: written.center.unwrap_or([f64::NAN; 3]), axis: written.axis }
+    }
+}
+
+impl Corner {
+    fn of(
+        word: Option<CornerWord>,
+        radius: Option<f64>,
+        [a, b]: [f64; 2],
+        section: &Section<'_>,
+    ) -> Self {
+        if CORNERS.iter().all(|key| section.has(key)) {
+            let message = format!("`{}` has both `corner` and `inner_radius`", section.path());
+            section.clash(CORNERS, message, "one of them");
+        }
+        let Some(radius) = radius else { return Self::Sharp(word.unwrap_or(CornerWord::Mitred)) };
+        if radius > a.min(b) {
+            section.wrong(
+                "inner_radius",
+                format!("`{}.inner_radius` is {radius} m, more than a half size of the window", section.path()),
+                format!("at most {} m", a.min(b)),
+            );
+        }
+        Self::Round(radius)
+    }
+}
+
+/// An axis must have a length.
+pub(super) fn check_axis(axis: Axis, section: &Section<'_>) {
+    if length(axis.vector()) == 0.0 {
+        let message = format!("`{}.axis` has no length", section.path());
+        section.wrong("axis", message, "\"x\", \"y\", \"z\", or a vector that is not zero");
+    }
+}
+
+/// Whether a direction has a part across the axis.
+fn check_direction(direction: [f64; 3], axis: Axis, section: &Section<'_>) -> bool {
+    let [a, b] = [axis.vector(), direction];
+    let across = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    // The bound of the solver's frame, below which no plane is left to turn in.
+    let has_part = length(across) > 1e-6 * length(a) * length(b);
+    if !has_part {
+        let message = format!("`{}.direction` has no part across the axis", section.path());
+        section.wrong("direction", message, "a vector that is not along the axis");
+    }
+    has_part
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
+}

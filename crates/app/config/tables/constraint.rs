@@ -1,0 +1,315 @@
+//! `[[constraints]]`: what must stay below a bound while the objective is optimised.
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::design::COMPONENTS;
+use super::functional::{Functional, ObjectiveKind, Weighting, keys_of_the_kind};
+use crate::config::schema::rules::{Rules, Then, is, present};
+use crate::config::section::Section;
+use crate::config::table::table;
+use crate::config::value::choice::choice;
+use crate::config::value::kinds::{WORD, quantity};
+use crate::config::value::quantity::Dimension;
+use crate::config::value::range::Range;
+use crate::config::value::{Column, Group, Unread};
+
+table! {
+    /// What must keep within a bound while the objective is optimised; with the algorithms `mma`, `ccsaq` and `slsqp`, and
+    /// with a `[design]`. A constraint counts as kept when it is beyond its bound by no more than a millionth of it. The best
+    /// design of a run is the best one that keeps all constraints; if none does, the one that is least beyond a bound, with a
+    /// warning.
+    ///
+    /// The bounds on a thickness are smooth ones on the safe side: the true least thickness is a little greater, the greatest a
+    /// little smaller. Where the flat body is to be limited, `design.lower` and `design.upper` do the same at no cost. With
+    /// both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their names.
+    ///
+    /// ```toml
+    /// [[constraints]]
+    /// kind = "mass"
+    /// region = "plate"
+    /// upper = "2.5 kg"
+    ///
+    /// [[constraints]]
+    /// kind = "loss"
+    /// region = "plate"
+    /// upper_ratio = 0.9
+    ///
+    /// [[constraints]]
+    /// kind = "thickness"
+    /// minimum = "6 mm"
+    /// ```
+    pub struct Constraint {
+        /// What the constraint is called in the results, a column of the history: letters, digits, `_` and `-`; each name once.
+        /// Default: its kind and region, such as `loss_plate`.
+        name: String = COLUMN, else String::new();
+        /// What is kept within what.
+        #[serde(flatten)]
+        limit: Limit = KEYS;
+    }
+    check = Constraint::check;
+}
+
+table! {
+    /// The keys that say what is limited, for all kinds together.
+    pub(in crate::config) struct LimitKeys {
+        /// What is limited: a quantity of the field, a volume or mass, or the thickness of the body.
+        kind: Kind = WORD, need "\"volume\"";
+        /// The region it is measured in. Required, but for `energy` and `thickness`.
+        region: Option<String> = TEXT;
+        /// As in `[objective]`.
+        weighting: Option<Weighting> = WORD;
+        /// As in `[objective]`.
+        target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
+        /// As in `[objective]`.
+        #[also(not_all_zero)]
+        direction: Option<[f64; 3]> = number(COMPONENTS);
+        /// As in `[objective]`.
+        frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
+        /// The greatest value, in the unit of the kind: `"20 W"`, `"2.5 kg"`. Either this or `upper_ratio`.
+        upper: Option<Unread> = SOME_QUANTITY;
+        /// The greatest value as a multiple of that of the initial design, which must be positive.
+        upper_ratio: Option<f64> = number(POSITIVE);
+        /// For `thickness`: the least thickness at every place [m]. At least one of `minimum` and `maximum` is needed.
+        minimum: Option<f64> = length(POSITIVE);
+        /// For `thickness`: the greatest thickness [m].
+        maximum: Option<f64> = length(POSITIVE);
+    }
+    unused = LimitKeys::unused;
+    rules = keys_of_the_limit;
+}
+
+/// The keys of a functional of the field.
+const OF_A_FIELD: [&str; 4] = ["weighting", "target", "direction", "frequency"];
+/// The keys of a bound on a value.
+const BOUNDS: [&str; 2] = ["upper", "upper_ratio"];
+/// The keys of a bound on a thickness.
+const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
+/// The keys that a thickness does not have.
+const NOT_OF_A_THICKNESS: [&str; 7] =
+    ["region", "weighting", "target", "direction", "frequency", "upper", "upper_ratio"];
+
+impl LimitKeys {
+    /// The keys that go with other kinds.
+    fn unused(section: &Section<'_>) -> Vec<&'static str> {
+        match section.peek("kind", &WORD) {
+            Some(Kind::Thickness) => NOT_OF_A_THICKNESS.to_vec(),
+            Some(Kind::Volume | Kind::Mass) => [&OF_A_FIELD[..], &THICKNESSES[..]].concat(),
+            Some(_) => THICKNESSES.to_vec(),
+            // Nothing can be said of the other keys.
+            None => {
+                section.silence();
+                [&NOT_OF_A_THICKNESS[..], &THICKNESSES[..]].concat()
+            }
+        }
+    }
+}
+
+/// Which keys go with which kind, and the unit of the bound.
+fn keys_of_the_limit(rules: Rules) -> Rules {
+    let thickness = Then { required: &[], refused: &NOT_OF_A_THICKNESS };
+    let body = Then { required: &["region"], refused: &OF_A_FIELD };
+    let mut rules = rules
+        .when("kind", &["thickness"], thickness)
+        .unless("kind", &["thickness"], Then { required: &[], refused: &THICKNESSES })
+        .when("kind", &["volume", "mass"], body)
+        .branch(is("kind", &["volume", "mass", "thickness"]), "else", keys_of_the_kind)
+        .add(json!({
+            "if": is("kind", &["thickness"]),
+            "then": { "anyOf": present(&THICKNESSES) },
+            "else": { "oneOf": present(&BOUNDS) },
+        }));
+    let by_volume = is("weighting", &["volume"]);
+    let sums = is("kind", &["flux_density_squared", "uniformity"]);
+    let units = [
+        (json!({ "allOf": [sums, by_volume] }), Dimension::FluxDensityIntegral, Range::POSITIVE),
+        (json!({ "allOf": [sums, { "not": by_volume }] }), Dimension::FluxDensitySquared, Range::POSITIVE),
+        (is("kind", &["field_component"]), Dimension::FluxDensity, Range::FINITE),
+        (is("kind", &["loss"]), Dimension::Power, Range::POSITIVE),
+        (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
+        (is("kind", &["volume"]), Dimension::Volume, Range::POSITIVE),
+        (is("kind", &["mass"]), Dimension::Mass, Range::POSITIVE),
+    ];
+    for (condition, dimension, range) in units {
+        let upper = rules.definitions.quantity(dimension, range);
+        rules = rules.add(json!({ "if": condition, "then": { "properties": { "upper": upper } } }));
+    }
+    rules
+}
+
+/// What is kept within which bounds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Limit {
+    /// A functional of the field, from above.
+    Field {
+        /// What is measured.
+        #[serde(flatten)]
+        functional: Functional,
+        /// Its bound.
+        #[serde(flatten)]
+        bound: UpperBound,
+    },
+    /// Volume or mass of a region, from above.
+    Body {
+        /// Which of them.
+        kind: BodyKind,
+        /// The region.
+        region: String,
+        /// Its bound.
+        #[serde(flatten)]
+        bound: UpperBound,
+    },
+    /// Thickness of the designed body along the direction of the design; at least one bound.
+    Thickness {
+        /// The word itself.
+        kind: ThicknessKind,
+        /// Least thickness [m].
+        minimum: Option<f64>,
+        /// Greatest thickness [m].
+        maximum: Option<f64>,
+    },
+}
+
+choice! {
+    /// Kinds of constraints on a body.
+    pub enum BodyKind {
+        /// Volume [m³].
+        Volume = "volume",
+        /// Mass [kg], by `density` of the material.
+        Mass = "mass",
+    }
+}
+
+choice! {
+    /// The kind of a constraint on the thickness.
+    pub enum ThicknessKind {
+        /// Thickness [m].
+        Thickness = "thickness",
+    }
+}
+
+choice! {
+    /// Every word that `kind` may be.
+    pub(in crate::config) enum Kind {
+        /// As in `[objective]`.
+        FluxDensitySquared = "flux_density_squared",
+        /// As in `[objective]`.
+        Uniformity = "uniformity",
+        /// As in `[objective]`.
+        FieldComponent = "field_component",
+        /// As in `[objective]`.
+        Loss = "loss",
+        /// As in `[objective]`.
+        Energy = "energy",
+        /// Volume of a region [m³], meshed or replaced by its impedance surface.
+        Volume = "volume",
+        /// Mass of a region [kg], by the `density` of its material.
+        Mass = "mass",
+        /// Thickness of the designed body along the direction of the design [m].
+        Thickness = "thickness",
+    }
+}
+
+/// An upper bound.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum UpperBound {
+    /// In SI.
+    #[serde(rename = "upper")]
+    Value(f64),
+    /// As a multiple of the initial design's value.
+    #[serde(rename = "upper_ratio")]
+    Ratio(f64),
+}
+
+impl Constraint {
+    /// The default of its name.
+    fn check(&mut self, section: &Section<'_>) {
+        // Without a kind, or with an unknown one, a constraint is left out.
+        let Some(kind) = section.peek::<_, Kind>("kind", &WORD) else { return self.name.clear() };
+        if !self.name.is_empty() {
+            return;
+        }
+        let region = match &self.limit {
+            Limit::Field { functional, .. } => functional.region.as_deref(),
+            Limit::Body { region, .. } => Some(region.as_str()),
+            Limit::Thickness { .. } => None,
+        };
+        self.name = Column::of(&region.map_or(kind.name().to_owned(), |r| format!("{}_{r}", kind.name())));
+    }
+}
+
+impl Group for Limit {
+    type Written = LimitKeys;
+
+    fn of(written: LimitKeys, section: &Section<'_>) -> Self {
+        let Some(kind) = section.peek("kind", &WORD) else {
+            return Self::Thickness { kind: ThicknessKind::Thickness, minimum: None, maximum: None };
+        };
+        let field = match kind {
+            Kind::FluxDensitySquared => ObjectiveKind::FluxDensitySquared,
+            Kind::Uniformity => ObjectiveKind::Uniformity,
+            Kind::FieldComponent => ObjectiveKind::FieldComponent,
+            Kind::Loss => ObjectiveKind::Loss,
+            Kind::Energy => ObjectiveKind::Energy,
+            Kind::Volume => return Self::body(BodyKind::Volume, Dimension::Volume, written, section),
+            Kind::Mass => return Self::body(BodyKind::Mass, Dimension::Mass, written, section),
+            Kind::Thickness => return Self::thickness(&written, section),
+        };
+        Self::field(field, written, section)
+    }
+}
+
+impl Limit {
+    fn field(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
+        let LimitKeys { region, weighting, target, direction, frequency, upper_ratio, .. } = written;
+        let mut functional = Functional { kind, region, weighting, target, direction, frequency };
+        functional.check(section);
+        let range = match kind {
+            ObjectiveKind::FieldComponent => Range::FINITE,
+            _ => Range::POSITIVE,
+        };
+        let bound = UpperBound::of(upper_ratio, section, functional.dimension(), range);
+        Self::Field { functional, bound }
+    }
+
+    fn body(kind: BodyKind, dimension: Dimension, written: LimitKeys, section: &Section<'_>) -> Self {
+        if !section.has("region") {
+            section.missing(&["region"], "region = \"plate\"");
+        }
+        let bound = UpperBound::of(written.upper_ratio, section, dimension, Range::POSITIVE);
+        Self::Body { kind, region: written.region.unwrap_or_default(), bound }
+    }
+
+    fn thickness(&LimitKeys { minimum, maximum, .. }: &LimitKeys, section: &Section<'_>) -> Self {
+        if !section.has("minimum") && !section.has("maximum") {
+            section.missing(&THICKNESSES, "minimum = \"6 mm\", or maximum = \"25 mm\"");
+        }
+        if let (Some(minimum), Some(maximum)) = (minimum, maximum)
+            && minimum >= maximum
+        {
+            let message =
+                format!("`{}` asks for {minimum} m at least and {maximum} m at most", section.path());
+            section.clash(THICKNESSES, message, "more than the minimum");
+        }
+        Self::Thickness { kind: ThicknessKind::Thickness, minimum, maximum }
+    }
+}
+
+impl UpperBound {
+    fn of(ratio: Option<f64>, section: &Section<'_>, dimension: Dimension, range: Range) -> Self {
+        let value = section.read("upper", &quantity(dimension, range));
+        match BOUNDS.map(|key| section.has(key)) {
+            [true, true] => {
+                let message = format!("`{}` has both `upper` and `upper_ratio`", section.path());
+                section.clash(BOUNDS, message, "one of them");
+            }
+            [false, false] => {
+                let example = format!("upper = \"{}\", or upper_ratio = 0.9", dimension.example());
+                section.missing(&BOUNDS, &example);
+            }
+            _ => {}
+        }
+        ratio.map_or(Self::Value(value.unwrap_or(f64::NAN)), Self::Ratio)
+    }
+}

@@ -1,0 +1,133 @@
+//! What is measured of the field: the keys that `[objective]`, its terms and `[[constraints]]` share.
+
+use super::design::{COMPONENTS, unit_vector};
+use crate::config::schema::rules::{Rules, Then};
+use crate::config::section::Section;
+use crate::config::table::table;
+use crate::config::value::choice::choice;
+use crate::config::value::quantity::Dimension;
+
+table! {
+    /// A real quantity of the field.
+    pub struct Functional {
+        /// What is measured. The default is the paper's objective.
+        kind: ObjectiveKind = WORD => ObjectiveKind::FluxDensitySquared;
+        /// The region it is measured in. Required, but for `energy`: without it the energy is that of everything that is
+        /// meshed.
+        region: Option<String> = TEXT;
+        /// For `flux_density_squared` and `uniformity`: how the cells of the region are weighted. Default `"point"`, as in the
+        /// paper.
+        weighting: Option<Weighting> = WORD;
+        /// For `uniformity`, required: the flux density wished for [T].
+        target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
+        /// For `field_component`, required: a vector along the component; its length does not matter.
+        #[also(not_all_zero)]
+        direction: Option<[f64; 3]> = number(COMPONENTS);
+        /// The one frequency it is taken at [Hz], one of `[analysis]`. Default: the values at all frequencies are added.
+        frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
+    }
+}
+
+/// Which keys go with which kind.
+pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
+    rules
+        .unless("kind", &["energy"], Then { required: &["region"], refused: &[] })
+        .when("kind", &["field_component", "loss", "energy"], Then { required: &[], refused: &["weighting"] })
+        .when("kind", &["uniformity"], Then { required: &["target"], refused: &[] })
+        .unless("kind", &["uniformity"], Then { required: &[], refused: &["target"] })
+        .when("kind", &["field_component"], Then { required: &["direction"], refused: &[] })
+        .unless("kind", &["field_component"], Then { required: &[], refused: &["direction"] })
+}
+
+choice! {
+    /// Kinds of functionals.
+    pub enum ObjectiveKind {
+        /// Σ w B·B* [T²; by volume T² m³]. The region must not move.
+        FluxDensitySquared = "flux_density_squared",
+        /// Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is to vanish. The region must not move.
+        Uniformity = "uniformity",
+        /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. The region must not move.
+        FieldComponent = "field_component",
+        /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
+        /// impedance surface, and may move.
+        Loss = "loss",
+        /// Energy of the magnetic field [J]: ½ ∫ ν |B|² dV in statics, its time average ¼ ∫ ν |B|² dV in harmonics. The region
+        /// is meshed and may move.
+        Energy = "energy",
+    }
+}
+
+choice! {
+    /// Weights of the cells of a region.
+    pub enum Weighting {
+        /// One term for each observation cell, as in the paper.
+        Point = "point",
+        /// The integral over the region.
+        Volume = "volume",
+    }
+}
+
+impl ObjectiveKind {
+    /// Whether the cells are weighted.
+    fn sums_over_cells(self) -> bool {
+        matches!(self, Self::FluxDensitySquared | Self::Uniformity)
+    }
+}
+
+impl Functional {
+    /// Checks which keys go with the kind, and completes what follows from it.
+    pub(super) fn check(&mut self, section: &Section<'_>) {
+        let kind = self.kind;
+        if !section.has("region") && kind != ObjectiveKind::Energy {
+            section.missing(&["region"], "region = \"observation\"");
+        }
+        for (key, example, wanted) in [
+            ("weighting", None, kind.sums_over_cells()),
+            ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::Uniformity),
+            ("direction", Some("direction = [0, 0, 1]"), kind == ObjectiveKind::FieldComponent),
+        ] {
+            match (section.has(key), example) {
+                (true, _) if !wanted => {
+                    let message =
+                        format!("`{}.{key}` has no use for the kind `{}`", section.path(), kind.name());
+                    section.wrong(key, message, "no such key, or another kind");
+                }
+                (false, Some(example)) if wanted => section.missing(&[key], example),
+                _ => {}
+            }
+        }
+        self.direction = self.direction.and_then(|vector| unit_vector(section, vector));
+        self.weighting = kind.sums_over_cells().then(|| self.weighting.unwrap_or(Weighting::Point));
+    }
+
+    /// Checks that its frequency is analysed, and that a loss is not sought where nothing is induced; `analysed` [Hz] is
+    /// empty where it is unknown.
+    pub(super) fn check_frequencies(&self, section: &Section<'_>, analysed: &[f64]) {
+        if let Some(own) = self.frequency.filter(|own| !analysed.is_empty() && !analysed.contains(own)) {
+            let known: Vec<String> = analysed.iter().map(|f| format!("{f} Hz")).collect();
+            let message = format!("`{}.frequency` is {own} Hz, which is not analysed", section.path());
+            section.wrong("frequency", message, format!("a frequency of [analysis]: {}", known.join(", ")));
+        }
+        let still = |f: f64| f == 0.0;
+        let nothing = self.frequency.map_or(!analysed.is_empty() && analysed.iter().all(|&f| still(f)), still);
+        if self.kind == ObjectiveKind::Loss && nothing {
+            let message = format!("`{}` is a loss at 0 Hz, where no current is induced", section.path());
+            section.wrong("kind", message, "a frequency above 0 Hz");
+        }
+    }
+
+    /// Unit of its values.
+    pub fn dimension(&self) -> Dimension {
+        match (self.kind, self.weighting) {
+            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::Uniformity, Some(Weighting::Volume)) => {
+                Dimension::FluxDensityIntegral
+            }
+            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::Uniformity, _) => {
+                Dimension::FluxDensitySquared
+            }
+            (ObjectiveKind::FieldComponent, _) => Dimension::FluxDensity,
+            (ObjectiveKind::Loss, _) => Dimension::Power,
+            (ObjectiveKind::Energy, _) => Dimension::Energy,
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! `[objective]` and `[[probes]]`: what is made small or large, and what is looked at.
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::functional::{Functional, keys_of_the_kind};
+use crate::config::schema::rules::Then;
+use crate::config::section::Section;
+use crate::config::table::table;
+use crate::config::value::Group;
+use crate::config::value::choice::choice;
+
+/// The keys that belong to a term.
+const OF_A_TERM: [&str; 7] = ["kind", "region", "weighting", "target", "direction", "frequency", "weight"];
+
+table! {
+    /// What is made small or large; needed by `run` and `gradient`. Either one functional, with its keys in `[objective]`
+    /// itself, or a weighted sum of several, each in `[[objective.terms]]`: the objective is then Σ `weight` · value, and only
+    /// `goal` stays in `[objective]`.
+    ///
+    /// The objective of the initial design must not be zero: a method sees the objective over its size there.
+    ///
+    /// ```toml
+    /// [objective]
+    /// kind = "flux_density_squared"
+    /// region = "observation"
+    /// weighting = "point"
+    /// ```
+    pub struct Objective {
+        /// Which way is better. Most objectives are errors, fields or losses.
+        goal: Goal = WORD => Goal::Minimise;
+        /// What is summed.
+        #[serde(flatten)]
+        sum: Sum = KEYS;
+    }
+}
+
+table! {
+    /// The keys of one term, or `terms`.
+    pub(in crate::config) struct SumKeys {
+        /// What is measured.
+        #[serde(flatten)]
+        functional: Functional = KEYS;
+        /// Factor on the value in SI, not 0.
+        #[also(not_zero)]
+        weight: f64 = number(FINITE) => 1.0;
+        /// The terms of a weighted sum, instead of the other keys.
+        #[also(not_empty)]
+        terms: Option<Vec<Term>> = TABLES;
+    }
+    rules = |rules| rules
+        .with("terms", Then { required: &[], refused: &OF_A_TERM })
+        .branch(json!({ "not": { "required": ["terms"] } }), "then", keys_of_the_kind);
+}
+
+choice! {
+    /// Which way an objective is better.
+    pub use fluxmorph_optimizer::objective as Goal {
+        /// Smaller.
+        Minimise = "minimise",
+        /// Larger.
+        Maximise = "maximise",
+    }
+}
+
+/// The terms of an objective as they are written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Sum {
+    /// One term, with its keys in `[objective]` itself.
+    One(Term),
+    /// `[[objective.terms]]`.
+    Several {
+        /// The terms, at least one.
+        terms: Vec<Term>,
+    },
+}
+
+table! {
+    /// One term of the objective.
+    ///
+    /// ```toml
+    /// [[objective.terms]]
+    /// kind = "loss"
+    /// region = "plate"
+    /// weight = 0.2
+    ///
+    /// [[objective.terms]]
+    /// kind = "field_component"
+    /// region = "observation"
+    /// direction = [0, 0, 1]
+    /// weight = 1000
+    /// ```
+    pub struct Term {
+        /// What is measured.
+        #[serde(flatten)]
+        functional: Functional = KEYS;
+        /// Factor on the value in SI, not 0.
+        #[also(not_zero)]
+        weight: f64 = number(FINITE) => 1.0;
+    }
+    check = Term::check;
+    rules = keys_of_the_kind;
+}
+
+table! {
+    /// Points at which the flux density is reported.
+    ///
+    /// ```toml
+    /// [[probes]]
+    /// name = "behind the plate"
+    /// points = [["0 mm", "0 mm", "-50 mm"], ["20 mm", "60 mm", "-50 mm"]]
+    /// ```
+    pub struct Probe {
+        /// What the points are called in the results; each name once.
+        name: String = TEXT, need "\"behind the plate\"";
+        /// The points [m], at least one. The flux density is recovered from the potentials around a point, within one material
+        /// (`docs/theory.md`, section 3). A point outside the mesh at the start is a fault; one that the moving mesh leaves behind
+        /// is `null` in the result, with a warning.
+        #[also(not_empty)]
+        points: Vec<[f64; 3]> = length(FINITE), need "[[\"0 mm\", \"0 mm\", \"-50 mm\"]]";
+    }
+    check = |_, section| section.check_not_empty("points", "at least one point of three lengths");
+}
+
+impl Objective {
+    /// The unit of its value in SI, where all its terms have the same.
+    pub fn si_unit(&self) -> Option<&'static str> {
+        let mut units = self.terms().iter().map(|term| term.functional.dimension().si_unit());
+        let first = units.next()?;
+        units.all(|unit| unit == first).then_some(first)
+    }
+
+    /// The terms, at least one.
+    pub fn terms(&self) -> &[Term] {
+        match &self.sum {
+            Sum::One(term) => std::slice::from_ref(term),
+            Sum::Several { terms } => terms,
+        }
+    }
+
+    /// The key path of a term, for messages.
+    pub fn path(&self, term: usize) -> String {
+        match self.sum {
+            Sum::One(_) => "objective".to_owned(),
+            Sum::Several { .. } => format!("objective.terms[{term}]"),
+        }
+    }
+}
+
+impl Group for Sum {
+    type Written = SumKeys;
+
+    fn of(written: SumKeys, section: &Section<'_>) -> Self {
+        let SumKeys { functional, weight, terms } = written;
+        if !section.has("terms") {
+            let mut term = Term { functional, weight };
+            term.check(section);
+            return Self::One(term);
+        }
+        for key in OF_A_TERM.into_iter().filter(|key| section.has(key)) {
+            let message = format!("`objective` has both `terms` and `{key}`");
+            section.wrong(key, message, format!("`{key}` inside [[objective.terms]]"));
+        }
+        if terms.as_ref().is_some_and(Vec::is_empty) {
+            section.wrong("terms", "`objective.terms` has no term", "at least one [[objective.terms]]");
+        }
+        Self::Several { terms: terms.unwrap_or_default() }
+    }
+}
+
+impl Term {
+    fn check(&mut self, section: &Section<'_>) {
+        if self.weight == 0.0 {
+            let message = format!("`{}.weight` is 0: the term has no effect", section.path());
+            section.wrong("weight", message, "any number but 0, or no term");
+        }
+        self.functional.check(section);
+    }
+}

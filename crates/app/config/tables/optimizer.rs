@@ -1,0 +1,74 @@
+//! `[optimizer]`: the algorithm and when it stops.
+
+use fluxmorph_optimizer::driver::Settings;
+
+use crate::config::table::table;
+use crate::config::value::choice::choice;
+use crate::config::value::range::Range;
+
+/// Most evaluations that a run may be given.
+pub const MOST_EVALUATIONS: usize = 1_000_000;
+
+/// Fractions of a whole.
+const FRACTIONS: Range = Range::half_open(0.0, 1.0);
+
+table! {
+    /// The algorithm and when it stops.
+    ///
+    /// ```toml
+    /// [optimizer]
+    /// algorithm = "mma"
+    /// max_evaluations = 20
+    /// max_time = "2 h"
+    /// ```
+    pub struct Optimizer: Default {
+        /// Method of NLopt. The default keeps to the bounds, needs no line search and suits many variables. With
+        /// `[[constraints]]`: `mma`, `ccsaq` or `slsqp`.
+        algorithm: Algorithm = WORD => Algorithm::Mma;
+        /// Most evaluations of the objective with its gradient.
+        max_evaluations: usize = integer(1, MOST_EVALUATIONS) => 30;
+        /// No evaluation is started after this time [s]. Default: no limit.
+        max_time: Option<f64> = quantity(Duration, POSITIVE);
+        /// Stop when the objective changes by less than this fraction between iterations; 0: off. The default is well below the
+        /// error of the mesh.
+        ftol_rel: f64 = number(FRACTIONS) => 1e-3;
+        /// Stop when all variables change by less than this fraction; 0: off. It is off by default, since the variables of a
+        /// design at its bounds get there long before the rest has settled.
+        xtol_rel: f64 = number(FRACTIONS) => 0.0;
+        /// Least quality (Eq. 4) of an element that a design may have, and so of the reference mesh that a round starts from. A
+        /// design below it is not evaluated: a round ends. Default: a twentieth of the worst quality of the undeformed mesh,
+        /// since layered meshes start with a low one.
+        minimum_quality: Option<f64> = number(FRACTIONS);
+    }
+}
+
+choice! {
+    /// Algorithms of NLopt.
+    pub use fluxmorph_optimizer::nlopt as Algorithm {
+        /// Method of moving asymptotes.
+        Mma = "mma",
+        /// Conservative convex separable approximation with quadratic terms.
+        Ccsaq = "ccsaq",
+        /// Sequential least-squares quadratic programming.
+        Slsqp = "slsqp",
+        /// Limited-memory BFGS.
+        Lbfgs = "lbfgs",
+        /// Truncated Newton with restarts and preconditioning.
+        Tnewton = "tnewton",
+        /// Limited-memory variable metric of rank 2.
+        Var2 = "var2",
+    }
+}
+
+impl Optimizer {
+    /// Method and limits for the driver.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            algorithm: self.algorithm,
+            max_evaluations: self.max_evaluations,
+            max_time: self.max_time,
+            ftol_rel: self.ftol_rel,
+            xtol_rel: self.xtol_rel,
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! `[remesh]`: the fictitious elastic body that carries the motion into the mesh (Eq. 3).
+
+use serde::Serialize;
+
+use super::order::box_with_volume;
+use crate::config::section::Section;
+use crate::config::table::table;
+use crate::config::value::choice::{Choice, choice};
+use crate::config::value::Group;
+use crate::config::value::range::Range;
+
+/// Poisson's ratio of a stable body.
+pub(super) const POISSON: Range = Range::open(-1.0, 0.5);
+
+table! {
+    /// The fictitious elastic body that carries the motion of the design into the mesh (Eq. 3). Either `region` or `box` says
+    /// which part of the mesh moves.
+    ///
+    /// ```toml
+    /// [remesh]
+    /// region = ["plate", "remesh"]
+    /// poisson = 0.0
+    /// stiffness = "inverse_volume"
+    /// slide = ["x_min", "y_min"]
+    /// ```
+    pub struct Remesh {
+        /// The part of the mesh that moves.
+        #[serde(flatten)]
+        extent: RemeshExtent = KEYS;
+        /// Poisson's ratio of the body. The default is the paper's.
+        poisson: f64 = number(POISSON) => 0.3;
+        /// Young's modulus of the body, before `stiffness` weights it. Without forces its unit cancels.
+        young: f64 = number(POSITIVE) => 1.0;
+        /// Fictitious force on every node that is free to move, in units of `young` times square metres.
+        force: [f64; 3] = number(FINITE) => [0.0; 3];
+        /// How the modulus depends on the element: small elements stay stiff and keep their shape, large ones take the motion.
+        stiffness: StiffnessLaw = WORD => StiffnessLaw::InverseSize;
+        /// Which way nodes may move. The default is the paper's elasticity.
+        motion: Motion = WORD => Motion::Free;
+        /// Most rounds of an optimisation: in each the mesh moves from a reference mesh of its own (`docs/theory.md`, section
+        /// 5.5). 0: all designs move from the undeformed mesh, and bounds that it does not reach in one step are refused.
+        rounds: usize = integer(0, 1000) => 20;
+        /// How far a design may lie from the reference of its round: largest share of the way to the first inverted element.
+        inversion_share: f64 = number(Range::open(0.0, 1.0)) => 0.9;
+        /// Surfaces whose nodes stay in their plane.
+        slide: Vec<String> = NAMES => Vec::new();
+        /// Surfaces whose nodes stay. The body's outside, and faces between two regions inside it, are fixed where nothing else
+        /// is said.
+        fixed: Vec<String> = NAMES => Vec::new();
+        /// Such surfaces whose nodes move freely, for example along the side of a core whose end face moves.
+        free: Vec<String> = NAMES => Vec::new();
+        /// Regions of the body with their own constants.
+        subregions: Vec<Subregion> = TABLES => Vec::new();
+    }
+    check = Remesh::check;
+}
+
+table! {
+    /// The part of the mesh that moves, as it is written.
+    pub(in crate::config) struct ExtentKeys {
+        /// The regions of the mesh that move. Either this or `box`.
+        region: Option<Vec<String>> = NAME_OR_NAMES;
+        /// Instead of `region`: all elements with their centroid between these two corners [m], the lower one first.
+        corners["box"]: Option<[[f64; 3]; 2]> = length(FINITE);
+    }
+    rules = |rules| rules.exactly_one(&["region", "box"]);
+}
+
+/// The part of the mesh that moves.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum RemeshExtent {
+    /// Regions of the mesh.
+    #[serde(rename = "region")]
+    Regions(Vec<String>),
+    /// All elements with their centroid between these corners [m].
+    #[serde(rename = "box")]
+    Box([[f64; 3]; 2]),
+}
+
+choice! {
+    /// How Young's modulus depends on the element.
+    pub enum StiffnessLaw {
+        /// The same everywhere.
+        Uniform = "uniform",
+        /// Proportional to 1 / smallest altitude: a thin layer counts as thin, however wide.
+        InverseSize = "inverse_size",
+        /// Proportional to 1 / volume.
+        InverseVolume = "inverse_volume",
+        /// Each principal direction of an element stiffer the shorter the element is along it: for thin layers that cross.
+        Directional = "directional",
+    }
+}
+
+choice! {
+    /// Which way the nodes of the elastic body may move.
+    pub enum Motion {
+        /// Every way.
+        Free = "free",
+        /// Along `design.direction` only, which must then be a vector along x, y or z. It keeps thin columns of cells from
+        /// inverting sideways.
+        AlongDesign = "along_design",
+    }
+}
+
+table! {
+    /// A region of the body with its own constants; what is left out is as in the rest of the body.
+    ///
+    /// ```toml
+    /// [[remesh.subregions]]
+    /// name = "plate"
+    /// young = 100
+    /// ```
+    pub struct Subregion {
+        /// Name of the region; each once.
+        name: String = TEXT, need "\"plate\"";
+        /// Young's modulus. Default: `remesh.young`.
+        young: Option<f64> = number(POSITIVE);
+        /// Poisson's ratio. Default: `remesh.poisson`.
+        poisson: Option<f64> = number(POISSON);
+        /// Fictitious force on every node. Default: `remesh.force`.
+        force: Option<[f64; 3]> = number(FINITE);
+    }
+}
+
+impl StiffnessLaw {
+    /// The law of a policy of the elastic map; `None` for one that the configuration has no word for.
+    pub fn of_policy(policy: fluxmorph_remesh::StiffnessPolicy) -> Option<Self> {
+        let same = |(word, _): &&(&str, Self)| *word == policy.name();
+        Self::CHOICES.iter().find(same).map(|(_, law)| *law)
+    }
+}
+
+impl Remesh {
+    fn check(&mut self, section: &Section<'_>) {
+        let lists = [("slide", &self.slide), ("fixed", &self.fixed), ("free", &self.free)];
+        for (index, (key, names)) in lists.iter().enumerate() {
+            for (earlier_key, earlier) in &lists[..index] {
+                for (i, name) in names.iter().enumerate().take_while(|_| !section.is_crowded()) {
+                    let Some(k) = earlier.iter().position(|earlier| earlier == name) else { continue };
+                    section.clash(
+                        [&format!("{earlier_key}[{k}]"), &format!("{key}[{i}]")],
+                        format!("`{name}` stands in remesh.{earlier_key} and remesh.{key}"),
+                        "each surface in one of the lists",
+                    );
+                }
+            }
+        }
+        let names = self.subregions.iter().map(|subregion| &subregion.name);
+        section.named_twice("subregions", names, "subregions", "each region once");
+    }
+}
+
+impl Group for RemeshExtent {
+    type Written = ExtentKeys;
+
+    fn of(written: ExtentKeys, section: &Section<'_>) -> Self {
+        match (section.has("region"), section.has("box")) {
+            (true, true) => {
+                section.clash(["region", "box"], "remesh.region and remesh.box are both given", "one of them");
+            }
+            (false, false) => {
+                section.missing(&["region", "box"], "region = \"remesh\", or box = [[0, 0, 0], [1, 1, 1]]");
+            }
+            _ => {}
+        }
+        match written.corners.and_then(|corners| box_with_volume(section, "box", corners)) {
+            Some(corners) => Self::Box(corners),
+            None => Self::Regions(written.region.unwrap_or_default()),
+        }
+    }
+}

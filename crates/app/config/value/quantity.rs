@@ -1,0 +1,490 @@
+//! Numbers with a unit: `"10 mm"`, `"7e6 S/m"`, `"40 kA"`, `"60 Hz"`.
+//!
+//! The unit is converted once, here; everything behind this module is in SI. A decimal prefix is applied to
+//! the exponent of the written number before it is parsed, so `"22 mm"` has the very bits of `0.022`.
+
+use crate::config::text::tree::shown;
+use std::fmt;
+
+/// What a quantity measures, and so which units it may carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// A length [m].
+    Length,
+    /// A frequency [Hz].
+    Frequency,
+    /// An electric conductivity [S/m].
+    Conductivity,
+    /// A mass density [kg/m³].
+    MassDensity,
+    /// A current, or ampere-turns [A].
+    Current,
+    /// A magnetic flux density [T].
+    FluxDensity,
+    /// An angle [rad].
+    Angle,
+    /// A duration [s].
+    Duration,
+    /// A squared magnetic flux density [T²].
+    FluxDensitySquared,
+    /// A squared magnetic flux density, integrated over a volume [T² m³].
+    FluxDensityIntegral,
+    /// A power [W].
+    Power,
+    /// An energy [J].
+    Energy,
+    /// A volume [m³].
+    Volume,
+    /// A mass [kg].
+    Mass,
+}
+
+/// A unit: `value [SI] = number · factor · 10^exponent`.
+struct Unit {
+    name: &'static str,
+    dimension: Dimension,
+    factor: f64,
+    exponent: i32,
+}
+
+const fn decimal(name: &'static str, dimension: Dimension, exponent: i32) -> Unit {
+    Unit { name, dimension, factor: 1.0, exponent }
+}
+
+const fn scaled(name: &'static str, dimension: Dimension, factor: f64) -> Unit {
+    Unit { name, dimension, factor, exponent: 0 }
+}
+
+use Dimension::{
+    Angle, Conductivity, Current, Duration, Energy, FluxDensity, FluxDensityIntegral, FluxDensitySquared,
+    Frequency, Length, Mass, MassDensity, Power, Volume,
+};
+
+/// Every unit that is understood. A unit that may be written in two ways stands twice.
+const UNITS: &[Unit] = &[
+    decimal("m", Length, 0),
+    decimal("cm", Length, -2),
+    decimal("mm", Length, -3),
+    decimal("um", Length, -6),
+    decimal("\u{b5}m", Length, -6),
+    decimal("\u{3bc}m", Length, -6),
+    scaled("in", Length, 0.0254),
+    decimal("Hz", Frequency, 0),
+    decimal("kHz", Frequency, 3),
+    decimal("MHz", Frequency, 6),
+    decimal("S/m", Conductivity, 0),
+    decimal("MS/m", Conductivity, 6),
+    decimal("kg/m3", MassDensity, 0),
+    decimal("kg/m\u{b3}", MassDensity, 0),
+    decimal("g/cm3", MassDensity, 3),
+    decimal("g/cm\u{b3}", MassDensity, 3),
+    decimal("A", Current, 0),
+    decimal("kA", Current, 3),
+    decimal("AT", Current, 0),
+    decimal("kAT", Current, 3),
+    decimal("T", FluxDensity, 0),
+    decimal("mT", FluxDensity, -3),
+    decimal("G", FluxDensity, -4),
+    scaled("deg", Angle, std::f64::consts::PI / 180.0),
+    decimal("rad", Angle, 0),
+    decimal("s", Duration, 0),
+    decimal("ms", Duration, -3),
+    scaled("min", Duration, 60.0),
+    scaled("h", Duration, 3600.0),
+    decimal("T2", FluxDensitySquared, 0),
+    decimal("T\u{b2}", FluxDensitySquared, 0),
+    decimal("mT2", FluxDensitySquared, -6),
+    decimal("mT\u{b2}", FluxDensitySquared, -6),
+    decimal("T2 m3", FluxDensityIntegral, 0),
+    decimal("T\u{b2} m\u{b3}", FluxDensityIntegral, 0),
+    decimal("W", Power, 0),
+    decimal("mW", Power, -3),
+    decimal("kW", Power, 3),
+    decimal("J", Energy, 0),
+    decimal("mJ", Energy, -3),
+    decimal("kJ", Energy, 3),
+    decimal("m3", Volume, 0),
+    decimal("m\u{b3}", Volume, 0),
+    decimal("l", Volume, -3),
+    decimal("cm3", Volume, -6),
+    decimal("cm\u{b3}", Volume, -6),
+    decimal("mm3", Volume, -9),
+    decimal("mm\u{b3}", Volume, -9),
+    decimal("kg", Mass, 0),
+    decimal("g", Mass, -3),
+    decimal("t", Mass, 3),
+];
+
+/// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
+const RESISTIVITY: &[&str] = &[
+    "Ohm m",
+    "ohm m",
+    "Ohm*m",
+    "ohm*m",
+    "Ohm.m",
+    "Ohm-m",
+    "\u{3a9} m",
+    "\u{3a9}m",
+    "\u{3a9}\u{b7}m",
+    "\u{2126}m",
+];
+
+impl Dimension {
+    /// The name of the dimension with its article, for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Length => "a length",
+            Frequency => "a frequency",
+            Conductivity => "a conductivity",
+            MassDensity => "a mass density",
+            Current => "a current",
+            FluxDensity => "a flux density",
+            Angle => "an angle",
+            Duration => "a duration",
+            FluxDensitySquared => "a squared flux density",
+            FluxDensityIntegral => "an integral of a squared flux density",
+            Power => "a power",
+            Energy => "an energy",
+            Volume => "a volume",
+            Mass => "a mass",
+        }
+    }
+
+    /// The SI unit in which the value is held.
+    pub fn si_unit(self) -> &'static str {
+        match self {
+            Length => "m",
+            Frequency => "Hz",
+            Conductivity => "S/m",
+            MassDensity => "kg/m\u{b3}",
+            Current => "A",
+            FluxDensity => "T",
+            Angle => "rad",
+            Duration => "s",
+            FluxDensitySquared => "T\u{b2}",
+            FluxDensityIntegral => "T\u{b2} m\u{b3}",
+            Power => "W",
+            Energy => "J",
+            Volume => "m\u{b3}",
+            Mass => "kg",
+        }
+    }
+
+    /// A text that would be accepted, for messages.
+    pub fn example(self) -> &'static str {
+        match self {
+            Length => "10 mm",
+            Frequency => "60 Hz",
+            Conductivity => "7e6 S/m",
+            MassDensity => "7850 kg/m3",
+            Current => "40 kA",
+            FluxDensity => "5 mT",
+            Angle => "30 deg",
+            Duration => "10 min",
+            FluxDensitySquared => "4 mT2",
+            FluxDensityIntegral => "1e-9 T2 m3",
+            Power => "20 W",
+            Energy => "1.5 J",
+            Volume => "400 cm3",
+            Mass => "2.5 kg",
+        }
+    }
+
+    /// All of them.
+    pub const ALL: [Self; 14] = [
+        Length,
+        Frequency,
+        Conductivity,
+        MassDensity,
+        Current,
+        FluxDensity,
+        Angle,
+        Duration,
+        FluxDensitySquared,
+        FluxDensityIntegral,
+        Power,
+        Energy,
+        Volume,
+        Mass,
+    ];
+
+    /// The accepted units.
+    pub(crate) fn units(self) -> impl Iterator<Item = &'static str> {
+        UNITS.iter().filter(move |unit| unit.dimension == self).map(|unit| unit.name)
+    }
+
+    /// The accepted units in one line, for messages.
+    pub fn accepted_units(self) -> String {
+        self.units().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Why a text is not a quantity of the wanted dimension.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QuantityError {
+    /// What is wrong, naming the text.
+    pub message: String,
+    /// What to write instead.
+    pub help: String,
+}
+
+impl fmt::Display for QuantityError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}; {}", self.message, self.help)
+    }
+}
+
+/// Value in SI of a number with a unit.
+///
+/// # Errors
+/// When the text does not start with a finite decimal number, or the unit is missing, unknown or of another
+/// dimension; the message names the accepted units.
+pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
+    let trimmed = text.trim();
+    let written = shown(text);
+    let (number, unit_text) = split_number(trimmed);
+    let accepted = || {
+        format!("write it like \"{}\"; accepted units: {}", dimension.example(), dimension.accepted_units())
+    };
+    let fail = |message: String| Err(QuantityError { message, help: accepted() });
+
+    let Some(number) = number else {
+        return fail(format!("`{written}` is not {}: it must start with a number", dimension.name()));
+    };
+    if unit_text.is_empty() {
+        return Err(QuantityError {
+            message: format!("`{written}` has no unit"),
+            help: format!(
+                "write its unit behind it, like \"{written} {}\"; accepted units: {}",
+                dimension.example().split_once(' ').map_or("", |(_, unit)| unit),
+                dimension.accepted_units()
+            ),
+        });
+    }
+    if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
+        let help = match number.scaled(0).filter(|rho| *rho > 0.0) {
+            Some(rho) => format!("conductivity is its reciprocal: write \"{:.6e} S/m\"", 1.0 / rho),
+            None => accepted(),
+        };
+        return Err(QuantityError {
+            message: format!("`{written}` is a resistivity, not a conductivity"),
+            help,
+        });
+    }
+    let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
+        let known: Vec<_> =
+            UNITS.iter().filter(|unit| unit.dimension == dimension).map(|unit| unit.name).collect();
+        let hint = match meant(unit_text, &known) {
+            Some(name) => format!("did you mean \"{} {name}\"? ", number.written),
+            None => String::new(),
+        };
+        return Err(QuantityError {
+            message: format!("`{}` in `{written}` is not a unit of {}", shown(unit_text), dimension.noun()),
+            help: format!("{hint}{}", accepted()),
+        });
+    };
+    if unit.dimension != dimension {
+        return fail(format!("`{written}` is {}, not {}", unit.dimension.name(), dimension.name()));
+    }
+    match number.scaled(unit.exponent).map(|value| value * unit.factor).filter(|value| value.is_finite()) {
+        Some(value) => Ok(value),
+        None => fail(format!("`{written}` is too large for a number")),
+    }
+}
+
+/// Whether a text starts with a number and goes on with a unit of any dimension.
+pub(in crate::config) fn is_number_with_unit(text: &str) -> bool {
+    let (number, unit) = split_number(text.trim());
+    number.is_some() && unit.starts_with(|c: char| c.is_alphabetic() || c == '\u{b0}')
+}
+
+/// The unit of a few that another text was probably meant to be: one that differs by case alone before all others.
+fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
+    let by_name =
+        SPELLED_OUT.iter().filter(|(name, _)| text.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit);
+    let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text));
+    by_case
+        .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
+        .or_else(|| super::nearest::nearest(text, known.iter().copied()))
+}
+
+/// Units by their full names.
+const SPELLED_OUT: &[(&str, &str)] = &[
+    ("meter", "m"),
+    ("metre", "m"),
+    ("meters", "m"),
+    ("metres", "m"),
+    ("millimeter", "mm"),
+    ("millimetre", "mm"),
+    ("millimeters", "mm"),
+    ("millimetres", "mm"),
+    ("micron", "um"),
+    ("inch", "in"),
+    ("inches", "in"),
+    ("hertz", "Hz"),
+    ("ampere", "A"),
+    ("amperes", "A"),
+    ("amp", "A"),
+    ("amps", "A"),
+    ("tesla", "T"),
+    ("gauss", "G"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("\u{b0}", "deg"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("sec", "s"),
+    ("minute", "min"),
+    ("minutes", "min"),
+    ("hour", "h"),
+    ("hours", "h"),
+    ("watt", "W"),
+    ("watts", "W"),
+    ("joule", "J"),
+];
+
+impl Dimension {
+    /// The name of the dimension without its article.
+    pub(crate) fn noun(self) -> &'static str {
+        self.name().split_once(' ').map_or(self.name(), |(_, noun)| noun)
+    }
+}
+
+/// A decimal number as written: mantissa digits and the power of ten behind them.
+struct Number<'a> {
+    /// All of it.
+    written: &'a str,
+    mantissa: &'a str,
+    exponent: i32,
+}
+
+impl Number<'_> {
+    /// The number times `10^shift`, rounded once.
+    fn scaled(&self, shift: i32) -> Option<f64> {
+        let exponent = self.exponent.saturating_add(shift);
+        format!("{}e{exponent}", self.mantissa).parse().ok().filter(|value: &f64| value.is_finite())
+    }
+}
+
+/// Split `7e6 S/m` into the number and the trimmed rest; no number gives `None`.
+fn split_number(text: &str) -> (Option<Number<'_>>, &str) {
+    let bytes = text.as_bytes();
+    let digits = |from: usize| from + bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+
+    let start = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let whole = digits(start);
+    let fraction = if bytes.get(whole) == Some(&b'.') { digits(whole + 1) } else { whole };
+    let has_digits = whole > start || fraction > whole + 1;
+    if !has_digits {
+        return (None, text);
+    }
+    let mut end = fraction;
+    let mut exponent = 0;
+    if matches!(bytes.get(fraction), Some(b'e' | b'E')) {
+        let sign = fraction + 1 + usize::from(matches!(bytes.get(fraction + 1), Some(b'+' | b'-')));
+        if sign <= bytes.len() && digits(sign) > sign {
+            end = digits(sign);
+            // More digits than an i32 holds saturate: the value is zero or infinite all the same.
+            let sign_is_minus = bytes[fraction + 1] == b'-';
+            exponent =
+                text[fraction + 1..end].parse().unwrap_or(if sign_is_minus { -100_000 } else { 100_000 });
+        }
+    }
+    (Some(Number { written: &text[..end], mantissa: &text[..fraction], exponent }), text[end..].trim_start())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn decimal_units_have_the_bits_of_the_si_literal() {
+        let cases = [
+            ("22 mm", Length, 0.022),
+            ("0.4mm", Length, 0.0004),
+            ("-5 mm", Length, -0.005),
+            ("1.5e1 cm", Length, 0.15),
+            ("3 um", Length, 3e-6),
+            ("3 \u{b5}m", Length, 3e-6),
+            (".5 m", Length, 0.5),
+            ("5. m", Length, 5.0),
+            ("7e6 S/m", Conductivity, 7e6),
+            ("5.8 MS/m", Conductivity, 5.8e6),
+            ("40 kA", Current, 40e3),
+            ("40 kAT", Current, 40e3),
+            (" +60 Hz ", Frequency, 60.0),
+            ("10 G", FluxDensity, 1e-3),
+            ("2 min", Duration, 120.0),
+            ("180 deg", Angle, std::f64::consts::PI),
+            ("1 in", Length, 0.0254),
+            ("3 mT\u{b2}", FluxDensitySquared, 3e-6),
+            ("2e-9 T2 m3", FluxDensityIntegral, 2e-9),
+            ("20 mW", Power, 0.02),
+            ("1.5 kJ", Energy, 1500.0),
+            ("22 cm\u{b3}", Volume, 22e-6),
+            ("2 l", Volume, 2e-3),
+            ("300 g", Mass, 0.3),
+            ("7.85 g/cm3", MassDensity, 7850.0),
+        ];
+        for (text, dimension, expected) in cases {
+            assert_eq!(parse_quantity(text, dimension), Ok(expected), "{text}");
+        }
+    }
+
+    #[test]
+    fn wrong_quantities_say_what_is_accepted() {
+        let cases = [
+            ("10", Length, "has no unit"),
+            ("mm", Length, "must start with a number"),
+            ("nan mm", Length, "must start with a number"),
+            ("inf mm", Length, "must start with a number"),
+            ("- 5 mm", Length, "must start with a number"),
+            (".", Length, "must start with a number"),
+            ("60 Hz", Length, "is a frequency, not a length"),
+            ("60 hz", Frequency, "did you mean \"60 Hz\"?"),
+            ("10 MM", Length, "did you mean \"10 mm\"?"),
+            ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
+            ("10", Length, "write its unit behind it, like \"10 mm\""),
+            ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
+            ("0 Ohm m", Conductivity, "is a resistivity"),
+            ("1e400 m", Length, "too large"),
+            ("1e99999999999 m", Length, "too large"),
+            ("10 parsec", Length, "accepted units: m, cm, mm"),
+            ("1e m", Length, "not a unit of length"),
+        ];
+        for (text, dimension, fragment) in cases {
+            let message = parse_quantity(text, dimension).expect_err(text).to_string();
+            assert!(message.contains(fragment), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_resistivity_is_answered_with_its_reciprocal() {
+        let error = parse_quantity("1.25e-7 Ohm m", Conductivity).expect_err("a resistivity");
+        assert!(error.help.contains("8.000000e6 S/m"), "{}", error.help);
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused_without_a_panic(text in "\\PC*") {
+            for dimension in [Length, Frequency, Conductivity, Current, FluxDensity, Angle, Duration, Power, Volume] {
+                if let Ok(value) = parse_quantity(&text, dimension) {
+                    prop_assert!(value.is_finite());
+                }
+            }
+        }
+
+        #[test]
+        fn a_printed_number_is_read_back_exactly(value in -1e12_f64..1e12) {
+            prop_assert_eq!(parse_quantity(&format!("{value} m"), Length), Ok(value));
+            prop_assert_eq!(parse_quantity(&format!("{value:e}m"), Length), Ok(value));
+        }
+
+        #[test]
+        fn number_like_texts_never_panic(text in "[-+]?[0-9.]{0,4}[eE]?[-+]?[0-9]{0,12} ?[a-zA-Z/]{0,4}") {
+            let _ = parse_quantity(&text, Length);
+        }
+    }
+}
