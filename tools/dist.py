@@ -16,6 +16,7 @@ import io
 import json
 import os
 import subprocess
+import sys
 import tarfile
 import tempfile
 from pathlib import Path
@@ -41,6 +42,11 @@ packages below, each with the licence that it declares and the licence files in 
 
 def output_of(*command, **options):
     return subprocess.run(command, check=True, stdout=subprocess.PIPE, cwd=HOME, **options).stdout
+
+
+def require(holds, message):
+    if not holds:
+        sys.exit(f"error: {message}")
 
 
 def build():
@@ -121,8 +127,9 @@ def try_out(packed, name, version):
             tar.extractall(folder)
         binary = Path(folder, name, "fluxmorph")
         said = output_of(binary, "--version").decode().strip()
-        assert said == f"fluxmorph {version}", f"`--version` prints {said!r}"
-        assert json.loads(output_of(binary, "check", HOME / "configs/shield_quick.toml", "--json"))
+        require(said == f"fluxmorph {version}", f"`--version` prints {said!r}")
+        checked = json.loads(output_of(binary, "check", HOME / "configs/shield_quick.toml", "--json"))
+        require(checked, "`check` prints nothing")
 
 
 def main():
@@ -135,11 +142,13 @@ def main():
     host = output_of("rustc", "--print", "host-tuple").decode().strip()
     metadata = json.loads(output_of("cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", host))
     binary = Path(metadata["target_directory"], "dist/fluxmorph")
+    require(binary.is_file(), f"there is no {binary}; leave --no-build out")
     version = next(p["version"] for p in metadata["packages"] if p["name"] == "fluxmorph")
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH") or output_of("git", "log", "-1", "--format=%ct"))
     packages = foreign_packages(metadata)
     files = {"fluxmorph": binary.read_bytes(), "THIRD-PARTY.md": third_party(packages)}
-    assert len(files["fluxmorph"]) <= LARGEST_BINARY, f"the binary has {len(files['fluxmorph'])} bytes"
+    size = len(files["fluxmorph"])
+    require(size <= LARGEST_BINARY, f"the binary has {size} bytes, more than {LARGEST_BINARY}")
     files |= {name: (HOME / name).read_bytes() for name in COPIED} | generated(binary)
     name = f"fluxmorph-{version}-{host}"
     output = (options.output or binary.parent).resolve()

@@ -2,8 +2,6 @@
 //! Every test works in its own temporary directory.
 #![allow(missing_docs)]
 
-#[path = "../acceptance/bad_input.rs"]
-mod bad_input;
 mod cli;
 mod commands;
 mod examples;

@@ -89,7 +89,12 @@ impl Ranks {
 
     /// Where this rank is a worker: sets the problem up, executes commands until the first rank ends, and says how this one
     /// ended.
-    pub(super) fn run_worker(&self, config: &Config, source: &SourceMap, purpose: Purpose) -> Option<ExitCode> {
+    pub(super) fn run_worker(
+        &self,
+        config: &Config,
+        source: &SourceMap,
+        purpose: Purpose,
+    ) -> Option<ExitCode> {
         let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
         session::serve(group, config, source, purpose);
         Some(ExitCode::Success)

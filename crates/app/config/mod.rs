@@ -11,8 +11,6 @@ pub mod schema;
 mod section;
 mod table;
 mod tables;
-#[cfg(test)]
-mod tests;
 mod text;
 mod value;
 

@@ -5,9 +5,9 @@
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 
 use super::lines::Lines;
 use super::table::Columns;
@@ -21,9 +21,8 @@ const TICK: Duration = Duration::from_millis(200);
 /// A part of the work and its time.
 const WORK: &str = "{spinner} {wide_msg} {elapsed}";
 
-/// The same within a run, before and after an evaluation has shown how long one takes.
-const FIRST: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapsed}";
-const LATER: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  ETA {eta}  {wide_msg} {elapsed}";
+/// The same within a run, behind what is known from its last evaluation.
+const RUN: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapsed}";
 
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
@@ -45,8 +44,6 @@ pub struct Bar<W> {
     lines: Lines,
     /// The template of the stages.
     template: &'static str,
-    /// When the run began, or the last evaluation ended.
-    last: Instant,
 }
 
 impl Bar<std::io::Stderr> {
@@ -72,7 +69,7 @@ impl<W: Write> Bar<W> {
     pub fn new(target: ProgressDrawTarget, writer: W) -> Self {
         let bar = ProgressBar::with_draw_target(None, target).with_style(style(WORK));
         let lines = Lines::new(Styles::default(), Columns::Compact);
-        Self { bar, writer, lines, template: WORK, last: Instant::now() }
+        Self { bar, writer, lines, template: WORK }
     }
 
     /// Shows what is being done, timed from now.
@@ -104,6 +101,14 @@ impl<W: Write> Observer for Bar<W> {
         }
     }
 
+    fn started(&mut self, started: &Started<'_>) {
+        self.lines.started(started).iter().for_each(|line| self.line(line));
+        if let Some(optimizer) = started.optimizer {
+            self.bar.set_length(optimizer.max_evaluations as u64);
+            self.template = RUN;
+        }
+    }
+
     fn phase(&mut self, name: &str) {
         self.work(WORK, name);
     }
@@ -114,18 +119,17 @@ impl<W: Write> Observer for Bar<W> {
 
     fn evaluation(&mut self, row: &Evaluation) {
         self.lines.evaluation(row).iter().for_each(|line| self.line(line));
-        let seconds = std::mem::replace(&mut self.last, Instant::now()).elapsed().as_secs_f64();
         if self.bar.is_finished() {
             return;
         }
-        self.bar.set_prefix(format!("F/F0 {:.4}  quality {:.3}", row.ratio, row.worst_quality));
-        self.bar.set_position(row.evaluation as u64 + 1);
-        if seconds > 0.5 * row.seconds {
-            self.template = LATER;
-        } else {
-            // An evaluation that is recalled from a journal says nothing about the time of the others.
-            self.bar.reset_eta();
-        }
+        let done = row.evaluation as u64 + 1;
+        // At most: the run may converge before. The library's estimate forgets all that is older than a quarter of a
+        // minute, which is less than an evaluation may take.
+        let left = self.bar.length().unwrap_or(done).saturating_sub(done) as f64 * row.seconds;
+        let left = HumanDuration(Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX));
+        let (ratio, quality) = (row.ratio, row.worst_quality);
+        self.bar.set_prefix(format!("F/F0 {ratio:.4}  quality {quality:.3}  ETA {left:#}"));
+        self.bar.set_position(done);
     }
 
     fn warning(&mut self, message: &str) {
@@ -258,7 +262,7 @@ mod tests {
         observer.stage(Stage::Adjoint);
         let lines = screen.lines();
         let last = lines.last().expect("a bar");
-        for part in ["1/4 [==        ]", "F/F0 0.5100", "quality 0.100", "adjoint"] {
+        for part in ["1/4 [==        ]", "F/F0 0.5100", "quality 0.100", "ETA 3s", "adjoint"] {
             assert!(last.contains(part), "{part}: {lines:#?}");
         }
         assert_eq!(lines.iter().filter(|line| line.contains("/4 [")).count(), 1, "{lines:#?}");
@@ -301,12 +305,11 @@ mod tests {
         let screen = Screen::default();
         let mut observer = bar(&screen);
         observer.started(&started(&Optimizer { max_evaluations: 100_000, ..Optimizer::default() }));
-        observer.last = Instant::now().checked_sub(Duration::from_secs(9000)).expect("the machine is up");
-        observer.evaluation(&Evaluation { ratio: 12.5, ..evaluation(99_998) });
+        observer.evaluation(&Evaluation { ratio: 12.5, seconds: 9e9, ..evaluation(99_998) });
         observer.stage(Stage::Elasticity);
         let lines = screen.lines();
         let last = lines.last().expect("a bar");
-        assert!(last.contains("99999/100000") && last.contains("ETA "), "{lines:#?}");
+        assert!(last.contains("99999/100000") && last.contains("ETA 285y"), "{lines:#?}");
         assert!(last.chars().count() <= 80, "{lines:#?}");
     }
 }

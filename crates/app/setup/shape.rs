@@ -13,7 +13,8 @@ use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
 use crate::config::{
-    self, Config, Design, DesignDirection, DirectionWord, Diagnostic, Remesh, RemeshExtent, SourceMap, StiffnessLaw,
+    self, Config, Design, DesignDirection, Diagnostic, DirectionWord, Remesh, RemeshExtent, SourceMap,
+    StiffnessLaw,
 };
 use crate::error::Error;
 use fluxmorph_optimizer::design::DesignSurface;
@@ -189,7 +190,8 @@ pub(super) fn remesh_setup(
             RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
             RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
         };
-        let fault = source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+        let fault =
+            source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
         return Err(source.error(vec![fault]).into());
     }
     for part in &mut subregions {

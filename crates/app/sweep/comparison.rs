@@ -78,7 +78,7 @@ impl Comparison {
             best: None,
             combinations: rows.collect::<Result<_, _>>()?,
         };
-        comparison.best = comparison.found_best();
+        comparison.best = comparison.find_best();
         Ok(comparison)
     }
 
@@ -88,7 +88,7 @@ impl Comparison {
     /// As [`Comparison::read`].
     pub fn update(&mut self, sweep: &Sweep, layout: &Layout, index: usize) -> Result<(), Error> {
         self.combinations[index] = Row::read(sweep, layout, &sweep.combinations[index])?;
-        self.best = self.found_best();
+        self.best = self.find_best();
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl Comparison {
     }
 
     /// The best of the rows that keep their constraints and want the same.
-    fn found_best(&self) -> Option<usize> {
+    fn find_best(&self) -> Option<usize> {
         let goal = self.combinations.first()?.goal;
         if self.combinations.iter().any(|row| row.goal != goal) {
             return None;
