@@ -101,14 +101,6 @@ impl<W: Write> Observer for Bar<W> {
         }
     }
 
-    fn started(&mut self, started: &Started<'_>) {
-        self.lines.started(started).iter().for_each(|line| self.line(line));
-        if let Some(optimizer) = started.optimizer {
-            self.bar.set_length(optimizer.max_evaluations as u64);
-            self.template = RUN;
-        }
-    }
-
     fn phase(&mut self, name: &str) {
         self.work(WORK, name);
     }
@@ -143,9 +135,8 @@ impl<W: Write> RunObserver for Bar<W> {
         self.lines.started(started).iter().for_each(|line| self.line(line));
         if let Some(optimizer) = started.optimizer {
             self.bar.set_length(optimizer.max_evaluations as u64);
-            self.template = FIRST;
+            self.template = RUN;
         }
-        self.last = Instant::now();
     }
 
     fn finished(&mut self, result: &RunResult) {
