@@ -12,8 +12,8 @@ use fluxmorph::setup::{Purpose, build_mesh, set_up};
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_optimizer::problem::{Analysis, Want};
-use fluxmorph_optimizer::thickness::Thickness;
+use fluxmorph_optimizer::geometric::WallThickness;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, SolverCache};
 
 /// Refinements of `shield_quick.toml`: 10k, 55k and 595k tetrahedra.
 const REFINEMENTS: [f64; 3] = [0.5, 1.4, 2.7];
@@ -51,9 +51,9 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
     let (probes, found) = timed(|| locate(&mesh, &points));
     assert!(found.iter().all(Option::is_some), "all inside");
     let (all, setup) = timed(|| set_up(&config, &source, Purpose::Optimisation).expect("valid"));
-    let shape = setup.problem.shape.as_ref().expect("it has a design");
+    let shape = setup.problem.shape().expect("it has a design");
     let plate = mesh.topology().region("plate").expect("it has one");
-    let (thickness, _) = timed(|| Thickness::measure(&mesh, plate, &shape.surface));
+    let (thickness, _) = timed(|| WallThickness::measure(&mesh, plate, shape.surface()));
     let mut parts = vec![
         ("mesh, generated", generated),
         ("mesh, Gmsh text", text),
@@ -64,11 +64,13 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
     ];
     let tets = mesh.topology().tets().len();
     if tets <= LARGEST_SOLVED {
-        let analysis: Analysis =
-            setup.problem.evaluate(&shape.initial, Want::Gradient).expect("it converges");
+        let analysis: Analysis = setup
+            .problem
+            .evaluate(shape.initial(), Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
+            .expect("it converges");
         parts.push((
             "fields and VTU",
-            timed(|| fields::vtu(&setup.problem.states, &fields::FieldData::of(&analysis))).0,
+            timed(|| fields::vtu(setup.problem.states(), &fields::FieldData::of(&analysis))).0,
         ));
     }
     (tets, parts)

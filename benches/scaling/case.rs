@@ -10,8 +10,8 @@ use fluxmorph::observer::Silent;
 use fluxmorph::output::peak_memory_bytes;
 use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::driver::{self, Unrecorded};
-use fluxmorph_optimizer::memory::Memory;
-use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::problem::{Derivatives, Problem};
+use fluxmorph_optimizer::problem::{NoProgress, SolverCache};
 use fluxmorph_solver::adjoint;
 use serde::{Deserialize, Serialize};
 
@@ -115,8 +115,8 @@ impl Case {
             mesh: self.mesh.clone(),
             threads: self.threads,
             set_up,
-            tets: problem.original.topology().tets().len(),
-            unknowns: problem.states[0].unknown_count(),
+            tets: problem.original().topology().tets().len(),
+            unknowns: problem.states()[0].unknown_count(),
             ..Record::default()
         };
         match self.kind {
@@ -145,8 +145,8 @@ impl Case {
 
 /// The phases of a design step with nothing remembered of another.
 fn step(problem: &Problem, record: &mut Record) {
-    let (model, shape) = (&problem.states[0], problem.shape.as_ref().expect("the shield has a design"));
-    let p: Vec<f64> = (0..shape.surface.variable_count()).map(|k| 2e-3 * (k as f64).sin()).collect();
+    let (model, shape) = (&problem.states()[0], problem.shape().expect("the shield has a design"));
+    let p: Vec<f64> = (0..shape.surface().variable_count()).map(|k| 2e-3 * (k as f64).sin()).collect();
     let (forward, moved) = timed(|| problem.moved(&p).expect("a small motion"));
     let mesh = moved.mesh.clone();
     let (assembly, (matrix, load)) = timed(|| (model.assemble(&mesh), model.load(&mesh)));
@@ -155,7 +155,7 @@ fn step(problem: &Problem, record: &mut Record) {
     record.factor = factor;
     let (time, state) = timed(|| model.solve_prepared(&mut system, &load).expect("it converges"));
     record.state = time;
-    let functional = &problem.objective.as_ref().expect("it has an objective").terms[0].functional;
+    let functional = &problem.objective().expect("it has an objective").terms[0].functional;
     let (evaluation, value) = timed(|| functional.evaluate(model, &mesh, &state).expect("it is finite"));
     let (time, lambda) = timed(|| adjoint::solve(&mut system, &value.derivative).expect("it converges"));
     record.adjoint = time;
@@ -163,21 +163,22 @@ fn step(problem: &Problem, record: &mut Record) {
     record.method = model.method_name();
     record.preconditioner_bytes = system.preconditioner_bytes();
     let (nodes, nodal) = timed(|| {
-        adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion.moving()).expect("it is here")
+        adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion().moving()).expect("it is here")
     });
     record.gradient = evaluation + nodes;
     let (backward, gradient) =
-        timed(|| shape.surface.gradient(&shape.motion.map().gradient(&nodal).expect("it converges")));
+        timed(|| shape.surface().gradient(&shape.motion().map().gradient(&nodal).expect("it converges")));
     record.elastic = forward + backward;
     record.objective = value.value;
     record.gradient_norm = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
     drop((system, lambda, nodal));
     record.peak_bytes = peak_memory_bytes();
     if record.tets < 200_000 {
-        let analysis =
-            problem.analyse_with(&mut Memory::default(), &p, moved, Want::Value).expect("it converges");
+        let analysis = problem
+            .analyse(moved, &p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+            .expect("it converges");
         record.fields =
-            timed(|| fields::vtu(&problem.states, &fields::FieldData::of(&analysis)).expect("it is finite"))
+            timed(|| fields::vtu(problem.states(), &fields::FieldData::of(&analysis)).expect("it is finite"))
                 .0;
     }
 }

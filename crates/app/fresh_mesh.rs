@@ -266,7 +266,7 @@ mod tests {
 
     /// A smooth shape near the frame that the shield's optimiser finds, by the place of every variable.
     fn dished(setup: &Setup) -> Vec<f64> {
-        let points = setup.problem.shape().expect("a shape").surface.points();
+        let points = setup.problem.shape().expect("a shape").surface().points();
         points.iter().map(|x| 0.2 * x[0].max(0.5 * x[1]) - 4e-3).collect()
     }
 

@@ -19,7 +19,7 @@ pub(crate) fn assert_reads_back(config: &Config) -> toml::Table {
 }
 
 /// Reads a case with its overrides; the configuration that its command names.
-fn configuration(case: &Case) -> (Config, Source, String) {
+fn configuration(case: &Case) -> (Config, SourceMap, String) {
     let home = folder();
     case.write(home.path());
     let overrides: Vec<String> = case.set.clone();

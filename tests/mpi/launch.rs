@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use fluxmorph::journal::Journal;
+use fluxmorph::output::{RunDirectory, system_disk};
 use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::journal::Journal;
-use fluxmorph_optimizer::output::{RunDirectory, system_disk};
 
 use crate::support::folder::read_json;
 use crate::support::program::{Finished, finish};

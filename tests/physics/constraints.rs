@@ -1,12 +1,12 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
-use fluxmorph_optimizer::config::{Algorithm, Optimizer};
+use fluxmorph::config::{Algorithm, Optimizer};
+use fluxmorph::observer::{Evaluation, Silent};
+use fluxmorph::output::{OlderRun, RunResult, system_disk};
+use fluxmorph::session::{self, Options};
+use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::driver::Optimised;
-use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::output::{OlderRun, RunResult, system_disk};
 use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_optimizer::session::{self, Options};
-use fluxmorph_optimizer::setup::{Purpose, set_up};
 
 use crate::problems::{analysed, initial, objective, optimised, try_optimised};
 use crate::support::folder::RunFolder;
@@ -202,14 +202,14 @@ fn loss_and_energy_are_those_of_the_field() {
     for changes in [&[loss][..], &[&[loss], &MESHED[..]].concat()] {
         let problem = changed("shield_quick.toml", changes).0;
         let analysis = analysed(&problem, &initial(&problem));
-        let sum = analysis.solutions[0].losses(&problem.states[0], &analysis.mesh)[0].1;
+        let sum = analysis.solutions[0].losses(&problem.states()[0], &analysis.mesh)[0].1;
         println!("loss {sum:.4} W");
         assert!((analysis.objective.expect("a loss") / sum - 1.0).abs() < 1e-12);
     }
     let energy = [(SQUARED, "kind = \"energy\"\n"), STATIC];
     let problem = changed("shield_quick.toml", &[&energy, &MESHED[..]].concat()).0;
     let analysis = analysed(&problem, &initial(&problem));
-    let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
+    let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
     let load = model.load(&analysis.mesh);
     let work: f64 = 0.5 * load.iter().zip(solution.values()).map(|(f, u)| (f * u).re).sum::<f64>();
     let energy = analysis.objective.expect("an energy");

@@ -17,11 +17,11 @@ const LARGEST_NORM: f64 = 1e130;
 /// objective has grown by a factor.
 fn weight(growth: f64) -> f64 {
     let problem = support::setup("shield_quick.toml", &[]).problem;
-    let shape = problem.shape.as_ref().expect("a shape");
-    let mesh = problem.moved(&shape.initial).expect("the initial design has a mesh").mesh;
-    let model = &problem.states[0];
+    let shape = problem.shape().expect("a shape");
+    let mesh = problem.moved(shape.initial()).expect("the initial design has a mesh").mesh;
+    let model = &problem.states()[0];
     let state = model.solve(&mesh).expect("a sound case").0;
-    let functional = &problem.objective.as_ref().expect("an objective").terms[0].functional;
+    let functional = &problem.objective().expect("an objective").terms[0].functional;
     let derivative = functional.evaluate(model, &mesh, &state).expect("a sound case").derivative;
     LARGEST_NORM / (norm::<c64>(&derivative) * growth.sqrt())
 }

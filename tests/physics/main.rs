@@ -3,7 +3,7 @@
 //!
 //! `convergence`: fitted orders, the matrix against its weak form; `verification`: the rows of docs/verification.md;
 //! `gradient`: Taylor remainders of the whole chain; `paper`, `gallery`: the shipped configurations; `constraints`,
-//! `solvers`, `starts`: what must not change a result; `guards`: numerical failures.
+//! `solvers`, `starts`: what must not change a result; `guards`: numerical failures; `optimiser`: the loop itself on a coarse shield.
 
 mod constraints;
 mod convergence;
@@ -11,6 +11,7 @@ mod gallery;
 mod gradient;
 mod guards;
 mod meshes;
+mod optimiser;
 mod orders;
 mod paper;
 mod problems;

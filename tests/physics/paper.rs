@@ -4,13 +4,13 @@
 //! from it, with the tolerances that the shipped meshes are made for. Measured values are in docs/results.md; run with
 //! `--nocapture` to see them.
 
-use fluxmorph_optimizer::config::Optimizer;
+use fluxmorph::config::Optimizer;
+use fluxmorph::fresh_mesh::{Gain, Shapes};
+use fluxmorph::observer::{Evaluation, Silent};
+use fluxmorph::output::{ObjectiveResult, StopReason};
+use fluxmorph::setup::Setup;
 use fluxmorph_optimizer::driver::Optimised;
-use fluxmorph_optimizer::fresh_mesh::{Gain, Shapes};
-use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::output::{ObjectiveResult, StopReason};
 use fluxmorph_optimizer::problem::Analysis;
-use fluxmorph_optimizer::setup::Setup;
 use fluxmorph_solver::recovery;
 
 use crate::problems::{self, analysed, objective, variables};
@@ -47,8 +47,8 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
         .enumerate()
     {
         let analysis = analysed(problem, p);
-        let (model, solution) = (&problem.states[0], &analysis.solutions[0]);
-        let objective = problem.objective.as_ref().expect("an objective");
+        let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
+        let objective = problem.objective().expect("an objective");
         cells[case] = relative_l2(
             &objective.terms[0].functional.cell_flux_densities(model, &analysis.mesh, solution),
             b,
@@ -219,7 +219,7 @@ fn the_meshed_run_reaches_the_papers_ratio() {
 
 /// For the layers between the mesh lines under the moving face: least final over initial thickness of any column.
 fn skin_layers_kept(setup: &Setup, analysis: &Analysis) -> Vec<f64> {
-    let reference = setup.problem.original.points();
+    let reference = setup.problem.original().points();
     let lines = [0.0, 0.3e-3, 0.8e-3, 1.6e-3, 3e-3, 5e-3].map(|depth| -0.010 + depth);
     let column = |p: [f64; 3]| (p[0].to_bits(), p[1].to_bits());
     let at_line: Vec<std::collections::HashMap<_, f64>> = lines

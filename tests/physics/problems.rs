@@ -1,26 +1,28 @@
 //! What these tests ask of a problem: its value at a design, and where an optimisation ends.
 
+use fluxmorph::config::Optimizer;
+use fluxmorph::observer::{Evaluation, Silent};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::Optimizer;
+use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
-use fluxmorph_optimizer::journal::Record;
-use fluxmorph_optimizer::observer::{Evaluation, Silent};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 /// Number of design variables.
 pub(crate) fn variables(problem: &Problem) -> usize {
-    problem.shape.as_ref().expect("a shape").surface.variable_count()
+    problem.shape().expect("a shape").surface().variable_count()
 }
 
 /// The initial design.
 pub(crate) fn initial(problem: &Problem) -> Vec<f64> {
-    problem.shape.as_ref().expect("a shape").initial.clone()
+    problem.shape().expect("a shape").initial().to_vec()
 }
 
 /// The analysis of a design, without derivatives.
 #[track_caller]
 pub(crate) fn analysed(problem: &Problem, p: &[f64]) -> Analysis {
-    problem.evaluate(p, Want::Value).unwrap_or_else(|e| panic!("{e}"))
+    problem
+        .evaluate(p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// F of a design.
@@ -46,7 +48,7 @@ pub(crate) fn try_optimised(
     settings: &Optimizer,
 ) -> (Result<Optimised, Error>, Vec<Evaluation>) {
     let mut rows = Rows::default();
-    (optimise(problem, settings, &mut Silent, &mut rows, &|| false), rows.0)
+    (optimise(problem, &settings.settings(), &mut Silent, &mut rows, &|| false), rows.0)
 }
 
 /// Optimises; the result, and the rows of the history.

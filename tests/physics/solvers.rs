@@ -1,8 +1,8 @@
 //! All ways to solve the linear systems give one field, one objective and one gradient; so do factors and solutions that
 //! are kept from design to design.
 
-use fluxmorph_optimizer::memory::Memory;
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem};
+use fluxmorph_optimizer::problem::{NoProgress, SolverCache};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
 
@@ -29,9 +29,9 @@ fn design(problem: &Problem, step: f64) -> Vec<f64> {
     (0..variables(problem)).map(|k| 1e-3 * step * (1.0 + (k as f64).sin())).collect()
 }
 
-fn evaluated(problem: &Problem, memory: &mut Memory, step: f64) -> Analysis {
+fn evaluated(problem: &Problem, memory: &mut SolverCache, step: f64) -> Analysis {
     let p = design(problem, step);
-    problem.evaluate_with(memory, &p, Want::Gradient).unwrap_or_else(|e| panic!("{e}"))
+    problem.evaluate(&p, Derivatives::First, memory, &mut NoProgress).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Relative deviation of objective and gradient.
@@ -47,7 +47,7 @@ fn every_method_agrees(case: (&str, &[&str]), more: &[&str], methods: &[Method])
         let setting = format!("analysis.linear_solver.method=\"{}\"", method.name());
         let settings: Vec<&str> = more.iter().copied().chain([setting.as_str()]).collect();
         let problem = problem(case, &settings);
-        let analysis = evaluated(&problem, &mut Memory::default(), 1.0);
+        let analysis = evaluated(&problem, &mut SolverCache::default(), 1.0);
         assert!(analysis.worst_residual <= 1e-9, "{method:?}: {:e}", analysis.worst_residual);
         assert!(analysis.solver_events.is_empty(), "{method:?}: {:?}", analysis.solver_events);
         analysis
@@ -88,11 +88,11 @@ const REUSED: &str = "analysis.linear_solver.reuse=while_it_pays";
 #[test]
 fn designs_that_share_factors_and_solutions_have_the_results_of_their_own() {
     let problem = problem(MESHED, &[REUSED]);
-    let mut memory = Memory::default();
+    let mut memory = SolverCache::default();
     let (mut kept, mut own) = (0, 0);
     for step in [0.0, 1.0, 3.0, 3.5, 3.6, 3.61] {
         let shared = evaluated(&problem, &mut memory, step);
-        let cold = evaluated(&problem, &mut Memory::default(), step);
+        let cold = evaluated(&problem, &mut SolverCache::default(), step);
         let deviation = deviation(&shared, &cold);
         assert!(deviation < SAME, "after {step} mm: {deviation:e}");
         assert!(shared.worst_residual <= 1e-9);
@@ -105,7 +105,7 @@ fn designs_that_share_factors_and_solutions_have_the_results_of_their_own() {
 #[test]
 fn a_factor_serves_a_frequency_close_by() {
     let problem = problem(MESHED, &[REUSED]);
-    let (mesh, at_60) = (&problem.original, &problem.states[0]);
+    let (mesh, at_60) = (problem.original(), &problem.states()[0]);
     let at_61 = at_60.at_frequency(mesh, 61.0).expect("a frequency above zero");
     let solved = |model: &FieldModel, memory: &mut LinearSolverCache| {
         let mut system = model.prepare_with(model.assemble(mesh), memory).expect("a regular system");
@@ -126,7 +126,7 @@ fn what_is_shared_between_frequencies_changes_no_result() {
     const TWO: (&str, &[&str]) = ("shield_two_frequencies.toml", &[]);
     let of = |reuse: &str| {
         let setting = format!("analysis.linear_solver.reuse=\"{reuse}\"");
-        evaluated(&problem(TWO, &[&setting]), &mut Memory::default(), 1.0)
+        evaluated(&problem(TWO, &[&setting]), &mut SolverCache::default(), 1.0)
     };
     let deviation = deviation(&of("while_it_pays"), &of("never"));
     assert!(deviation < SAME, "{deviation:e}");
@@ -135,7 +135,7 @@ fn what_is_shared_between_frequencies_changes_no_result() {
 #[test]
 fn a_method_that_does_not_converge_is_followed_by_a_more_robust_one() {
     let problem = problem(MESHED, &[REUSED]);
-    let (mesh, model) = (&problem.original, &problem.states[0]);
+    let (mesh, model) = (problem.original(), &problem.states()[0]);
     let setup = |max_iterations| FieldModelSetup {
         linear_solver: LinearSolverSettings {
             method: LinearSolver::Fixed(Method::Incomplete),

@@ -5,9 +5,9 @@
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
-use fluxmorph_optimizer::config::Optimizer;
-use fluxmorph_optimizer::output::StopReason;
-use fluxmorph_optimizer::setup::{Purpose, set_up};
+use fluxmorph::config::Optimizer;
+use fluxmorph::output::StopReason;
+use fluxmorph::setup::{Purpose, set_up};
 
 use crate::problems::{objective, optimised, variables};
 use crate::support::{self, setup};
@@ -56,7 +56,7 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     End {
         stop_reason: optimised.stop_reason,
         evaluations: optimised.evaluations,
-        rounds: setup.problem.shape.as_ref().expect("a shape").motion.round(),
+        rounds: setup.problem.shape().expect("a shape").motion().round(),
         objective: optimised.best.objective,
         worst_quality: rows.iter().map(|row| row.worst_quality).fold(f64::INFINITY, f64::min),
     }

@@ -4,16 +4,12 @@
 use std::path::Path;
 
 use fluxmorph::config::Algorithm;
-use fluxmorph::journal::{Identity, Journal, Record, parse};
+use fluxmorph::journal::{Identity, Journal};
 use fluxmorph::observer::Evaluation;
 use fluxmorph::output::{OlderRun, RunDirectory};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::algorithm::{Minimisation, Sample, minimise};
-use fluxmorph_optimizer::config::Algorithm;
 use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::journal::{Identity, Journal};
-use fluxmorph_optimizer::observer::Evaluation;
-use fluxmorph_optimizer::output::{OlderRun, RunDirectory};
+use fluxmorph_optimizer::nlopt::{Minimisation, Sample, minimise};
 use fluxmorph_optimizer::problem::Timings;
 
 use crate::disk::SimulatedDisk;

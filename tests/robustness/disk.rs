@@ -90,7 +90,7 @@ impl SimulatedDisk {
     }
 
     /// Fails at an operation, counted from now.
-    pub(crate) fn fail_at(&self, operation: usize, fault: Diagnostic) {
+    pub(crate) fn fail_at(&self, operation: usize, fault: Fault) {
         let mut state = self.state();
         state.operations.clear();
         state.fault = Some((operation, fault));
@@ -130,7 +130,7 @@ fn crashed() -> io::Error {
 
 impl State {
     /// Counts an operation, and fails if it is its turn; `Some` is a write that shall be short.
-    fn operate(&mut self, name: &'static str) -> io::Result<Option<Diagnostic>> {
+    fn operate(&mut self, name: &'static str) -> io::Result<Option<Fault>> {
         if self.condition == Condition::Off {
             return Err(crashed());
         }
@@ -157,7 +157,7 @@ impl State {
     }
 
     /// The power fails: what is left is durable.
-    fn crash(&mut self, fault: Diagnostic) {
+    fn crash(&mut self, fault: Fault) {
         if fault == Fault::CrashLosing {
             // What has no durable way that leads to it is lost as well.
             let durable = &self.durable_names;

@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
-use fluxmorph::cli::ExitCode;
+use fluxmorph::Error;
+use fluxmorph::ExitCode;
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::output::{OutputError, RunResult};
 use fluxmorph::session::Limits;
-use fluxmorph_optimizer::Error;
 use rayon::prelude::*;
 
 use crate::disk::{Fault, SimulatedDisk};
@@ -59,7 +59,7 @@ impl Trial<'_> {
         tallies.into_iter().fold(Tally::default(), |sum, tally| sum + tally)
     }
 
-    fn one(&self, number: usize, operation: &str, fault: Diagnostic) -> Tally {
+    fn one(&self, number: usize, operation: &str, fault: Fault) -> Tally {
         let context = format!("{fault:?} at operation {number}, {operation}");
         if fault == Fault::ShortWrite && operation != "write" {
             return Tally::default();
@@ -106,7 +106,7 @@ impl Trial<'_> {
 }
 
 /// No file under its final name is torn; logs may end in the middle of a record after a crash.
-fn check_whole(disk: &SimulatedDisk, fault: Diagnostic, context: &str) {
+fn check_whole(disk: &SimulatedDisk, fault: Fault, context: &str) {
     let logs = if fault.is_crash() { Logs::MayBeCut } else { Logs::AreWhole };
     assert_eq!(torn(&disk.files(FOLDER.as_ref()), logs), Vec::<String>::new(), "{context}");
 }

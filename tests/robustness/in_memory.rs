@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use fluxmorph::Error;
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::observer::Silent;
 use fluxmorph::output::{Disk, OlderRun, RunResult};
 use fluxmorph::session::{self, Limits, Options, SavedRun};
-use fluxmorph_optimizer::Error;
 
 use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS};
 use crate::support::{self, changed, parsed};

@@ -107,8 +107,8 @@ fn a_run_of_an_earlier_version_is_refused_and_may_be_replaced() {
     std::fs::rename(run.journal(), run.out.join("journal.bin")).expect("renamed");
     std::fs::write(run.out.join("history.jsonl"), "{}\n").expect("written");
     run.is_refused(3, &["journal.bin` is the journal of version", "start the run again with --force"]);
-    ended(&mut fluxmorph(&[&"report", &run.out])).with(3, &["journal.bin` is the journal of version"]);
-    ended(run.device.command("run", &run.out).arg("--force")).completed();
+    finish(&mut command(&[&"report", &run.out])).with(3, &["journal.bin` is the journal of version"]);
+    finish(run.device.command("run", &run.out).arg("--force")).completed();
     assert_same(&essence(&files(&run.out)), &run.expected, "replaced");
 }
 

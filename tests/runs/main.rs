@@ -5,6 +5,7 @@
 mod cli;
 mod commands;
 mod examples;
+mod field_pieces;
 mod folders;
 mod fresh_mesh;
 mod memory;
@@ -17,13 +18,3 @@ mod run_files;
 mod support;
 #[cfg(unix)]
 mod sweep;
-
-/// For `bad_input` alone.
-mod program {
-    pub(crate) use crate::support::program::{Finished, folder};
-    pub(crate) use crate::support::shield::quick;
-
-    pub(crate) fn fluxmorph(arguments: &[impl AsRef<std::ffi::OsStr>]) -> Finished {
-        crate::support::program::finish(crate::support::program::program().args(arguments))
-    }
-}

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use fluxmorph::journal;
 use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::journal;
 use fluxmorph_optimizer::problem::Timings;
 use serde_json::Value;
 

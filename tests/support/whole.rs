@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph::journal;
+use fluxmorph::journal::{self, Rest};
 use fluxmorph_geometry::io::read_vtu;
-use fluxmorph_optimizer::journal::{self, Rest};
 
 /// What the ends of logs may look like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

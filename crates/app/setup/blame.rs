@@ -263,9 +263,8 @@ mod tests {
 
     #[test]
     fn advice_of_a_linear_solver_names_the_keys_to_change() {
-        let failed = |cause| {
-            Error::Solver(SolverError::NotConverged { residual: 1e-3, required: 1e-9, iterations: 9, cause })
-        };
+        let failed =
+            |cause| SolverError::NotConverged { residual: 1e-3, required: 1e-9, iterations: 9, cause }.into();
         let keys = |cause| keys_of_advice(&failed(cause)).unwrap_or_default();
         assert_eq!(keys(NonConvergence::IllConditioned), "analysis.linear_solver.factor_gib");
         assert!(keys(NonConvergence::OnRanks).starts_with("analysis.petsc.solver"));

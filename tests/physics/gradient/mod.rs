@@ -2,8 +2,8 @@
 
 use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::problem::{Problem, Want};
-use fluxmorph_optimizer::verify::{Certificate, Settings, certify, certify_all, measure};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify, measure};
 use fluxmorph_remesh::Moved;
 
 use crate::problems::{initial, variables};
@@ -24,7 +24,8 @@ const MESHED: [&str; 5] = [
 ];
 
 fn holds(problem: &Problem, p: &[f64]) {
-    check_in_five(&certify(problem, p, &Settings::default(), |_, _| {}).unwrap_or_else(|e| panic!("{e}")));
+    let certificates = certify(problem, p, &Settings::default(), &|| false, |_, _, _| {});
+    check_in_five(&certificates.unwrap_or_else(|e| panic!("{e}")).objective);
 }
 
 fn check(certificate: &Certificate) {
@@ -46,25 +47,26 @@ fn check_in_five(certificate: &Certificate) {
 
 /// dF/dx against the motion of every node that the elastic map may move, each on its own.
 fn node_gradient_holds(problem: &Problem) {
-    let shape = problem.shape.as_ref().expect("a shape");
+    let shape = problem.shape().expect("a shape");
     let at = problem.moved(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
     let mesh = at.mesh.clone();
-    let base = problem.analyse(&wavy(problem), at.clone(), Want::Gradient).unwrap_or_else(|e| panic!("{e}"));
+    let analyse = |moved: Moved, derivatives: Derivatives| {
+        problem.analyse(moved, &wavy(problem), derivatives, &mut SolverCache::default(), &mut NoProgress)
+    };
+    let base = analyse(at.clone(), Derivatives::First).unwrap_or_else(|e| panic!("{e}"));
     let objective = base.objective.expect("an objective");
     let gradient: Vec<f64> = base.sensitivity.expect("it was asked for").into_iter().flatten().collect();
     // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
     let moves = |k: usize| {
         let node = NodeId::new(k / 3);
-        shape.motion.map().is_unknown(node, k % 3) || shape.surface.nodes().binary_search(&node).is_ok()
+        shape.motion().map().is_unknown(node, k % 3) || shape.surface().nodes().binary_search(&node).is_ok()
     };
     let span: Vec<f64> = (0..gradient.len()).map(|k| if moves(k) { 1e-5 } else { 0.0 }).collect();
     let settings = Settings { first_step: 1.0, difference_step: 0.01, ..Settings::default() };
     let value = |v: &[f64]| -> Result<f64, Error> {
         let moved = mesh.moved(v.as_chunks::<3>().0)?;
-        Ok(problem
-            .analyse(&wavy(problem), Moved { mesh: moved, ..at.clone() }, Want::Value)?
-            .objective
-            .expect("an objective"))
+        let analysis = analyse(Moved { mesh: moved, ..at.clone() }, Derivatives::None)?;
+        Ok(analysis.objective.expect("an objective"))
     };
     let zero = vec![0.0; gradient.len()];
     let certificate = measure(&value, &zero, objective, &gradient, &span, &settings, |_, _| {});

@@ -4,7 +4,7 @@
 mod runs;
 mod team;
 
-use fluxmorph_optimizer::problem::{Problem, Want};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_remesh::StiffnessPolicy;
 use fluxmorph_solver::Order;
 use team::led;
@@ -24,16 +24,18 @@ const SAME: f64 = 1e-8;
 
 /// Objective, gradient and worst quality at a design in the middle of nowhere, also from a reference mesh moved to it.
 fn numbers(problem: &mut Problem) -> Vec<(f64, Vec<f64>, f64)> {
-    let count = problem.shape.as_ref().expect("a design").surface.variable_count();
+    let count = problem.shape().expect("a design").surface().variable_count();
     let design = |step: f64| (0..count).map(|k| 1e-3 * step * (1.0 + (k as f64).sin())).collect::<Vec<f64>>();
     let mut numbers = Vec::new();
     for step in [0.5, 1.0] {
         let p = design(step);
-        let analysis = problem.evaluate(&p, Want::Gradient).expect("it is solved");
+        let analysis = problem
+            .evaluate(&p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
+            .expect("it is solved");
         assert!(analysis.worst_residual < 1e-9, "{:e}", analysis.worst_residual);
         let gradient = analysis.gradient.expect("asked for");
         numbers.push((analysis.objective.expect("there is one"), gradient, analysis.quality.worst));
-        problem.approach(&p, &|| false).expect("it is near");
+        problem.continue_to(&p, &|| false).expect("it is near");
     }
     numbers
 }
@@ -72,7 +74,7 @@ fn so_are_those_of_impedance_surfaces_at_two_frequencies() {
 fn so_are_those_of_quadratic_elements() {
     let overrides =
         ["mesh.shield.refinement=0.3", "analysis.order=2", "analysis.linear_solver.method=\"direct\""];
-    let order = support::setup("shield_quick.toml", &overrides).problem.states[0].space().order();
+    let order = support::setup("shield_quick.toml", &overrides).problem.states()[0].space().order();
     assert_eq!(order, Order::Quadratic);
     ranks_agree("shield_quick.toml", &overrides, &[2]);
 }
@@ -88,7 +90,7 @@ fn so_are_those_of_a_magnet_and_of_every_stiffness() {
 #[test]
 fn every_rank_has_about_the_same_number_of_rows() {
     let counts = led(4, "shield.toml", &MESHED, |setup| {
-        let share = setup.problem.share.as_ref().expect("it is shared out");
+        let share = setup.problem.share().expect("it is shared out");
         (0..4).map(|rank| share.partition.nodes_of(rank).len()).collect::<Vec<_>>()
     });
     let mean = counts.iter().sum::<usize>() as f64 / 4.0;

@@ -4,12 +4,12 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
+use fluxmorph::observer::Silent;
+use fluxmorph::output::{OlderRun, RunResult, StopReason, system_disk};
+use fluxmorph::report::ReportedRun;
+use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph::setup::Purpose;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
-use fluxmorph_optimizer::observer::Silent;
-use fluxmorph_optimizer::output::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph_optimizer::report::ReportedRun;
-use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
-use fluxmorph_optimizer::setup::Purpose;
 
 use crate::support;
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use fluxmorph::session;
+use fluxmorph::setup::{Purpose, Setup, set_up_watched};
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
-use fluxmorph_optimizer::session;
-use fluxmorph_optimizer::setup::{Purpose, Setup, set_up_watched};
 
 use crate::support;
 

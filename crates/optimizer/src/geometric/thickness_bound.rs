@@ -16,7 +16,7 @@ use crate::problem::Shape;
 
 /// What the smooth bound gives away at most, as a share of the limit: below what a workshop holds, and still smooth over
 /// the change of thickness of one optimisation step.
-const MARGIN: f64 = 0.01;
+pub const MARGIN: f64 = 0.01;
 
 /// A limit of the thickness [m].
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -83,14 +83,14 @@ impl Problem {
         Self { constraints: Vec::new(), ..self }
     }
 
-    /// The same with other states, as many as before.
+    /// The same with other states.
     ///
     /// # Panics
-    /// If there is another number of them.
+    /// As [`Problem::new`].
     #[must_use]
     pub fn with_states(self, states: Vec<FieldModel>) -> Self {
-        assert_eq!(states.len(), self.states.len(), "one state a frequency");
-        Self { states, ..self }
+        let Self { original, objective, constraints, shape, share, .. } = self;
+        Self::new(original, states, objective, constraints, shape).shared_out(share)
     }
 
     /// Lets go of states, constraints and shape, which hold nearly all of the memory: the undeformed mesh is left, and
@@ -112,6 +112,11 @@ impl Problem {
     /// What is optimised; `None` for a field analysis without objective.
     pub fn objective(&self) -> Option<&WeightedSum> {
         self.objective.as_ref()
+    }
+
+    /// What is optimised, to change its goal or weights.
+    pub fn objective_mut(&mut self) -> Option<&mut WeightedSum> {
+        self.objective.as_mut()
     }
 
     /// What must keep within bounds; empty without a shape.

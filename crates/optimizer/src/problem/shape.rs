@@ -30,9 +30,7 @@ impl Shape {
     /// If there is not one bound a variable, or the bounds cross.
     pub fn new(surface: DesignSurface, motion: Motion, limits: StepLimits, bounds: [Vec<f64>; 2]) -> Self {
         let [lower, upper] = bounds;
-        let variables = surface.variable_count();
-        assert_eq!([lower.len(), upper.len()], [variables; 2], "one bound a variable");
-        assert!(lower.iter().zip(&upper).all(|(low, high)| low <= high), "the lower bound is the lower one");
+        check_bounds(&surface, &lower, &upper);
         let initial = lower.iter().zip(&upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
         Self { surface, motion, limits, thickness: None, lower, upper, initial }
     }
@@ -48,9 +46,27 @@ impl Shape {
     /// # Panics
     /// If there is not one value a variable.
     #[must_use]
-    pub fn starting_at(self, initial: Vec<f64>) -> Self {
+    pub fn starting_at(mut self, initial: Vec<f64>) -> Self {
+        self.set_initial(initial);
+        self
+    }
+
+    /// Begins at `initial` [m].
+    ///
+    /// # Panics
+    /// If there is not one value a variable.
+    pub fn set_initial(&mut self, initial: Vec<f64>) {
         assert_eq!(initial.len(), self.surface.variable_count(), "one value a variable");
-        Self { initial, ..self }
+        self.initial = initial;
+    }
+
+    /// Moves between other bounds `[lower, upper]` [m].
+    ///
+    /// # Panics
+    /// If there is not one bound a variable, or the bounds cross.
+    pub fn set_bounds(&mut self, [lower, upper]: [Vec<f64>; 2]) {
+        check_bounds(&self.surface, &lower, &upper);
+        (self.lower, self.upper) = (lower, upper);
     }
 
     /// Design variables to surface.
@@ -116,4 +132,9 @@ impl Shape {
         finite::sensitivity(owner, nodal)?;
         Ok(self.surface.gradient(&self.motion.map().gradient(nodal)?))
     }
+}
+
+fn check_bounds(surface: &DesignSurface, lower: &[f64], upper: &[f64]) {
+    assert_eq!([lower.len(), upper.len()], [surface.variable_count(); 2], "one bound a variable");
+    assert!(lower.iter().zip(upper).all(|(low, high)| low <= high), "the lower bound is the lower one");
 }

@@ -79,8 +79,8 @@ fn the_number_of_variables_is_known_before_the_problem_is_made() {
     ] {
         let (config, source) = designed(&design);
         let count = variable_count(&config, &source).unwrap();
-        let shape = set_up(&config, &source, Purpose::Optimisation).unwrap().problem.shape.unwrap();
-        assert_eq!(count, shape.surface.variable_count(), "{design}");
+        let problem = set_up(&config, &source, Purpose::Optimisation).unwrap().problem;
+        assert_eq!(count, problem.shape().unwrap().surface().variable_count(), "{design}");
         assert!(expected.is_none_or(|expected| expected == count), "{design}: {count}");
     }
 }

@@ -1,8 +1,9 @@
 //! What is not finite is refused by name, before an optimiser sees it.
 
 use fluxmorph::setup::{Purpose, set_up};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
-use fluxmorph_optimizer::{Error, finite};
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::problem::finite;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 fn named(error: Result<(), Error>) -> String {
     let error = error.expect_err("it is not finite");
@@ -15,8 +16,10 @@ fn quick() -> (Problem, Analysis) {
     let (config, source) =
         fluxmorph::config::Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
     let problem = set_up(&config, &source, Purpose::Optimisation).expect("a sound case").problem;
-    let p = problem.shape.as_ref().expect("a shape").initial.clone();
-    let analysis = problem.evaluate(&p, Want::Gradient).expect("a sound case");
+    let p = problem.shape().expect("a shape").initial().to_vec();
+    let analysis = problem
+        .evaluate(&p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
+        .expect("a sound case");
     (problem, analysis)
 }
 
@@ -47,16 +50,18 @@ fn an_evaluation_with_a_number_that_is_none_is_refused_by_name() {
 #[ignore = "a measurement: the clock is the process', and other tests run in it"]
 fn the_checks_take_less_than_a_hundredth_of_an_evaluation() {
     let (problem, analysed) = quick();
-    let p = &problem.shape.as_ref().expect("a shape").initial;
+    let p = &problem.shape().expect("a shape").initial();
     let cpu = || cpu_time::ProcessTime::now();
     let start = cpu();
-    problem.evaluate(p, Want::Gradient).expect("a sound case");
+    problem
+        .evaluate(p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
+        .expect("a sound case");
     let evaluation = start.elapsed().as_secs_f64();
     let start = cpu();
     const REPEATS: u32 = 20;
     for _ in 0..REPEATS {
-        finite::state(&problem.states[0], &analysed.mesh, &analysed.solutions[0]).expect("sound");
-        finite::analysis(&analysed, &problem.constraints).expect("sound");
+        finite::state(&problem.states()[0], &analysed.mesh, &analysed.solutions[0]).expect("sound");
+        finite::analysis(&analysed, problem.constraints()).expect("sound");
     }
     let checks = start.elapsed().as_secs_f64() / f64::from(REPEATS);
     println!(

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fluxmorph::config::Config;
 use fluxmorph::setup::{Purpose, Setup, set_up};
-use fluxmorph_optimizer::geometric::{Bound, ThicknessBound, Volume};
+use fluxmorph_optimizer::geometric::{Bound, MARGIN, ThicknessBound, Volume};
 use fluxmorph_optimizer::problem::Problem;
 
 fn shield(overrides: &[&str]) -> Setup {
@@ -16,7 +16,7 @@ fn shield(overrides: &[&str]) -> Setup {
 
 /// A design inside the bounds that is flat nowhere.
 fn wavy(problem: &Problem) -> Vec<f64> {
-    let variables = problem.shape.as_ref().expect("a shape").surface.variable_count();
+    let variables = problem.shape().expect("a shape").surface().variable_count();
     (0..variables).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
 }
 
@@ -46,8 +46,8 @@ const MESHED: [&str; 2] = ["regions.plate.model=\"volume\"", "remesh.region=[\"p
 
 fn volume(setup: &Setup) -> Volume {
     let problem = &setup.problem;
-    let surface = problem.states[0].conductors().first().map(|plate| plate.surface.as_slice());
-    Volume::new(&problem.original, &setup.full_mesh, "plate", surface).expect("a plate has a volume")
+    let surface = problem.states()[0].conductors().first().map(|plate| plate.surface.as_slice());
+    Volume::new(problem.original(), &setup.full_mesh, "plate", surface).expect("a plate has a volume")
 }
 
 #[test]
@@ -55,8 +55,8 @@ fn a_quarter_plate_has_its_volume_and_grows_with_its_face() {
     for overrides in [&[][..], &MESHED] {
         let setup = shield(overrides);
         let (problem, plate) = (&setup.problem, volume(&setup));
-        let shape = problem.shape.as_ref().expect("a shape");
-        let uniform = vec![3e-3; shape.surface.variable_count()];
+        let shape = problem.shape().expect("a shape");
+        let uniform = vec![3e-3; shape.surface().variable_count()];
         let mesh = problem.moved(&uniform).expect("inside the bounds").mesh;
         let (value, gradient) = plate.evaluate(&mesh, shape).expect("a direct solve");
         // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
@@ -73,7 +73,7 @@ fn the_gradient_holds_in_both_models_and_both_agree() {
     let values = [&[][..], &MESHED].map(|overrides| {
         let setup = shield(overrides);
         let (problem, plate) = (&setup.problem, volume(&setup));
-        let shape = problem.shape.as_ref().expect("a shape");
+        let shape = problem.shape().expect("a shape");
         let at = |p: &[f64]| {
             let mesh = problem.moved(p).expect("inside the bounds").mesh;
             plate.evaluate(&mesh, shape).expect("a direct solve")
@@ -88,9 +88,10 @@ fn the_gradient_holds_in_both_models_and_both_agree() {
 #[test]
 fn the_bound_is_conservative_by_no_more_than_its_margin() {
     let setup = shield(&[]);
-    let shape = setup.problem.shape.as_ref().expect("a shape");
+    let shape = setup.problem.shape().expect("a shape");
     let p = wavy(&setup.problem);
-    let (least, most) = shape.thickness.as_ref().expect("a plate has one").range(&shape.surface.heights(&p));
+    let (least, most) =
+        shape.thickness().expect("a plate has one").range(&shape.surface().normal_displacements(&p));
     for (bound, excess, limit) in
         [(Bound::Minimum(0.012), 0.012 - least, 0.012), (Bound::Maximum(0.014), most - 0.014, 0.014)]
     {
@@ -102,9 +103,9 @@ fn the_bound_is_conservative_by_no_more_than_its_margin() {
 #[test]
 fn a_uniform_plate_meets_its_limit_by_the_margin() {
     let setup = shield(&[]);
-    let shape = setup.problem.shape.as_ref().expect("a shape");
+    let shape = setup.problem.shape().expect("a shape");
     let bound = ThicknessBound::new(shape, Bound::Minimum(0.008)).expect("a thickness");
-    let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface.variable_count()]);
+    let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface().variable_count()]);
     // 8 mm − 10 mm, and all nodes count alike: the whole margin of 0.08 mm.
     assert!((value + 0.002 - 0.00008).abs() < 1e-12, "{value}");
     let sum: f64 = gradient.iter().sum();
@@ -114,7 +115,7 @@ fn a_uniform_plate_meets_its_limit_by_the_margin() {
 #[test]
 fn the_gradient_holds() {
     let setup = shield(&[]);
-    let shape = setup.problem.shape.as_ref().expect("a shape");
+    let shape = setup.problem.shape().expect("a shape");
     for bound in [Bound::Minimum(0.012), Bound::Maximum(0.014)] {
         let bound = ThicknessBound::new(shape, bound).expect("a thickness");
         // Well below 1/ρ, about 0.03 mm, where the function is smooth.

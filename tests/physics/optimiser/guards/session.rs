@@ -4,7 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use fluxmorph::config::Config;
-use fluxmorph::observer::{Evaluation, Observer, Silent};
+use fluxmorph::observer::{Evaluation, Observer, RunObserver, Silent};
 use fluxmorph::output::{OlderRun, system_disk};
 use fluxmorph::session::{self, Limits, Options, SavedRun};
 use serde_json::Value;
@@ -12,22 +12,24 @@ use serde_json::Value;
 use super::quick_path;
 
 /// Panics when it is told of an evaluation.
-struct Subject {
+struct Faulty {
     at: usize,
 }
 
-impl Observer for Subject {
+impl Observer for Faulty {
     fn evaluation(&mut self, evaluation: &Evaluation) {
         assert!(evaluation.evaluation != self.at, "a fault of the program");
     }
 }
+
+impl RunObserver for Faulty {}
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
 /// A run of a few evaluations in a directory, with an observer.
-fn run(directory: &Path, observer: &mut dyn Observer) -> Result<(), fluxmorph_optimizer::Error> {
+fn run(directory: &Path, observer: &mut dyn RunObserver) -> Result<(), fluxmorph::Error> {
     let overrides = ["output.verify_refinement=0".to_owned(), "output.fields=every".to_owned()];
     let (mut config, source) = Config::from_file(&quick_path(), &overrides).unwrap();
     config.output.directory = directory.to_owned();
@@ -41,7 +43,7 @@ fn run(directory: &Path, observer: &mut dyn Observer) -> Result<(), fluxmorph_op
 fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let [broken, sound] = ["broken", "sound"].map(|name| folder.path().join(name));
-    let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Subject { at: 2 })));
+    let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 2 })));
     assert!(caught.is_err(), "the panic is not swallowed");
     assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
     assert!(!broken.join("result.json").exists());
@@ -67,6 +69,6 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
 fn a_panic_before_the_first_evaluation_is_kept_leaves_a_failed_manifest() {
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("broken");
-    assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Subject { at: 0 }))).is_err());
+    assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 0 }))).is_err());
     assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
 }

@@ -33,7 +33,7 @@ fn refused(text: &str) -> String {
 #[test]
 fn a_coil_region_becomes_a_source_and_its_divergence_is_told() {
     let setup = prepared(BLOCK).unwrap_or_else(|error| panic!("{error}"));
-    let coils = setup.problem.states[0].coils();
+    let coils = setup.problem.states()[0].coils();
     let CoilShape::Region(current) = &coils[0].shape else { panic!("a region") };
     for (_, j) in current.current_density() {
         assert!((j[1] * 0.02 * 0.03 - 1.0).abs() < 1e-11, "one ampere-turn through 20 mm x 30 mm");
@@ -84,7 +84,7 @@ fn an_analytic_coil_may_be_slanted() {
          axis = [1, 2, 0.5]\nradius = \"3 mm\"\nwidth = \"1 mm\"\nheight = \"2 mm\"",
     );
     let setup = prepared(&slanted).unwrap_or_else(|error| panic!("{error}"));
-    let CoilShape::Racetrack(coil) = &setup.problem.states[0].coils()[0].shape else { panic!("analytic") };
+    let CoilShape::Racetrack(coil) = &setup.problem.states()[0].coils()[0].shape else { panic!("analytic") };
     assert!((coil.axis()[1] - 2.0 / 5.25f64.sqrt()).abs() < 1e-15);
 }
 
@@ -93,7 +93,7 @@ fn remanences_are_given_by_region() {
     let magnet = BLOCK.replace("50 Hz", "0 Hz")
         + "[materials.m]\n[regions.block]\nmaterial = \"m\"\nremanence = [0, \"1.2 T\", 0]\n";
     let setup = prepared(&magnet).unwrap_or_else(|error| panic!("{error}"));
-    let model = &setup.problem.states[0];
+    let model = &setup.problem.states()[0];
     assert_eq!(model.remanence_of(fluxmorph_geometry::ElementId(0)), [0.0, 1.2, 0.0]);
     assert!(!model.is_unexcited());
 }

@@ -12,7 +12,7 @@ use fluxmorph::session::{self, Options};
 use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
 use fluxmorph_geometry::{ElementId, Partition};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Want};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 /// Three ranks, and one that owns no element.
 const RANKS: usize = 4;
@@ -27,8 +27,9 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
     let options = Options { disk, older_run: OlderRun::Keep, threads: 2, team: None, interrupted: &|| false };
     session::run(&config, &source, options, &mut Silent).unwrap();
     let problem = set_up(&config, &source, Purpose::Optimisation).unwrap().problem;
-    let initial = problem.shape.as_ref().unwrap().initial.clone();
-    let analysis = problem.evaluate(&initial, Want::Gradient).unwrap();
+    let initial = problem.shape().unwrap().initial().to_vec();
+    let analysis =
+        problem.evaluate(&initial, Derivatives::First, &mut SolverCache::default(), &mut NoProgress).unwrap();
     (problem, analysis)
 }
 
@@ -45,11 +46,11 @@ fn write_pieces(directory: &RunDirectory, problem: &Problem, analysis: &Analysis
     let data = FieldData::of(analysis);
     directory.begin_pieces(0).unwrap();
     for (rank, elements) in parts(analysis).iter().enumerate() {
-        let bytes = fields::piece(&problem.states, &data, elements).unwrap();
+        let bytes = fields::piece(problem.states(), &data, elements).unwrap();
         directory.write(&directory.field_piece(0, rank), &bytes).unwrap();
     }
     let names: Vec<String> = (0..RANKS).map(|rank| RunDirectory::piece_in_header(0, rank)).collect();
-    directory.finish_pieces(0, &fields::header(&problem.states, &data, &names)).unwrap();
+    directory.finish_pieces(0, &fields::header(problem.states(), &data, &names)).unwrap();
 }
 
 /// All numbers of an array as bits: zeros of either sign differ.
@@ -75,7 +76,7 @@ fn fields_in_pieces_are_those_of_the_whole_and_are_reported_alike() {
     };
 
     let whole = std::fs::read(directory.field(0)).unwrap();
-    assert!(whole == fields::vtu(&problem.states, &FieldData::of(&analysis)).unwrap(), "the run's file");
+    assert!(whole == fields::vtu(problem.states(), &FieldData::of(&analysis)).unwrap(), "the run's file");
     let whole = vtu_contents(&whole).unwrap();
     let of_whole = report().unwrap();
     write_pieces(&directory, &problem, &analysis);

@@ -1,10 +1,7 @@
 //! The optimiser on small cases of a configuration: driver, guards, geometric functionals, what a set-up refuses.
-#![allow(missing_docs, clippy::unwrap_used)]
-
 mod coils;
 mod design_surface;
 mod driver;
-mod field_pieces;
 mod finite;
 mod geometric;
 mod guards;

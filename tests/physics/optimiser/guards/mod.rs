@@ -28,26 +28,26 @@ fn quick(overrides: &[&str]) -> (Problem, Optimizer) {
 }
 
 /// The field problems of a case with something changed.
-fn with_field(mut problem: Problem, change: impl Fn(&mut FieldModelSetup)) -> Problem {
+fn with_field(problem: Problem, change: impl Fn(&mut FieldModelSetup)) -> Problem {
     let changed = |model: &FieldModel| {
         let mut setup = model.setup().clone();
         change(&mut setup);
-        FieldModel::new(&problem.original, setup).unwrap()
+        FieldModel::new(problem.original(), setup).unwrap()
     };
-    problem.states = problem.states.iter().map(changed).collect();
-    problem
+    let states = problem.states().iter().map(changed).collect();
+    problem.with_states(states)
 }
 
 fn initial(problem: &Problem) -> Vec<f64> {
-    problem.shape.as_ref().unwrap().initial.clone()
+    problem.shape().unwrap().initial().to_vec()
 }
 
 /// Norm of the right side of the initial design's adjoint problem for a weight of one.
 fn adjoint_norm(problem: &Problem) -> f64 {
-    let model = &problem.states[0];
+    let model = &problem.states()[0];
     let mesh = problem.moved(&initial(problem)).unwrap().mesh;
     let state = model.solve(&mesh).unwrap().0;
-    let functional = &problem.objective.as_ref().unwrap().terms[0].functional;
+    let functional = &problem.objective().unwrap().terms[0].functional;
     norm::<c64>(&functional.evaluate(model, &mesh, &state).unwrap().derivative)
 }
 
@@ -56,7 +56,7 @@ fn adjoint_norm(problem: &Problem) -> f64 {
 fn overflowing(growth: f64) -> (Problem, Optimizer) {
     let (mut problem, settings) = quick(&["output.verify_refinement=0"]);
     let weight = LARGEST_NORM / (adjoint_norm(&problem) * growth.sqrt());
-    let objective = problem.objective.as_mut().unwrap();
+    let objective = problem.objective_mut().unwrap();
     objective.goal = Goal::Maximise;
     objective.terms[0].weight = weight;
     (problem, settings)
