@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::config::{Config, SourceMap};
 use fluxmorph_optimizer::observer::Silent;
 use fluxmorph_optimizer::output::{Disk, OlderRun, RunResult};
 use fluxmorph_optimizer::session::{self, Limits, Options, SavedRun};
@@ -16,7 +16,7 @@ const BLOCK: &str = include_str!("block.toml");
 pub(crate) const FOLDER: &str = "/runs/block";
 
 /// The block with some texts replaced.
-pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, Source) {
+pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, SourceMap) {
     let mut text = BLOCK.to_owned();
     for (from, to) in changes {
         assert!(text.contains(from), "{from}");
@@ -28,7 +28,7 @@ pub(crate) fn block(changes: &[(&str, &str)]) -> (Config, Source) {
 }
 
 /// The block with a bound on its volume.
-pub(crate) fn constrained() -> (Config, Source) {
+pub(crate) fn constrained() -> (Config, SourceMap) {
     block(&[(
         "[design]",
         "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]",
@@ -36,7 +36,7 @@ pub(crate) fn constrained() -> (Config, Source) {
 }
 
 /// The block with steps so cautious that the mesh has several references.
-pub(crate) fn with_rounds() -> (Config, Source) {
+pub(crate) fn with_rounds() -> (Config, SourceMap) {
     block(&[
         ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = ["),
         ("max_evaluations = 6", "max_evaluations = 12"),
@@ -46,7 +46,7 @@ pub(crate) fn with_rounds() -> (Config, Source) {
 }
 
 /// A shipped configuration.
-pub(crate) fn shipped(name: &str) -> (Config, Source) {
+pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
     let (mut config, source) = Config::from_file(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
     config.output.directory = PathBuf::from(FOLDER);
@@ -54,7 +54,7 @@ pub(crate) fn shipped(name: &str) -> (Config, Source) {
 }
 
 /// Runs a configuration from its start.
-pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, Source)) -> Result<RunResult, Error> {
+pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
     let options =
         Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
     session::run(config, source, options, &mut Silent)

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::cli::ExitCode;
-use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::config::{Config, SourceMap};
 use fluxmorph_optimizer::output::{OutputError, RunResult};
 use fluxmorph_optimizer::session::Limits;
 use rayon::prelude::*;
@@ -39,7 +39,7 @@ impl std::ops::Add for Tally {
 /// One failing work on a disk: from `disk`, do `work` with the fault, and bring it to its end.
 struct Trial<'a> {
     disk: &'a SimulatedDisk,
-    device: &'a (Config, Source),
+    device: &'a (Config, SourceMap),
     expected: &'a Essence,
     /// Of the resumption that follows a failure.
     limits: Limits,
@@ -112,7 +112,7 @@ fn check_whole(disk: &SimulatedDisk, fault: Fault, context: &str) {
 }
 
 /// The essence of a run without faults.
-fn reference(device: &(Config, Source)) -> Essence {
+fn reference(device: &(Config, SourceMap)) -> Essence {
     let disk = SimulatedDisk::default();
     run(&disk.shared(), device).unwrap_or_else(|e| panic!("{e}"));
     essence(&disk.files(Path::new(FOLDER)))
@@ -120,13 +120,13 @@ fn reference(device: &(Config, Source)) -> Essence {
 
 #[test]
 fn no_fault_of_the_disk_loses_or_tears_anything() {
-    let start = |device: &(Config, Source)| {
+    let start = |device: &(Config, SourceMap)| {
         let expected = reference(device);
         let work = |disk: &SimulatedDisk| run(&disk.shared(), device);
         let limits = Limits::default();
         Trial { disk: &SimulatedDisk::default(), device, expected: &expected, limits, work: &work }.all()
     };
-    let again = |device: &(Config, Source), evaluations: usize| {
+    let again = |device: &(Config, SourceMap), evaluations: usize| {
         let expected = reference(device);
         let disk = SimulatedDisk::default();
         let mut first = device.clone();
@@ -136,7 +136,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
         let work = |disk: &SimulatedDisk| resume(&disk.shared(), limits);
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
     };
-    let replaced = |device: &(Config, Source)| {
+    let replaced = |device: &(Config, SourceMap)| {
         let expected = reference(device);
         let disk = SimulatedDisk::default();
         run(&disk.shared(), &block(&[])).unwrap_or_else(|e| panic!("{e}"));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use fluxmorph_optimizer::config::{Config, Source};
+use fluxmorph_optimizer::config::{Config, SourceMap};
 use fluxmorph_optimizer::journal;
 use fluxmorph_optimizer::output::Disk;
 use fluxmorph_optimizer::session::Limits;
@@ -57,7 +57,7 @@ fn count(bytes: &[u8]) -> usize {
     journal::parse(bytes).expect("a journal").records.len()
 }
 
-fn whole_run(device: &(Config, Source)) -> (BTreeMap<PathBuf, Vec<u8>>, Essence) {
+fn whole_run(device: &(Config, SourceMap)) -> (BTreeMap<PathBuf, Vec<u8>>, Essence) {
     let disk = SimulatedDisk::default();
     run(&disk.shared(), device).unwrap_or_else(|e| panic!("{e}"));
     let files = disk.files(FOLDER.as_ref());
@@ -90,7 +90,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
 }
 
 /// The quick shield, which keeps the fields of its first and its last evaluation alone.
-fn shipped_with(evaluations: usize) -> (Config, Source) {
+fn shipped_with(evaluations: usize) -> (Config, SourceMap) {
     let (mut config, source) = shipped("shield_quick.toml");
     config.optimizer.max_evaluations = evaluations;
     (config, source)

@@ -47,8 +47,12 @@ pub fn render(report: &DiagnosticReport, style: Style) -> String {
         Style::Plain => Renderer::plain(),
         Style::Coloured => Renderer::styled(),
     };
-    let mut blocks: Vec<_> =
-        report.diagnostics.iter().take(MOST_SHOWN).map(|diagnostic| render_one(report, diagnostic, &renderer)).collect();
+    let mut blocks: Vec<_> = report
+        .diagnostics
+        .iter()
+        .take(MOST_SHOWN)
+        .map(|diagnostic| render_one(report, diagnostic, &renderer))
+        .collect();
     let name = report.source.documents().first().map_or("", |document| &document.name);
     let count = report.diagnostics.len();
     let faults = if count == 1 { "1 fault".to_owned() } else { format!("{count} faults") };

@@ -129,7 +129,11 @@ pub fn inspected(config: &Config, source: &SourceMap) -> Result<Vec<MotionSummar
 }
 
 /// Every case, set up; the tuner has one: the configuration itself.
-fn jobs<'a>(config: &'a Config, source: &'a SourceMap, parameters: Parameters) -> Result<Vec<Job<'a>>, Error> {
+fn jobs<'a>(
+    config: &'a Config,
+    source: &'a SourceMap,
+    parameters: Parameters,
+) -> Result<Vec<Job<'a>>, Error> {
     let own = config.morphing(source)?.morph;
     if parameters == Parameters::Tuned && own.motion.is_empty() {
         let fault = source

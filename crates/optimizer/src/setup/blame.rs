@@ -119,7 +119,9 @@ impl Blame<'_> {
                 let second = self.surface("boundaries", second)?;
                 let fault = self.at(&second, error)?;
                 Some(match self.surface("boundaries", first) {
-                    Some(first) => fault.secondary(self.source.span(&first), "it shares a face with this one"),
+                    Some(first) => {
+                        fault.secondary(self.source.span(&first), "it shares a face with this one")
+                    }
                     None => fault,
                 })
             }

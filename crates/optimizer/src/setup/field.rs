@@ -10,8 +10,8 @@ use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, 
 
 use super::blame::Gathered;
 use crate::config::{
-    self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel, SolverMethod,
-    SourceMap,
+    self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
+    SolverMethod, SourceMap,
 };
 use crate::error::Error;
 

@@ -16,7 +16,8 @@ use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use super::blame::with_advice;
 use crate::config::{
-    CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span, Target,
+    CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span,
+    Target,
 };
 use crate::error::Error;
 use crate::output::OutputError;

@@ -141,7 +141,10 @@ fn made(
     let motion_alone = purpose == Purpose::Inspection && config.morph.is_some();
     if free && conductors.is_empty() && !motion_alone {
         let fault = source
-            .diagnostic("boundaries", "no surface has a condition: the potential is known up to a constant only")
+            .diagnostic(
+                "boundaries",
+                "no surface has a condition: the potential is known up to a constant only",
+            )
             .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
         gathered.take::<()>(Err(source.error(vec![fault]).into()))?;
     }

@@ -10,7 +10,9 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
 use super::{field, mesh, millimetres, name_faults, shape};
-use crate::config::{Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target};
+use crate::config::{
+    Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
+};
 use crate::error::Error;
 use crate::morph::path::{NodeMotion, Path, Transform};
 
@@ -98,7 +100,12 @@ fn transform_of(motion: &PrescribedMotion) -> Transform {
 }
 
 /// The nodes of a surface, line, list or box; a fault where there is none.
-fn nodes_of(source: &SourceMap, path: &str, target: &Target, mesh: &Mesh) -> Result<Vec<NodeId>, Box<Diagnostic>> {
+fn nodes_of(
+    source: &SourceMap,
+    path: &str,
+    target: &Target,
+    mesh: &Mesh,
+) -> Result<Vec<NodeId>, Box<Diagnostic>> {
     let topology = mesh.topology();
     let [lower, upper] = mesh.bounding_box();
     let near = NEAR * norm(sub(upper, lower));

@@ -13,7 +13,8 @@ use fluxmorph_solver::FieldModel;
 
 use super::millimetres;
 use crate::config::{
-    self, Config, Design, DesignDirection, DirectionWord, Diagnostic, Remesh, RemeshExtent, SourceMap, StiffnessLaw,
+    self, Config, Design, DesignDirection, Diagnostic, DirectionWord, Remesh, RemeshExtent, SourceMap,
+    StiffnessLaw,
 };
 use crate::design::DesignSurface;
 use crate::error::Error;
@@ -196,7 +197,8 @@ pub(super) fn remesh_setup(
             RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
             RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
         };
-        let fault = source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+        let fault =
+            source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
         return Err(source.error(vec![fault]).into());
     }
     for part in &mut subregions {
@@ -234,7 +236,11 @@ pub(super) fn remesh_setup(
 }
 
 /// The axis of the design's direction where the motion is to follow it.
-pub(super) fn guidance(source: &SourceMap, design: Option<&Design>, remesh: &Remesh) -> Result<Guidance, Error> {
+pub(super) fn guidance(
+    source: &SourceMap,
+    design: Option<&Design>,
+    remesh: &Remesh,
+) -> Result<Guidance, Error> {
     let axis = match design.map(|design| design.direction) {
         Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
         Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,

@@ -38,7 +38,11 @@ pub(in crate::config) struct Definitions(BTreeMap<String, Value>);
 
 impl Definitions {
     /// A reference to a definition, which is made where it is new.
-    pub(in crate::config) fn reference(&mut self, name: &str, make: impl FnOnce(&mut Self) -> Value) -> Keywords {
+    pub(in crate::config) fn reference(
+        &mut self,
+        name: &str,
+        make: impl FnOnce(&mut Self) -> Value,
+    ) -> Keywords {
         if !self.0.contains_key(name) {
             // It may refer to itself.
             self.0.insert(name.to_owned(), Value::Null);
@@ -58,8 +62,10 @@ impl Definitions {
     /// # Panics
     /// For a range that quantities do not have: the schema is the same in every run, and a test makes it.
     pub(in crate::config) fn quantity(&mut self, dimension: Dimension, range: Range) -> Keywords {
-        let (_, prefix) =
-            RANGES.iter().find(|(known, _)| *known == range).expect("quantities are of any sign, > 0 or >= 0");
+        let (_, prefix) = RANGES
+            .iter()
+            .find(|(known, _)| *known == range)
+            .expect("quantities are of any sign, > 0 or >= 0");
         self.reference(&format!("{prefix}{dimension:?}"), |_| quantity(dimension, range))
     }
 

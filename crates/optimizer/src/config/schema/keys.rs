@@ -40,7 +40,9 @@ fn collect<'d>(
             let name = schema["$ref"].as_str().and_then(|name| name.strip_prefix(DEFINITIONS));
             let Some(name) = name.filter(|name| !name.ends_with(SUFFIX)) else { continue };
             let inner = &document["$defs"][name];
-            let Some(keys) = inner["properties"].as_object().filter(|_| entered.insert(name)) else { continue };
+            let Some(keys) = inner["properties"].as_object().filter(|_| entered.insert(name)) else {
+                continue;
+            };
             known.enter(&header, keys.keys());
             collect(&path, inner, document, known, entered);
         }

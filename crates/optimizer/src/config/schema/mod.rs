@@ -15,8 +15,8 @@ use serde_json::{Map, Value};
 
 pub use page::page;
 
-use super::tables::Config;
 use super::table::Table;
+use super::tables::Config;
 use definitions::Definitions;
 use description::Description;
 

@@ -56,7 +56,12 @@ impl Rules {
     }
 
     /// All rules of others, in a branch (`then` or `else`) of a condition.
-    pub(in crate::config) fn branch(mut self, condition: Value, branch: &str, others: fn(Self) -> Self) -> Self {
+    pub(in crate::config) fn branch(
+        mut self,
+        condition: Value,
+        branch: &str,
+        others: fn(Self) -> Self,
+    ) -> Self {
         let inner = others(Self::new(std::mem::take(&mut self.definitions)));
         self.definitions = inner.definitions;
         self.add(json!({ "if": condition, (branch): { "allOf": inner.rules } }))

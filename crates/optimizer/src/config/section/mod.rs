@@ -127,7 +127,12 @@ impl<'a> Section<'a> {
     }
 
     /// Reads a required key; `example` is a value to write.
-    pub(super) fn need<K: Kind, T: Value<K> + Placeholder>(&self, key: &'static str, kind: &K, example: &str) -> T {
+    pub(super) fn need<K: Kind, T: Value<K> + Placeholder>(
+        &self,
+        key: &'static str,
+        kind: &K,
+        example: &str,
+    ) -> T {
         if !self.has(key) {
             self.missing(&[key], &kind.line(key, example));
         }
@@ -211,7 +216,9 @@ impl<'a> Section<'a> {
         let mut table = Some(self.table);
         for part in key.split('.') {
             let mut steps = part.split('[');
-            let Some(mut node) = table.and_then(|table| table.get(steps.next()?)) else { return (None, span) };
+            let Some(mut node) = table.and_then(|table| table.get(steps.next()?)) else {
+                return (None, span);
+            };
             for step in steps {
                 let index = step.trim_end_matches(']').parse::<usize>().ok();
                 let item = node.content.list().and_then(|items| items.get(index?));

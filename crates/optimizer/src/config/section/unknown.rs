@@ -29,7 +29,10 @@ impl KnownKeys {
             Some(table) => plain.split_once('.').is_some_and(|(first, _)| first == table),
             None => bare(header) == plain,
         };
-        self.0.iter().find(|(header, _)| is_it(header)).map(|(header, keys)| (header.as_str(), keys.as_slice()))
+        self.0
+            .iter()
+            .find(|(header, _)| is_it(header))
+            .map(|(header, keys)| (header.as_str(), keys.as_slice()))
     }
 
     /// The headers of the tables that have a key, but for the one at a key path.
@@ -43,7 +46,8 @@ impl KnownKeys {
 
     /// The key of another table that a misspelt one may stand for.
     fn elsewhere(&self, key: &str) -> Option<String> {
-        let all = || self.0.iter().flat_map(|(header, keys)| keys.iter().map(move |key| (header, key.as_str())));
+        let all =
+            || self.0.iter().flat_map(|(header, keys)| keys.iter().map(move |key| (header, key.as_str())));
         let near = nearest_two(key, all().map(|(_, key)| key)).first().copied()?;
         let (header, _) = all().find(|(_, key)| *key == near)?;
         Some(format!("did you mean `{near}`? it belongs to {header}"))
@@ -58,7 +62,9 @@ pub(in crate::config) fn bare(header: &str) -> &str {
 /// A key path without numbers of items.
 fn without_numbers(path: &str) -> String {
     let parts = path.split('[').enumerate();
-    parts.map(|(i, part)| if i == 0 { part } else { part.split_once(']').map_or("", |(_, rest)| rest) }).collect()
+    parts
+        .map(|(i, part)| if i == 0 { part } else { part.split_once(']').map_or("", |(_, rest)| rest) })
+        .collect()
 }
 
 impl Section<'_> {
@@ -110,7 +116,8 @@ impl Section<'_> {
                 format!("did you mean `{near}`{or}?{moved}")
             }
         };
-        let header = near.first().and_then(|near| keys.table(&join(&self.path, near))).map(|(header, _)| header);
+        let header =
+            near.first().and_then(|near| keys.table(&join(&self.path, near))).map(|(header, _)| header);
         if let (Content::Table(_) | Content::Array(_), Some(header)) = (&node.content, header)
             && matches!(node.content, Content::Table(_)) == header.starts_with("[[")
         {
@@ -135,7 +142,9 @@ mod tests {
     #[test]
     fn tables_are_found_by_key_path() {
         let keys = known_keys();
-        let has = |path: &str, key: &str| keys.table(path).is_some_and(|(_, keys)| keys.iter().any(|own| own == key));
+        let has = |path: &str, key: &str| {
+            keys.table(path).is_some_and(|(_, keys)| keys.iter().any(|own| own == key))
+        };
         assert!(has("coils[3]", "half_window"));
         assert!(has("materials.soft steel", "density"));
         assert!(has("morph.motion[0].rotation", "angle"));

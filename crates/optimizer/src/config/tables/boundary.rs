@@ -63,9 +63,7 @@ impl Boundaries {
         }
         let given = self.uniform_field.iter().flat_map(|field| &field.surfaces);
         for (i, name) in given.enumerate().take_while(|_| !section.is_crowded()) {
-            for (key, list) in
-                [("flux_parallel", &self.flux_parallel), ("flux_normal", &self.flux_normal)]
-            {
+            for (key, list) in [("flux_parallel", &self.flux_parallel), ("flux_normal", &self.flux_normal)] {
                 let Some(k) = list.iter().position(|other| other == name) else { continue };
                 section.clash(
                     [&format!("{key}[{k}]"), &format!("uniform_field.surfaces[{i}]")],

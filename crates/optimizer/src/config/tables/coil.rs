@@ -364,8 +364,7 @@ impl CoilShape {
         let window = ("half_window", "[\"60 mm\", \"160 mm\"]");
         let across = if shape == ShapeWord::Circular { ("radius", "\"60 mm\"") } else { window };
         let center_example = "[\"0 mm\", \"0 mm\", \"60 mm\"]";
-        let required =
-            [("center", center_example), ("width", "\"20 mm\""), ("height", "\"40 mm\""), across];
+        let required = [("center", center_example), ("width", "\"20 mm\""), ("height", "\"40 mm\""), across];
         for (key, example) in required.into_iter().filter(|(key, _)| !section.has(key)) {
             section.missing(&[key], &format!("{key} = {example}"));
         }
@@ -392,7 +391,10 @@ impl CoilPath {
             for key in ["center", "axis"].into_iter().filter(|key| section.has(key)) {
                 section.wrong(
                     key,
-                    format!("`{}` has terminals, and `{key}` of a coil that closes on itself", section.path()),
+                    format!(
+                        "`{}` has terminals, and `{key}` of a coil that closes on itself",
+                        section.path()
+                    ),
                     "terminals, or center and axis of a line through the hole",
                 );
             }
@@ -409,12 +411,7 @@ impl CoilPath {
 }
 
 impl Corner {
-    fn of(
-        word: Option<CornerWord>,
-        radius: Option<f64>,
-        [a, b]: [f64; 2],
-        section: &Section<'_>,
-    ) -> Self {
+    fn of(word: Option<CornerWord>, radius: Option<f64>, [a, b]: [f64; 2], section: &Section<'_>) -> Self {
         if CORNERS.iter().all(|key| section.has(key)) {
             let message = format!("`{}` has both `corner` and `inner_radius`", section.path());
             section.clash(CORNERS, message, "one of them");
@@ -423,7 +420,10 @@ impl Corner {
         if radius > a.min(b) {
             section.wrong(
                 "inner_radius",
-                format!("`{}.inner_radius` is {radius} m, more than a half size of the window", section.path()),
+                format!(
+                    "`{}.inner_radius` is {radius} m, more than a half size of the window",
+                    section.path()
+                ),
                 format!("at most {} m", a.min(b)),
             );
         }

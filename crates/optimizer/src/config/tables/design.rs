@@ -131,7 +131,8 @@ impl Design {
             );
         }
         if let DesignDirection::Vector(vector) = self.direction {
-            self.direction = unit_vector(section, vector).map_or_else(Placeholder::placeholder, DesignDirection::Vector);
+            self.direction =
+                unit_vector(section, vector).map_or_else(Placeholder::placeholder, DesignDirection::Vector);
         }
         self.initial.check(section, self.lower, self.upper);
         self.check_symmetry(section);
@@ -139,7 +140,8 @@ impl Design {
 
     fn check_symmetry(&self, section: &Section<'_>) {
         for (index, plane) in self.symmetry.iter().enumerate() {
-            let Some(table) = section.inner(&format!("symmetry[{index}]")).filter(|table| !table.is_faulty(table.path()))
+            let Some(table) =
+                section.inner(&format!("symmetry[{index}]")).filter(|table| !table.is_faulty(table.path()))
             else {
                 continue;
             };

@@ -109,7 +109,8 @@ impl Functional {
             section.wrong("frequency", message, format!("a frequency of [analysis]: {}", known.join(", ")));
         }
         let still = |f: f64| f == 0.0;
-        let nothing = self.frequency.map_or(!analysed.is_empty() && analysed.iter().all(|&f| still(f)), still);
+        let nothing =
+            self.frequency.map_or(!analysed.is_empty() && analysed.iter().all(|&f| still(f)), still);
         if self.kind == ObjectiveKind::Loss && nothing {
             let message = format!("`{}` is a loss at 0 Hz, where no current is induced", section.path());
             section.wrong("kind", message, "a frequency above 0 Hz");

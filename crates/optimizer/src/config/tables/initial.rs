@@ -35,7 +35,8 @@ table! {
 impl Value<OneOf> for InitialDesign {
     fn read(_: &OneOf, entry: &Entry<'_>) -> Option<Self> {
         if entry.node.content.table().is_some() {
-            return <RandomDesign as Value<_>>::read(&TABLE, entry).map(|RandomDesign { random }| Self::Random { random });
+            return <RandomDesign as Value<_>>::read(&TABLE, entry)
+                .map(|RandomDesign { random }| Self::Random { random });
         }
         if entry.node.content.list().is_some() {
             return Value::read(&length(FINITE), entry).map(Self::Values);

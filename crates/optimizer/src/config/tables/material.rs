@@ -72,7 +72,10 @@ impl Material {
             .map(|(key, example)| {
                 section.refuse(
                     key,
-                    format!("`{}.{key}` has several values: anisotropic materials are not supported", section.path()),
+                    format!(
+                        "`{}.{key}` has several values: anisotropic materials are not supported",
+                        section.path()
+                    ),
                     format!("one number, such as {key} = {example}"),
                 );
                 key

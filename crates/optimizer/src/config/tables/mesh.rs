@@ -17,9 +17,9 @@ pub use sphere::SphereMesh;
 use crate::config::schema::rules::{Rules, is};
 use crate::config::section::Section;
 use crate::config::table::table;
-use crate::config::value::{Group, Placeholder};
 use crate::config::value::choice::{Choice, choice};
 use crate::config::value::range::Range;
+use crate::config::value::{Group, Placeholder};
 
 /// Ratios of neighbouring cells.
 const GROWTHS: Range = Range::closed(1.0, 100.0);
@@ -139,11 +139,10 @@ table! {
 
 /// A generator has its own table, a file its unit.
 fn keys_of_the_mesh(rules: Rules) -> Rules {
-    let mut rules = rules
-        .exactly_one(&["generator", "file"])
-        .needs("file", &["unit"])
-        .needs("unit", &["file"])
-        .add(json!({ "if": is("generator", &[Generator::Boxes.name()]), "then": { "required": ["boxes"] } }));
+    let mut rules =
+        rules.exactly_one(&["generator", "file"]).needs("file", &["unit"]).needs("unit", &["file"]).add(
+            json!({ "if": is("generator", &[Generator::Boxes.name()]), "then": { "required": ["boxes"] } }),
+        );
     for (table, _) in Generator::CHOICES {
         let own = json!({ "properties": { "generator": { "enum": [table] } }, "required": ["generator"] });
         rules = rules.add(json!({ "dependentSchemas": { (*table): own } }));
@@ -159,8 +158,9 @@ impl MeshKeys {
                 "`mesh.file` and `mesh.generator` are both given",
                 "one of them: a mesh is read or generated",
             ),
-            (false, false) => section
-                .missing(&["generator", "file"], "generator = \"shield\", or file = \"device.msh\""),
+            (false, false) => {
+                section.missing(&["generator", "file"], "generator = \"shield\", or file = \"device.msh\"")
+            }
             (false, true) if !section.has("unit") => section.missing(&["unit"], "unit = \"mm\""),
             (true, false) if section.has("unit") => section.clash(
                 ["generator", "unit"],

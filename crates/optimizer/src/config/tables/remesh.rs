@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::order::box_with_volume;
 use crate::config::section::Section;
 use crate::config::table::table;
-use crate::config::value::choice::{Choice, choice};
 use crate::config::value::Group;
+use crate::config::value::choice::{Choice, choice};
 use crate::config::value::range::Range;
 
 /// Poisson's ratio of a stable body.
@@ -156,7 +156,11 @@ impl Group for RemeshExtent {
     fn of(written: ExtentKeys, section: &Section<'_>) -> Self {
         match (section.has("region"), section.has("box")) {
             (true, true) => {
-                section.clash(["region", "box"], "remesh.region and remesh.box are both given", "one of them");
+                section.clash(
+                    ["region", "box"],
+                    "remesh.region and remesh.box are both given",
+                    "one of them",
+                );
             }
             (false, false) => {
                 section.missing(&["region", "box"], "region = \"remesh\", or box = [[0, 0, 0], [1, 1, 1]]");

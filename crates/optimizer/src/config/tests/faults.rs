@@ -267,7 +267,8 @@ fn every_fault_is_named_at_its_place() {
         assert!(SMALL.contains(from), "{from}");
         let text = SMALL.replacen(from, to, 1);
         let report = report(&text);
-        let fault = report.diagnostics.iter().find(|fault| fault.path == *path && fault.message.contains(message));
+        let fault =
+            report.diagnostics.iter().find(|fault| fault.path == *path && fault.message.contains(message));
         let fault = fault.unwrap_or_else(|| panic!("{to}: {path}: {message}\n{report}"));
         let found = line_of(&text, fault.span.range.start);
         assert!(*line == 0 || found == *line, "{to}: line {found}, not {line}\n{report}");

@@ -256,7 +256,9 @@ fn a_later_fault_points_at_its_key() {
     let (_, source) = Config::from_str(SMALL, "small.toml").expect("a good configuration");
     let faults = vec![
         source.unknown_name("design.surface", "surface", "plate_bottom", &["plate_botom", "plate_top"]),
-        source.diagnostic("boundaries.flux_parallel[1]", "`y_min` is not planar").expected("a planar surface"),
+        source
+            .diagnostic("boundaries.flux_parallel[1]", "`y_min` is not planar")
+            .expected("a planar surface"),
         source.diagnostic("output.directory", "a default has no place of its own"),
     ];
     assert!(source.check(vec![]).is_ok());

@@ -128,7 +128,8 @@ fn contradictions_are_faults_at_their_keys() {
     ];
     for (text, path, message) in cases {
         let report = report(text);
-        let found = report.diagnostics.iter().any(|f| f.message.contains(message) && f.path.starts_with(path));
+        let found =
+            report.diagnostics.iter().any(|f| f.message.contains(message) && f.path.starts_with(path));
         assert!(found, "{path}: {message}\n{report}");
         let all_help = report.diagnostics.iter().all(|f| f.expected.is_some() || f.help.is_some());
         assert!(all_help, "says what to do\n{report}");

@@ -94,7 +94,8 @@ impl DiagnosticSink {
 
     /// Whether there is a fault below a path.
     pub(in crate::config) fn any_below(&self, path: &str) -> bool {
-        let is_below = |known: &Diagnostic| known.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
+        let is_below =
+            |known: &Diagnostic| known.path.strip_prefix(path).is_some_and(|rest| rest.starts_with('.'));
         self.are_many() || self.0.borrow().iter().any(is_below)
     }
 

@@ -194,7 +194,10 @@ impl DiagnosticReport {
 
     /// The fault of another file.
     pub fn of_file(of: Subject, document: Document, diagnostic: Diagnostic) -> Self {
-        Self { of, ..Self::new(SourceMap::of_documents(vec![document], PathBuf::new(), ""), vec![diagnostic]) }
+        Self {
+            of,
+            ..Self::new(SourceMap::of_documents(vec![document], PathBuf::new(), ""), vec![diagnostic])
+        }
     }
 }
 

@@ -30,7 +30,8 @@ pub(super) fn diagnostics(document: usize, text: &str, errors: &[toml::de::Error
             break;
         }
         let said = message.replace('\n', ", ").replace(char::is_control, " ");
-        let diagnostic = Diagnostic::new("", Span { document, range: range.clone() }, format!("not valid TOML: {said}"));
+        let diagnostic =
+            Diagnostic::new("", Span { document, range: range.clone() }, format!("not valid TOML: {said}"));
         found.push(match advice(text, &range, line) {
             _ if is_duplicate => duplicate(diagnostic, text, range),
             Some(advice) => diagnostic.help(advice),

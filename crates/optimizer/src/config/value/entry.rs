@@ -39,7 +39,8 @@ impl<'a> Entry<'a> {
             self.wrong(message, &format!("at most {LONGEST_LIST} items"), None);
             return None;
         }
-        let item = |(index, node)| Entry { node, path: format!("{}[{index}]", self.path), context: self.context };
+        let item =
+            |(index, node)| Entry { node, path: format!("{}[{index}]", self.path), context: self.context };
         Some(items.iter().enumerate().map(item).collect())
     }
 }

@@ -1,13 +1,13 @@
 //! The vocabulary of `table!`: what a key may hold, its unit and its range.
 
+use super::quantity::Dimension;
 pub(in crate::config) use super::quantity::Dimension::*;
 use super::range::Range;
-pub(in crate::config) use super::{overlay, unread};
 use super::{
-    Column, Flag, Keys, NameOrNames, NamedTables, Names, Number, OneOf, PerAxis, SomeQuantity, SubTable, Tables,
-    Text, Whole, Word, ZeroOr,
+    Column, Flag, Keys, NameOrNames, NamedTables, Names, Number, OneOf, PerAxis, SomeQuantity, SubTable,
+    Tables, Text, Whole, Word, ZeroOr,
 };
-use super::quantity::Dimension;
+pub(in crate::config) use super::{overlay, unread};
 
 /// A text that is not empty.
 pub(in crate::config) const TEXT: Text = Text;

@@ -8,23 +8,24 @@ pub(in crate::config) mod choice;
 mod entry;
 pub(in crate::config) mod kinds;
 pub(in crate::config) mod nearest;
+mod nested;
 mod number;
 pub(in crate::config) mod quantity;
 pub(in crate::config) mod range;
 mod text;
-mod nested;
 
 use serde_json::{Map, Value as Json};
 
 use super::schema::definitions::Definitions;
 use choice::Choice;
 pub(in crate::config) use entry::Entry;
+pub(in crate::config) use nested::{
+    Also, Field, Group, Keys, NamedTables, OneOf, Plain, SomeQuantity, SubTable, Tables, Unread, overlay,
+    unread,
+};
 pub(in crate::config) use number::{LONGEST_LENGTH, Number, PerAxis, Whole, ZeroOr};
 use quantity::Dimension;
 pub(in crate::config) use text::{Column, Flag, NameOrNames, Names, Text, Word, first_duplicate};
-pub(in crate::config) use nested::{
-    Also, Field, Group, Keys, NamedTables, OneOf, Plain, SomeQuantity, SubTable, Tables, Unread, overlay, unread,
-};
 
 /// Longest list that is read: far beyond any use, and small enough to keep messages and memory bounded.
 pub(in crate::config) const LONGEST_LIST: usize = 100_000;

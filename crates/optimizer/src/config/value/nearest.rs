@@ -44,7 +44,10 @@ pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>
 }
 
 /// The help that offers what [`nearest_two`] found.
-pub(in crate::config) fn offer<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub(in crate::config) fn offer<'a>(
+    name: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
     let near = nearest_two(name, candidates);
     let named = near.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or ");
     (!near.is_empty()).then(|| format!("did you mean {named}?"))

@@ -105,8 +105,11 @@ impl<T: Group> Value<NamedTables> for BTreeMap<String, T> {
 
     fn schema(_: &NamedTables, definitions: &mut Definitions) -> Keywords {
         let table = <T as Value<SubTable>>::schema(&SubTable, definitions);
-        let keywords =
-            [("type", "object".into()), ("additionalProperties", table.into()), ("propertyNames", definitions.text().into())];
+        let keywords = [
+            ("type", "object".into()),
+            ("additionalProperties", table.into()),
+            ("propertyNames", definitions.text().into()),
+        ];
         keywords.map(|(keyword, value)| (keyword.to_owned(), value)).into_iter().collect()
     }
 }

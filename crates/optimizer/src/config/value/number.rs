@@ -132,7 +132,8 @@ impl Value<Whole> for usize {
     }
 
     fn schema(kind: &Whole, _: &mut Definitions) -> Keywords {
-        let keywords = [("type", "integer".into()), ("minimum", kind.least.into()), ("maximum", kind.most.into())];
+        let keywords =
+            [("type", "integer".into()), ("minimum", kind.least.into()), ("maximum", kind.most.into())];
         keywords.map(|(keyword, value)| (keyword.to_owned(), value)).into_iter().collect()
     }
 }

@@ -123,7 +123,11 @@ impl<const N: usize> Value<Names> for [String; N] {
         let count = names.len();
         let array = names.try_into().ok();
         if array.is_none() {
-            entry.wrong(format!("`{}` has {count} items", entry.path), kind.expected.unwrap_or_default(), None);
+            entry.wrong(
+                format!("`{}` has {count} items", entry.path),
+                kind.expected.unwrap_or_default(),
+                None,
+            );
         }
         array
     }
@@ -186,9 +190,7 @@ impl<T: Choice> Value<Word> for T {
 
     fn schema(_: &Word, definitions: &mut Definitions) -> Keywords {
         let words = || {
-            let word = |((word, _), meaning): (&(&str, T), &&[&str])| {
-                json!({ "description": described(meaning), "type": "string", "const": word })
-            };
+            let word = |((word, _), meaning): (&(&str, T), &&[&str])| json!({ "description": described(meaning), "type": "string", "const": word });
             let words: Vec<Json> = T::CHOICES.iter().zip(T::MEANINGS).map(word).collect();
             json!({ "description": described(T::ABOUT), "oneOf": words })
         };

@@ -1,9 +1,9 @@
 //! `[morph.tune]`: what `fluxmorph morph --tune` may change, and how far.
 
 use crate::config::table::table;
+use crate::config::tables::remesh::POISSON;
 use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
-use crate::config::tables::remesh::POISSON;
 
 /// Exponents of a ratio of moduli.
 const DECADES: Range = Range::closed(-9.0, 9.0);
