@@ -6,9 +6,9 @@
 use std::path::Path;
 
 use cpu_time::ProcessTime;
+use fluxmorph::build::{Purpose, build_mesh, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::fields;
-use fluxmorph::setup::{Purpose, build_mesh, set_up};
+use fluxmorph::files::fields;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;

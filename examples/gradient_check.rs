@@ -3,8 +3,8 @@
 //! `cargo run --release --example gradient_check`
 
 use fluxmorph::Error;
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify};
 
 pub(crate) fn main() -> Result<(), Error> {

@@ -3,9 +3,9 @@
 //! `cargo run --release --example optimisation`
 
 use fluxmorph::Error;
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::{Config, Optimizer};
-use fluxmorph::observer::Console;
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::show::Console;
 use fluxmorph_optimizer::driver::{Unrecorded, optimise};
 
 pub(crate) fn main() -> Result<(), Error> {
@@ -13,7 +13,7 @@ pub(crate) fn main() -> Result<(), Error> {
         Config::from_str(include_str!("../configs/shield_quick.toml"), "shield_quick.toml")?;
     let mut problem = set_up(&config, &source, Purpose::Optimisation)?.problem;
 
-    // Seven evaluations are enough to see the frame; `session::run` would also write a run directory.
+    // Seven evaluations are enough to see the frame; `run::run` would also write a run directory.
     let settings = Optimizer { max_evaluations: 7, ..config.optimizer };
     let mut console = Console::new(std::io::stdout());
     let optimised = optimise(&mut problem, &settings.settings(), &mut console, &mut Unrecorded, &|| false)?;

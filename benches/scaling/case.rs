@@ -4,11 +4,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::fields;
-use fluxmorph::observer::Silent;
-use fluxmorph::output::peak_memory_bytes;
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::files::fields;
+use fluxmorph::files::peak_memory_bytes;
+use fluxmorph::show::Silent;
 use fluxmorph_optimizer::driver::{self, Unrecorded};
 use fluxmorph_optimizer::problem::{Derivatives, Problem};
 use fluxmorph_optimizer::problem::{NoProgress, SolverCache};

@@ -9,8 +9,8 @@ use fluxmorph_solver::SolverError;
 
 use crate::config::ConfigError;
 use crate::exit_code::ExitCode;
-use crate::output::{DesignFileError, OutputError};
-use crate::sweep::SweepError;
+use crate::files::{DesignFileError, OutputError};
+use crate::run::sweep::SweepError;
 
 /// Errors of the program.
 #[derive(Debug, thiserror::Error)]

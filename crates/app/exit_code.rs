@@ -2,7 +2,7 @@
 
 use fluxmorph_optimizer::driver::StopReason;
 
-use crate::output::RunStatus;
+use crate::files::RunStatus;
 
 /// How the process ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SpherePara
 
 use crate::case::{Case, overwrite, read};
 use crate::program::app::config::{Config, MeshConfig, SourceMap, resolved_toml};
-use crate::program::app::setup::build_mesh;
+use crate::program::app::build::build_mesh;
 use crate::program::{folder, text};
 
 /// The configuration must be that of its resolved form, bit for bit.

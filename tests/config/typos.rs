@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use crate::looks::report;
 use crate::program::app::config::Config;
-use crate::program::app::setup::build_mesh;
+use crate::program::app::build::build_mesh;
 use crate::program::repository;
 
 /// Least share of typos for which the original is suggested.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use fluxmorph::journal::Journal;
-use fluxmorph::output::{RunDirectory, system_disk};
+use fluxmorph::files::{RunDirectory, system_disk};
+use fluxmorph::run::journal::Journal;
 use fluxmorph_optimizer::driver::Record;
 
 use crate::support::folder::read_json;

@@ -1,10 +1,10 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::{Algorithm, Optimizer};
-use fluxmorph::observer::{Evaluation, Silent};
-use fluxmorph::output::{OlderRun, RunResult, system_disk};
-use fluxmorph::session::{self, Options};
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::files::{OlderRun, RunResult, system_disk};
+use fluxmorph::run::{self, Options};
+use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::problem::Problem;
 
@@ -166,7 +166,7 @@ fn a_run_at_two_frequencies_writes_both() {
     let older_run = OlderRun::Keep;
     let options = Options { disk: &disk, older_run, threads: 1, team: None, interrupted: &|| false };
     let result: RunResult =
-        session::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
+        run::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);
     let frequencies: Vec<f64> = result.states.iter().map(|state| state.frequency_hz).collect();
     assert_eq!(frequencies, result.frequencies_hz);

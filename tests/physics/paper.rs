@@ -4,11 +4,11 @@
 //! from it, with the tolerances that the shipped meshes are made for. Measured values are in docs/results.md; run with
 //! `--nocapture` to see them.
 
+use fluxmorph::build::Setup;
 use fluxmorph::config::Optimizer;
-use fluxmorph::fresh_mesh::{Gain, Shapes};
-use fluxmorph::observer::{Evaluation, Silent};
-use fluxmorph::output::{ObjectiveResult, StopReason};
-use fluxmorph::setup::Setup;
+use fluxmorph::files::{ObjectiveResult, StopReason};
+use fluxmorph::run::mesh_independence::{Gain, Shapes};
+use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::problem::Analysis;
 use fluxmorph_solver::recovery;

@@ -1,7 +1,7 @@
 //! What these tests ask of a problem: its value at a design, and where an optimisation ends.
 
 use fluxmorph::config::Optimizer;
-use fluxmorph::observer::{Evaluation, Silent};
+use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};

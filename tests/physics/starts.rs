@@ -5,9 +5,9 @@
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::Optimizer;
-use fluxmorph::output::StopReason;
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::files::StopReason;
 
 use crate::problems::{objective, optimised, variables};
 use crate::support::{self, setup};

@@ -4,9 +4,9 @@
 use std::path::Path;
 
 use fluxmorph::config::Algorithm;
-use fluxmorph::journal::{Identity, Journal};
-use fluxmorph::observer::Evaluation;
-use fluxmorph::output::{OlderRun, RunDirectory};
+use fluxmorph::files::{OlderRun, RunDirectory};
+use fluxmorph::run::journal::{Identity, Journal};
+use fluxmorph::show::Evaluation;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::nlopt::{Minimisation, Sample, minimise};

@@ -6,8 +6,8 @@ use std::path::Path;
 use fluxmorph::Error;
 use fluxmorph::ExitCode;
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::output::{OutputError, RunResult};
-use fluxmorph::session::Limits;
+use fluxmorph::files::{OutputError, RunResult};
+use fluxmorph::run::Limits;
 use rayon::prelude::*;
 
 use crate::disk::{Fault, SimulatedDisk};

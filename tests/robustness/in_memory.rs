@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use fluxmorph::Error;
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::observer::Silent;
-use fluxmorph::output::{Disk, OlderRun, RunResult};
-use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph::files::{Disk, OlderRun, RunResult};
+use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::show::Silent;
 
 use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS};
 use crate::support::{self, changed, parsed};
@@ -49,11 +49,11 @@ pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
 pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
     let options =
         Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
-    session::run(config, source, options, &mut Silent)
+    run::run(config, source, options, &mut Silent)
 }
 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
     let options = Options { disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
-    session::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
+    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::journal;
-use fluxmorph::output::Disk;
-use fluxmorph::session::Limits;
+use fluxmorph::files::Disk;
+use fluxmorph::run::Limits;
+use fluxmorph::run::journal;
 
 use crate::disk::SimulatedDisk;
 use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, with_rounds};

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::fields::{self, FieldData};
-use fluxmorph::observer::Silent;
-use fluxmorph::output::{Disk, OlderRun, RunDirectory, system_disk};
-use fluxmorph::report::ReportedRun;
-use fluxmorph::session::{self, Options};
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::files::fields::{self, FieldData};
+use fluxmorph::files::{Disk, OlderRun, RunDirectory, system_disk};
+use fluxmorph::run::{self, Options};
+use fluxmorph::show::Silent;
+use fluxmorph::show::report::ReportedRun;
 use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
 use fluxmorph_geometry::{ElementId, Partition};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
@@ -25,7 +25,7 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
     let (mut config, source) = Config::from_file(&path, &overrides).unwrap();
     config.output.directory = directory.to_owned();
     let options = Options { disk, older_run: OlderRun::Keep, threads: 2, team: None, interrupted: &|| false };
-    session::run(&config, &source, options, &mut Silent).unwrap();
+    run::run(&config, &source, options, &mut Silent).unwrap();
     let problem = set_up(&config, &source, Purpose::Optimisation).unwrap().problem;
     let initial = problem.shape().unwrap().initial().to_vec();
     let analysis =

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph::journal;
+use fluxmorph::run::journal;
 use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::problem::Timings;
 use serde_json::Value;

@@ -14,8 +14,8 @@ pub(crate) mod whole;
 
 use std::path::PathBuf;
 
+use fluxmorph::build::{Purpose, Setup, set_up};
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::setup::{Purpose, Setup, set_up};
 
 /// A file of the repository.
 pub(crate) fn repository(path: &str) -> PathBuf {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph::journal::{self, Rest};
+use fluxmorph::run::journal::{self, Rest};
 use fluxmorph_geometry::io::read_vtu;
 
 /// What the ends of logs may look like.

@@ -8,11 +8,11 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::template::Template;
 use super::{examples, exit};
+use crate::build::memory_limit;
+use crate::build::with_names;
 use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
 use crate::error::Error;
-use crate::memory_limit;
-use crate::output::OlderRun;
-use crate::setup::with_names;
+use crate::files::OlderRun;
 
 pub use sweep::{Scheduler, SweepArgs};
 

@@ -8,7 +8,7 @@ use super::args::{Cli, GenerateArgs, Generated};
 use super::stdout;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::output::{OutputError, system_disk, write_whole};
+use crate::files::{OutputError, system_disk, write_whole};
 use crate::schema;
 
 /// Print what is asked for.

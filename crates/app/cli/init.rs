@@ -9,7 +9,7 @@ use super::args::InitArgs;
 use super::template::Template;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::output::{OutputError, shell_word, system_disk, write_whole};
+use crate::files::{OutputError, shell_word, system_disk, write_whole};
 
 /// Do what the command line says.
 ///

@@ -15,7 +15,7 @@ use super::ExitCode;
 use super::launcher;
 use super::ranks::is_worker;
 use crate::error::Error;
-use crate::observer;
+use crate::show;
 use fluxmorph_optimizer::Error as OptimizerError;
 
 /// What is shown at the first signal of a run.
@@ -81,7 +81,7 @@ pub(super) fn watch(message: &'static str) -> Signal {
         std::thread::spawn(move || {
             if signals.forever().next().is_some() && speaks {
                 // A second signal ends the process where it stands: from here on nothing is left to tidy up.
-                observer::clear();
+                show::clear();
                 let _ = writeln!(std::io::stderr(), "{message}");
             }
         });

@@ -24,14 +24,14 @@ use std::io::Write;
 
 use clap::Parser;
 
+use crate::build::locate_error;
 use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::launcher;
-use crate::observer::{Bar, Console, Quiet, RunObserver};
-use crate::output::DesignFileError;
-use crate::setup::blame;
+use crate::files::DesignFileError;
+use crate::run::launcher;
+use crate::show::{Bar, Console, Quiet, RunObserver};
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -91,7 +91,7 @@ fn message(error: &Error) -> String {
         Error::Config(ConfigError::Invalid(report)) | Error::Design(DesignFileError::Fault(report)) => {
             diagnostics::render(report, Style::for_stderr())
         }
-        other => match blame::keys_of_advice(other) {
+        other => match locate_error::keys_of_advice(other) {
             Some(keys) => format!("error: {other} ({keys})"),
             None => format!("error: {other}"),
         },

@@ -4,9 +4,9 @@ use super::args::MorphArgs;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::morph::{self, Parameters};
-use crate::output::system_disk;
-use crate::session::Options;
+use crate::files::system_disk;
+use crate::run::Options;
+use crate::run::morph::{self, Parameters};
 use fluxmorph_optimizer::driver::StopReason;
 
 /// Do what the command line says.

@@ -2,7 +2,7 @@
 //!
 //! A panic inside NLopt's callback and one on a worker thread come out on the thread of the command
 //! ([`fluxmorph_optimizer::nlopt`]); the session marks its manifest as failed on the way
-//! ([`crate::session`]). Here it ends.
+//! ([`crate::run`]). Here it ends.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::Write;
@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::exit_code::ExitCode;
-use crate::observer;
+use crate::show;
 
 /// Does the work; a panic is told once, and ends as a numerical failure.
 pub(super) fn reported(work: impl FnOnce() -> ExitCode) -> ExitCode {
@@ -20,7 +20,7 @@ pub(super) fn reported(work: impl FnOnce() -> ExitCode) -> ExitCode {
         if told.swap(true, Ordering::SeqCst) {
             return;
         }
-        observer::clear();
+        show::clear();
         let backtrace = Backtrace::capture();
         let mut stderr = std::io::stderr();
         let _ = writeln!(stderr, "{}", message(info));

@@ -12,11 +12,11 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
+use crate::build::Purpose;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::session;
-use crate::setup::Purpose;
+use crate::run;
 
 /// The ranks that this process belongs to. Dropped at the first rank, it ends the others: cleanly, or where this one panics
 /// at once, since they may wait for it in the middle of their work. So it is at a worker that leaves before it was shut down.
@@ -96,7 +96,7 @@ impl Ranks {
         purpose: Purpose,
     ) -> Option<ExitCode> {
         let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
-        session::serve(group, config, source, purpose);
+        run::serve(group, config, source, purpose);
         Some(ExitCode::Success)
     }
 }

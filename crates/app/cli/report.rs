@@ -1,13 +1,13 @@
 //! `fluxmorph report`: one HTML page from a run directory.
 
 use super::args::ReportArgs;
+use crate::build::memory_limit;
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::memory_limit;
-use crate::observer::{Console, Observer};
-use crate::output::system_disk;
-use crate::report::ReportedRun;
+use crate::files::system_disk;
+use crate::show::report::ReportedRun;
+use crate::show::{Console, Observer};
 
 /// Do what the command line says.
 ///

@@ -8,15 +8,15 @@ use super::args::{ResumeArgs, RunArgs};
 use super::interrupt::{self, Signal};
 use super::ranks::Ranks;
 use super::{observer, stdout, with_threads};
+use crate::build::Purpose;
+use crate::build::memory_limit;
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::memory_limit;
-use crate::observer::RunObserver;
-use crate::output::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::report::ReportedRun;
-use crate::session::{self, Limits, Options, SavedRun};
-use crate::setup::Purpose;
+use crate::files::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
+use crate::run::{self, Limits, Options, SavedRun};
+use crate::show::RunObserver;
+use crate::show::report::ReportedRun;
 
 /// Do what the command line says.
 ///
@@ -36,7 +36,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         let team = ranks.group();
         let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
-        let result = session::run(&config, &source, options, &mut *observer);
+        let result = run::run(&config, &source, options, &mut *observer);
         let report = config.output.report.then_some(&disk);
         let json = args.common.work.json;
         let ended = Ended { directory: &config.output.directory, report, json };
@@ -72,7 +72,7 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         let report = config.output.report.then_some(&disk);
         let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);
-        let result = session::resume(saved, limits, options, &mut *observer);
+        let result = run::resume(saved, limits, options, &mut *observer);
         let ended = Ended { directory: &args.directory, report, json: args.work.json };
         concluded(result, &ended, &signal, &mut *observer)
     });

@@ -3,11 +3,11 @@
 use super::args::SolveArgs;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
+use crate::build::{Purpose, variable_count};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::output::{read_design, system_disk};
-use crate::session::{self, Options};
-use crate::setup::{Purpose, variable_count};
+use crate::files::{read_design, system_disk};
+use crate::run::{self, Options};
 
 /// Do what the command line says.
 ///
@@ -30,7 +30,7 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
         let older_run = args.common.older_run();
         let team = ranks.group();
         let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
-        let result = session::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
+        let result = run::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {
             stdout::print_json(&result)?;
         }

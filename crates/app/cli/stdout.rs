@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::output::OutputError;
+use crate::files::OutputError;
 
 /// Print a text as it is.
 ///

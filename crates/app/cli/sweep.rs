@@ -9,11 +9,11 @@ use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::observer::{Console, Observer};
-use crate::output::{OlderRun, OutputError, shell_word, system_disk};
-use crate::sweep::{
+use crate::files::{OlderRun, OutputError, shell_word, system_disk};
+use crate::run::sweep::{
     Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
 };
+use crate::show::{Console, Observer};
 
 /// What is shown at the first signal.
 const FINISHES_RUNS: &str =

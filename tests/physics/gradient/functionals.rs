@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_optimizer::problem::Problem;
 
 use super::{MESHED, Settings, certify, check, wavy};

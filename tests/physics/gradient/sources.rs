@@ -1,6 +1,6 @@
 //! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
 
-use fluxmorph::setup::{Purpose, Setup, set_up};
+use fluxmorph::build::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify};
 
 use super::{MESHED, check, wavy};

@@ -1,7 +1,7 @@
 //! From the tables of sources to the field model, and what is refused on the way.
 
+use fluxmorph::build::{Purpose, Setup, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::setup::{Purpose, Setup, set_up};
 use fluxmorph_solver::coil::CoilShape;
 
 const BLOCK: &str = r#"

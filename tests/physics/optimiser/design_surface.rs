@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use fluxmorph::build::{Purpose, set_up, variable_count};
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::setup::{Purpose, set_up, variable_count};
 
 /// The quick shield with another `[design]` in place of its surface, direction and grid.
 fn designed(design: &str) -> (Config, SourceMap) {

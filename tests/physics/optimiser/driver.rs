@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::{Algorithm, Config, Optimizer};
-use fluxmorph::observer::{Evaluation, Observer, Silent};
-use fluxmorph::output::StopReason;
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::files::StopReason;
+use fluxmorph::show::{Evaluation, Observer, Silent};
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};

@@ -1,6 +1,6 @@
 //! What is not finite is refused by name, before an optimiser sees it.
 
-use fluxmorph::setup::{Purpose, set_up};
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::problem::finite;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use fluxmorph::build::{Purpose, Setup, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::setup::{Purpose, Setup, set_up};
 use fluxmorph_optimizer::geometric::{Bound, MARGIN, ThicknessBound, Volume};
 use fluxmorph_optimizer::problem::Problem;
 

@@ -4,11 +4,11 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph::observer::Silent;
-use fluxmorph::output::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph::report::ReportedRun;
-use fluxmorph::session::{self, Limits, Options, SavedRun};
-use fluxmorph::setup::Purpose;
+use fluxmorph::build::Purpose;
+use fluxmorph::files::{OlderRun, RunResult, StopReason, system_disk};
+use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::show::Silent;
+use fluxmorph::show::report::ReportedRun;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
 
 use crate::support;
@@ -39,7 +39,7 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
         let (mut config, source) = support::config(CONFIG, &SETTINGS);
         config.output.directory = directory.to_owned();
         if let Some(team) = team.filter(|team| team.role() == Role::Worker) {
-            session::serve(team, &config, &source, Purpose::Optimisation);
+            run::serve(team, &config, &source, Purpose::Optimisation);
             return None;
         }
         let asked = Cell::new(0);
@@ -52,9 +52,9 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
         let result = match task {
             Task::Resume => {
                 let saved = SavedRun::open(&disk, directory).expect("there is a run");
-                session::resume(saved, Limits::default(), options, &mut Silent)
+                run::resume(saved, Limits::default(), options, &mut Silent)
             }
-            _ => session::run(&config, &source, options, &mut Silent),
+            _ => run::run(&config, &source, options, &mut Silent),
         };
         if let Some(team) = team {
             team.shut_down();

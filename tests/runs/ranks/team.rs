@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use fluxmorph::session;
-use fluxmorph::setup::{Purpose, Setup, set_up_watched};
+use fluxmorph::build::{Purpose, Setup, set_up_watched};
+use fluxmorph::run;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
 
 use crate::support;
@@ -19,7 +19,7 @@ pub(crate) fn led<T: Send>(
         let team = RankGroup::new(ranks, Arc::default());
         let (config, source) = support::config(name, overrides);
         if team.role() == Role::Worker {
-            session::serve(&team, &config, &source, Purpose::Optimisation);
+            run::serve(&team, &config, &source, Purpose::Optimisation);
             return None;
         }
         let setup = set_up_watched(&config, &source, Purpose::Optimisation, Some(&team), &mut |_| ());

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{LimitArgs, key_value, threads, whole_number};
-use crate::output::OlderRun;
-use crate::session::Limits;
-use crate::sweep::{Outside, Request};
+use crate::files::OlderRun;
+use crate::run::Limits;
+use crate::run::sweep::{Outside, Request};
 
 /// Options of `sweep`.
 #[derive(Debug, Args)]

@@ -4,8 +4,8 @@
 
 use fluxmorph_geometry::tet4::{norm, sub};
 
+use crate::build::Setup;
 use crate::config::{Coil, CoilShape, Config, ElementOrder, MeshConfig};
-use crate::setup::Setup;
 
 /// Worst quality (Eq. 4) below which a mesh from a file is better made again. Generated meshes are layered on purpose, and
 /// move along their layers.
@@ -75,7 +75,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::setup::{Purpose, set_up};
+    use crate::build::{Purpose, set_up};
 
     fn of(configuration: &str, overrides: &[&str]) -> Vec<String> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(configuration);

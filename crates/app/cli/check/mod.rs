@@ -13,7 +13,7 @@ use super::args::{CheckArgs, Progress};
 use super::{stdout, with_threads};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::observer::{Bar, Observer, Silent, Styles};
+use crate::show::{Bar, Observer, Silent, Styles};
 
 /// Set the problem up and print what it is, as a table or JSON.
 ///

@@ -8,16 +8,16 @@ use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
+use crate::build::memory_limit;
+use crate::build::{Purpose, Setup, set_up_watched};
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
 };
 use crate::error::Error;
-use crate::fresh_mesh;
-use crate::memory_limit;
-use crate::morph::{self, MotionSummary};
-use crate::output::OlderRun;
-use crate::setup::{Purpose, Setup, set_up_watched};
+use crate::files::OlderRun;
+use crate::run::mesh_independence;
+use crate::run::morph::{self, MotionSummary};
 use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::problem::Progress;
 
@@ -192,7 +192,7 @@ pub(super) fn summary<'a>(
         probes: &config.probes,
         output_directory: config.output.directory.display().to_string(),
         memory_estimate_bytes: of_evaluation(problem)
-            .max(fresh_mesh::memory_estimate(config, problem).unwrap_or(0)),
+            .max(mesh_independence::memory_estimate(config, problem).unwrap_or(0)),
         warnings,
     })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::summary::{FieldProblem, Summary};
 use super::table::{Align, Table};
 use crate::config::{CoilShape, Constraint, DesignDirection, Goal, Limit, RemeshExtent, UpperBound};
-use crate::output::shell_word;
+use crate::files::shell_word;
 
 /// Names stand in a column of this width: the longest is `design variables`.
 const NAMES: usize = 18;

@@ -7,8 +7,8 @@ mod session;
 
 use std::path::{Path, PathBuf};
 
+use fluxmorph::build::{Purpose, set_up};
 use fluxmorph::config::{Config, Goal, Optimizer};
-use fluxmorph::setup::{Purpose, set_up};
 use fluxmorph_geometry::fem::{c64, norm};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::{FieldModel, FieldModelSetup};

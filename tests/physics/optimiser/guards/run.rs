@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use fluxmorph::ExitCode;
 use fluxmorph::config::{Algorithm, Optimizer};
-use fluxmorph::observer::{Evaluation, Observer, Silent};
-use fluxmorph::output::{OutputError, RunStatus, StopReason};
+use fluxmorph::files::{OutputError, RunStatus, StopReason};
+use fluxmorph::show::{Evaluation, Observer, Silent};
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};

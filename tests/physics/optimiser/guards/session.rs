@@ -4,9 +4,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use fluxmorph::config::Config;
-use fluxmorph::observer::{Evaluation, Observer, RunObserver, Silent};
-use fluxmorph::output::{OlderRun, system_disk};
-use fluxmorph::session::{self, Limits, Options, SavedRun};
+use fluxmorph::files::{OlderRun, system_disk};
+use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::show::{Evaluation, Observer, RunObserver, Silent};
 use serde_json::Value;
 
 use super::quick_path;
@@ -36,7 +36,7 @@ fn run(directory: &Path, observer: &mut dyn RunObserver) -> Result<(), fluxmorph
     let disk = system_disk();
     let options =
         Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
-    session::run(&config, &source, options, observer).map(drop)
+    run::run(&config, &source, options, observer).map(drop)
 }
 
 #[test]
@@ -57,8 +57,7 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     let options =
         Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
     let limits = Limits { max_evaluations: None, max_time: None };
-    let resumed =
-        session::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();
+    let resumed = run::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();
     run(&sound, &mut Silent).unwrap();
     let expected = json(&sound.join("result.json"));
     assert_eq!(expected["objective"], json(&broken.join("result.json"))["objective"]);

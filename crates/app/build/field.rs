@@ -1,0 +1,286 @@
+//! The field problems of a configuration.
+
+use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
+use fluxmorph_geometry::{Mesh, Topology};
+use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
+use fluxmorph_solver::linear::{
+    DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
+};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, SolverError, UniformField};
+
+use super::locate_error::DiagnosticSink;
+use crate::config::{
+    self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
+    SolverMethod, SourceMap,
+};
+use crate::error::Error;
+use fluxmorph_optimizer::Error as OptimizerError;
+
+/// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
+pub(super) fn without_impedance_regions(
+    config: &Config,
+    full: &Mesh,
+) -> Result<(Mesh, Vec<Conductor>), Error> {
+    let mut mesh = full.clone();
+    let replaced: Vec<&String> = config
+        .regions
+        .iter()
+        .filter(|(_, r)| r.model == RegionModel::Impedance)
+        .map(|(name, _)| name)
+        .collect();
+    for name in &replaced {
+        mesh = mesh.without_region(full.topology().region(name)?)?.0;
+    }
+    // Node numbers are final only now: expose each surface on the last mesh through the positions it kept.
+    let mut conductors = Vec::new();
+    for name in replaced {
+        let surface = exposed_surface(full, &mesh, name)?;
+        conductors.push(Conductor { name: name.clone(), surface, material: super::material(config, name) });
+    }
+    Ok((mesh, conductors))
+}
+
+/// The faces of `mesh` that the region `name` of `full` covered, oriented out of `mesh`.
+fn exposed_surface(
+    full: &Mesh,
+    mesh: &Mesh,
+    name: &str,
+) -> Result<Vec<[fluxmorph_geometry::NodeId; 3]>, Error> {
+    let region = full.topology().region(name)?;
+    let key = |p: [f64; 3]| p.map(f64::to_bits);
+    let faces: std::collections::HashSet<_> = full
+        .topology()
+        .facets()
+        .iter()
+        .filter(|f| {
+            let at = |e: fluxmorph_geometry::ElementId| full.topology().region_of()[e.index()] == region;
+            f.outside.is_some_and(|outside| at(f.inside) != at(outside))
+        })
+        .map(|f| {
+            let mut corners = f.nodes.map(|n| key(full.point(n)));
+            corners.sort_unstable();
+            corners
+        })
+        .collect();
+    Ok(mesh
+        .topology()
+        .facets()
+        .iter()
+        .filter(|f| f.outside.is_none())
+        .filter(|f| {
+            let mut corners = f.nodes.map(|n| key(mesh.point(n)));
+            corners.sort_unstable();
+            faces.contains(&corners)
+        })
+        .map(|f| f.nodes)
+        .collect())
+}
+
+/// The field models of a configuration on its mesh, one a frequency.
+pub(super) fn field_models(
+    config: &Config,
+    mesh: &Mesh,
+    impedance_surfaces: &[Conductor],
+    coils: &[coil::Coil],
+    share: Option<&Ownership>,
+) -> Result<Vec<FieldModel>, Error> {
+    let mut models: Vec<FieldModel> = Vec::new();
+    for &frequency in config.analysis.frequencies() {
+        // A model above 0 Hz shares all but its numbers with another.
+        models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
+            Some(model) => model.at_frequency(mesh, frequency)?,
+            None => {
+                let sources = (impedance_surfaces.to_vec(), coils.to_vec());
+                field_model(config, mesh, frequency, sources, share)?
+            }
+        });
+    }
+    Ok(models)
+}
+
+fn field_model(
+    config: &Config,
+    mesh: &Mesh,
+    frequency: f64,
+    (impedance_surfaces, coils): (Vec<Conductor>, Vec<coil::Coil>),
+    share: Option<&Ownership>,
+) -> Result<FieldModel, Error> {
+    let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
+    let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
+        names.iter().map(|name| (name.clone(), boundary)).collect()
+    };
+    let mut boundaries = of(&config.boundaries.flux_parallel, Boundary::FluxParallel);
+    boundaries.extend(of(&config.boundaries.flux_normal, Boundary::FluxNormal));
+    if let Some(field) = &config.boundaries.uniform_field {
+        let applied = UniformField { flux_density: field.b, centre: field.center };
+        boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
+    }
+    let linear_solver = linear_solver(&config.analysis.linear_solver);
+    let setup = FieldModelSetup {
+        frequency,
+        penalty: config.analysis.penalty,
+        order: order(config),
+        materials,
+        remanence: remanences(config, mesh.topology()),
+        impedance_surfaces,
+        coils,
+        boundaries,
+        linear_solver,
+        ownership: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
+    };
+    Ok(FieldModel::new(mesh, setup)?)
+}
+
+/// How the linear systems are solved.
+fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
+    let method = match options.method {
+        SolverMethod::Automatic => LinearSolver::Automatic,
+        SolverMethod::Direct => LinearSolver::Fixed(Method::Direct),
+        SolverMethod::DirectSingle => LinearSolver::Fixed(Method::DirectSingle),
+        SolverMethod::RealFactor => LinearSolver::Fixed(Method::RealFactor),
+        SolverMethod::RealFactorSingle => LinearSolver::Fixed(Method::RealFactorSingle),
+        SolverMethod::Incomplete => LinearSolver::Fixed(Method::Incomplete),
+        SolverMethod::TwoLevel => LinearSolver::Fixed(Method::TwoLevel),
+    };
+    let reuse = match options.reuse {
+        FactorReuse::WhileItPays => Reuse::WhileItPays,
+        FactorReuse::Never => Reuse::Never,
+    };
+    LinearSolverSettings {
+        method,
+        reuse,
+        tolerance: options.tolerance,
+        factor_bytes: (options.factor_gib * GIB) as usize,
+        ..LinearSolverSettings::default()
+    }
+}
+
+/// How they are solved on several ranks.
+fn distributed(options: &config::Petsc) -> DistributedSettings {
+    DistributedSettings {
+        method: match options.solver {
+            PetscSolver::Automatic => None,
+            PetscSolver::Mumps => Some(DistributedMethod::Direct),
+            PetscSolver::Asm => Some(DistributedMethod::Schwarz),
+        },
+        krylov: match options.krylov {
+            PetscKrylov::Gmres => Krylov::Gmres,
+            PetscKrylov::Cocg => Krylov::Cocg,
+        },
+        overlap: options.overlap,
+        sub_solver: match options.sub_solver {
+            PetscSubSolver::Incomplete => SubSolver::Incomplete,
+            PetscSubSolver::Complete => SubSolver::Complete,
+        },
+    }
+}
+
+/// Bytes of a GiB.
+const GIB: f64 = (1u64 << 30) as f64;
+
+/// The order of the elements.
+pub(super) fn order(config: &Config) -> Order {
+    match config.analysis.order {
+        config::ElementOrder::Linear => Order::Linear,
+        config::ElementOrder::Quadratic => Order::Quadratic,
+    }
+}
+
+/// A coil of the configuration on its mesh.
+fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
+    let frame = |center, axis: config::Axis, direction| Frame::new(center, axis.vector(), direction);
+    let shape = match &coil.shape {
+        config::CoilShape::Racetrack(r) => {
+            let corner = match r.corner {
+                config::Corner::Sharp(config::CornerWord::Mitred) => coil::Corner::Mitred,
+                config::Corner::Round(inner_radius) => coil::Corner::Round { inner_radius },
+            };
+            let frame = frame(r.center, r.axis, r.direction)?;
+            Racetrack::in_frame(frame, r.half_window, r.width, r.height, corner)?.into()
+        }
+        config::CoilShape::Rectangular(r) => {
+            let frame = frame(r.center, r.axis, r.direction)?;
+            Racetrack::in_frame(frame, r.half_window, r.width, r.height, coil::Corner::Mitred)?.into()
+        }
+        config::CoilShape::Circular(c) => {
+            Racetrack::circular(frame(c.center, c.axis, None)?, c.radius, c.width, c.height)?.into()
+        }
+        config::CoilShape::Region(region) => {
+            let topology = mesh.topology();
+            let elements = topology.elements_of(topology.region(&region.region)?);
+            let terminal = |name: &String| -> Result<Terminal, Error> {
+                Ok(Terminal { name: name.clone(), triangles: topology.surface(name)?.to_vec() })
+            };
+            let path = match &region.path {
+                config::CoilPath::Terminals { terminals: [from, to] } => {
+                    Path::Terminals { from: terminal(from)?, to: terminal(to)? }
+                }
+                config::CoilPath::Closed { center, axis } => Path::Closed(frame(*center, *axis, None)?),
+            };
+            RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
+        }
+    };
+    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
+}
+
+/// What to tell the user about the current of each coil region.
+pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
+    let notice = |coil: &coil::Coil| match &coil.shape {
+        CoilShape::Racetrack(_) => None,
+        CoilShape::Region(current) => Some(format!("coil `{}`: {}", coil.name, current.report())),
+    };
+    model.coils().iter().filter_map(notice).collect()
+}
+
+/// The coils on the mesh, or the faults of all of them.
+pub(super) fn coils(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<Vec<coil::Coil>, Error> {
+    let mut sink = DiagnosticSink::new(config, source, Vec::new());
+    let mut coils = Vec::new();
+    for (i, written) in config.coils.iter().enumerate() {
+        let made = coil(written, mesh).map_err(|error| match error {
+            Error::Optimizer(OptimizerError::Solver(SolverError::Parameter { ref what, .. })) => {
+                source.error(vec![source.diagnostic(&format!("coils[{i}].{what}"), error.to_string())]).into()
+            }
+            other => other,
+        });
+        coils.extend(sink.take(made)?);
+    }
+    sink.check()?;
+    Ok(coils)
+}
+
+/// Every region that no coil can be, and every phase that means nothing.
+pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let is_static = config.analysis.frequencies().contains(&0.0);
+    for (i, coil) in config.coils.iter().enumerate() {
+        if is_static && coil.phase != 0.0 {
+            let fault = source.diagnostic(&format!("coils[{i}].phase"), "a static current has no phase");
+            faults.push(
+                fault.expected("no phase, or frequencies above 0 Hz; a reversed current is a negative one"),
+            );
+        }
+        let config::CoilShape::Region(region) = &coil.shape else { continue };
+        let (path, name) = (format!("coils[{i}].region"), &region.region);
+        if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
+            let fault = source.diagnostic(&path, format!("`{name}` is replaced by its impedance surface"));
+            faults.push(fault.expected("a region that is meshed"));
+        } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
+            && super::material(config, name).conductivity > 0.0
+        {
+            let message = format!(
+                "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
+            );
+            faults.push(
+                source.diagnostic(&path, message).expected("a material without conductivity for the winding"),
+            );
+        }
+    }
+    faults
+}
+
+/// Remanence of every region [T], by `RegionId`; zero where there is no magnet.
+fn remanences(config: &Config, topology: &Topology) -> Vec<[f64; 3]> {
+    let of = |name: &String| config.regions.get(name).and_then(|region| region.remanence);
+    topology.region_names().iter().map(|name| of(name).unwrap_or_default()).collect()
+}

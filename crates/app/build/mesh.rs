@@ -1,0 +1,190 @@
+//! The mesh of a configuration: generated or read, with the interfaces that the configuration names.
+//!
+//! A surface name `"a|b"` that the mesh does not have stands for the faces between the regions `a` and `b`. It is added to
+//! the mesh under that name before anything else looks for it, so that every key may use it.
+
+use std::collections::{BTreeSet, HashSet};
+use std::path::Path;
+use std::sync::Arc;
+
+use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
+use fluxmorph_geometry::io::msh::{MshError, Place as MshPlace};
+use fluxmorph_geometry::io::read_msh_file;
+use fluxmorph_geometry::topology::OUTSIDE;
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
+
+use super::locate_error::with_advice;
+use crate::config::{
+    CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span,
+    Target,
+};
+use crate::error::Error;
+use crate::files::OutputError;
+
+/// A mesh with all its surfaces, and what was done to its file.
+pub(super) struct Built {
+    pub(super) mesh: Mesh,
+    pub(super) notices: Vec<String>,
+}
+
+/// Builds or reads the mesh of a configuration.
+pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error> {
+    let generated = |mesh: Result<Mesh, MeshError>| match mesh {
+        Ok(mesh) => Ok(Built { mesh, notices: Vec::new() }),
+        Err(error) => Err(parameter_fault(error, source)),
+    };
+    let built = match &config.mesh {
+        MeshConfig::Shield(parameters) => generated(shield(&parameters.parameters())),
+        MeshConfig::Block(parameters) => generated(block(&parameters.parameters())),
+        MeshConfig::Boxes(parameters) => generated(boxes(&parameters.parameters())),
+        MeshConfig::Sphere(parameters) => generated(sphere(&parameters.parameters())),
+        MeshConfig::File { path, unit } => read_msh_file(path, unit.metres())
+            .map(|read| {
+                let told = |message: String| format!("mesh file `{}`: {message}", path.display());
+                Built { mesh: read.mesh, notices: read.notices.messages().into_iter().map(told).collect() }
+            })
+            .map_err(|error| file_fault(error, source)),
+    }?;
+    Ok(Built { mesh: with_interfaces(built.mesh, &surface_names(config))?, ..built })
+}
+
+/// The unit in which the mesh of a configuration is written: that of its file, and millimetres for a generator.
+pub(crate) fn unit(config: &Config) -> LengthUnit {
+    match &config.mesh {
+        MeshConfig::File { unit, .. } => *unit,
+        _ => LengthUnit::Millimetre,
+    }
+}
+
+/// A parameter that a generator refuses becomes a fault at its key.
+fn parameter_fault(error: MeshError, source: &SourceMap) -> Error {
+    let MeshError::Parameter { parameter, value, expected } = error else { return error.into() };
+    let path = format!("mesh.{parameter}");
+    source.error(vec![source.diagnostic(&path, format!("{path} = {value}")).expected(expected)]).into()
+}
+
+/// A fault of a mesh file is shown at the key that names it.
+fn file_fault(error: MeshError, source: &SourceMap) -> Error {
+    match error {
+        MeshError::Msh { path, cause } => msh_fault(&path, &cause, source).into(),
+        MeshError::File { path, cause } => OutputError::io("read", path)(cause).into(),
+        other => other.into(),
+    }
+}
+
+/// A fault of a mesh file is shown in the file where that is text, and at the key that names it.
+fn msh_fault(path: &Path, error: &MshError, source: &SourceMap) -> ConfigError {
+    let file = path.display().to_string();
+    let mut fault = with_advice(source.diagnostic("mesh.file", format!("mesh file `{file}`, {error}")));
+    if path.extension().is_some_and(|extension| extension == "geo") {
+        fault.help = Some("this is the geometry: `gmsh -3 -format msh41` makes the mesh of it".to_owned());
+    }
+    let (MshPlace::Line(first_line), Some(excerpt)) = (error.place, &error.excerpt) else {
+        return source.error(vec![fault]);
+    };
+    let document = Document { name: file, text: excerpt.text.clone(), first_line };
+    let (source, number) = source.with_document(document);
+    let span = Span { document: number, range: excerpt.span.clone() };
+    let named = fault.span.clone();
+    source.error(vec![Diagnostic { span, ..fault }.secondary(named, "the file is named here")])
+}
+
+/// Every surface that the configuration names, with the path of its key.
+pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
+    let mut names = Vec::new();
+    let mut add = |path: &str, surfaces: &'a [String]| {
+        names.extend(surfaces.iter().enumerate().map(|(i, name)| (format!("{path}[{i}]"), name.as_str())));
+    };
+    add("boundaries.flux_parallel", &config.boundaries.flux_parallel);
+    add("boundaries.flux_normal", &config.boundaries.flux_normal);
+    if let Some(field) = &config.boundaries.uniform_field {
+        add("boundaries.uniform_field.surfaces", &field.surfaces);
+    }
+    for (i, coil) in config.coils.iter().enumerate() {
+        if let CoilShape::Region(region) = &coil.shape
+            && let CoilPath::Terminals { terminals } = &region.path
+        {
+            add(&format!("coils[{i}].terminals"), terminals.as_slice());
+        }
+    }
+    if let Some(remesh) = &config.remesh {
+        add("remesh.slide", &remesh.slide);
+        add("remesh.fixed", &remesh.fixed);
+        add("remesh.free", &remesh.free);
+    }
+    for (i, motion) in config.morph.iter().flat_map(|morph| &morph.motion).enumerate() {
+        if let Target::Surface(surfaces) = &motion.target {
+            add(&format!("morph.motion[{i}].surface"), surfaces);
+        }
+    }
+    let design = config.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
+    // By default it is the design surface, whose own key is the better place for a fault.
+    if config.output.stl != design {
+        add("output.stl", &config.output.stl);
+    }
+    if let [one] = design {
+        names.push(("design.surface".to_owned(), one.as_str()));
+    } else {
+        add("design.surface", design);
+    }
+    names
+}
+
+/// The mesh with a surface for every name of an interface; names that stand for none are left to [`surface_faults`].
+fn with_interfaces(mesh: Mesh, names: &[(String, &str)]) -> Result<Mesh, MeshError> {
+    let missing: BTreeSet<&str> = names
+        .iter()
+        .map(|(_, name)| *name)
+        .filter(|name| name.contains('|') && mesh.topology().surface(name).is_err())
+        .collect();
+    let found: Vec<_> = missing
+        .into_iter()
+        .filter_map(|name| Some((name, mesh.topology().faces_between(name).ok()?)))
+        .collect();
+    if found.is_empty() {
+        return Ok(mesh);
+    }
+    let mut topology = mesh.topology().as_ref().clone();
+    for (name, faces) in found {
+        topology = topology.with_surface(name, faces)?;
+    }
+    Mesh::new(Arc::new(topology), mesh.points().to_vec())
+}
+
+/// Every surface named that the mesh does not have, or that is empty.
+pub(super) fn surface_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let surfaces: Vec<&str> = topology.surface_names().collect();
+    let mut sides: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+    sides.push(OUTSIDE);
+    let fault = |(path, name): (String, &str)| match topology.surface(name) {
+        Ok([]) => Some(source.diagnostic(&path, format!("the surface `{name}` has no triangles"))),
+        Ok(_) => None,
+        Err(_) => Some(match topology.faces_between(name) {
+            Err(MeshError::UnknownRegion { name, .. }) => source.unknown_name(&path, "region", &name, &sides),
+            Err(MeshError::NoInterface { .. }) => source
+                .diagnostic(&path, format!("the two sides of `{name}` have no face in common"))
+                .expected("two regions that touch, or a region that reaches the outside"),
+            _ => source.unknown_name(&path, "surface", name, &surfaces),
+        }),
+    };
+    surface_names(config).into_iter().filter(|(_, name)| !name.is_empty()).filter_map(fault).collect()
+}
+
+/// Every condition on a surface that does not lie at the outside of the mesh.
+pub(super) fn inner_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let outer: HashSet<[NodeId; 3]> =
+        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
+    surface_names(config)
+        .into_iter()
+        .filter(|(path, _)| path.starts_with("boundaries."))
+        .filter(|(_, name)| {
+            topology.surface(name).is_ok_and(|s| s.iter().any(|t| !outer.contains(&face_key(*t))))
+        })
+        .map(|(path, name)| {
+            source
+                .diagnostic(&path, format!("the surface `{name}` has faces inside the mesh"))
+                .expected("a surface at the outside of the mesh: conditions hold there")
+        })
+        .collect()
+}

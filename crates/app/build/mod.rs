@@ -1,0 +1,390 @@
+//! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
+//!
+//! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
+//! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
+//! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+
+mod design;
+mod field;
+mod functional;
+pub(crate) mod locate_error;
+pub(crate) mod memory_limit;
+pub(crate) mod mesh;
+mod motion;
+mod outline;
+mod shape;
+mod share;
+
+pub(crate) use design::triangulation as design_triangulation;
+pub use motion::{MotionSetup, set_up_motion};
+pub use outline::{Outline, OutlinedDesign, outline};
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::parallel::RankGroup;
+use fluxmorph_geometry::{Mesh, RegionId, Topology};
+use fluxmorph_solver::audit::{SkinAudit, skin_audit};
+use fluxmorph_solver::{FieldModel, Material};
+
+use crate::config::{self, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap};
+use crate::error::Error;
+use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::problem::{Progress, Stage};
+use locate_error::DiagnosticSink;
+
+/// A problem, and what the user should know of it.
+#[derive(Debug)]
+pub struct Setup {
+    /// The problem.
+    pub problem: Problem,
+    /// Skin-depth audit of every conductor.
+    pub audits: Vec<Audited>,
+    /// Warnings and notices, in the order found.
+    pub warnings: Vec<String>,
+    /// The mesh as read or generated, with all its regions.
+    pub full_mesh: Mesh,
+}
+
+/// The audit of one conductor and how it is modelled.
+#[derive(Debug)]
+pub struct Audited {
+    /// What was found.
+    pub audit: SkinAudit,
+    /// Meshed, or replaced by its impedance surface.
+    pub model: RegionModel,
+}
+
+impl Audited {
+    /// What to tell the user.
+    pub fn warning(&self) -> Option<String> {
+        match self.model {
+            RegionModel::Volume => self.audit.volume_warning(),
+            RegionModel::Impedance => self.audit.impedance_warning(),
+        }
+    }
+}
+
+/// Which parts of the configuration a command needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// A field analysis: objective and design take part where they are given.
+    Analysis,
+    /// A look at everything, without solving: with [morph] a field problem need not be complete.
+    Inspection,
+    /// An optimisation: objective, design and remesh region must be there.
+    Optimisation,
+}
+
+/// Builds or reads the mesh of a configuration, with the interfaces that the configuration names.
+///
+/// # Errors
+/// [`Error::Config`] for a parameter that a generator refuses or a mesh file that is damaged, [`Error::Output`] for a mesh
+/// file that cannot be read.
+pub fn build_mesh(config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
+    Ok(mesh::build(config, source)?.mesh)
+}
+
+/// Sets up the problem of a configuration.
+///
+/// # Errors
+/// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
+pub fn set_up(config: &Config, source: &SourceMap, purpose: Purpose) -> Result<Setup, Error> {
+    set_up_watched(config, source, purpose, None, &mut |_| ())
+}
+
+/// As [`set_up`], shared out among the ranks of a team if there is one: every rank sets the same up, and none but the first
+/// gives orders. `progress` hears of every stage as it begins.
+///
+/// # Errors
+/// As [`set_up`].
+pub fn set_up_watched(
+    config: &Config,
+    source: &SourceMap,
+    purpose: Purpose,
+    team: Option<&RankGroup>,
+    progress: &mut dyn Progress,
+) -> Result<Setup, Error> {
+    if purpose == Purpose::Optimisation {
+        config.optimisation(source)?;
+    }
+    made(config, source, purpose, team, progress)
+        .map_err(|error| locate_error::attribute_error(error, config, source))
+}
+
+fn made(
+    config: &Config,
+    source: &SourceMap,
+    purpose: Purpose,
+    team: Option<&RankGroup>,
+    progress: &mut dyn Progress,
+) -> Result<Setup, Error> {
+    progress.stage(Stage::Mesh);
+    let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
+    let mut faults = name_faults(config, source, full_mesh.topology());
+    if let Some(first) = faults.first_mut() {
+        // What was left out of the file is often why a name is not there.
+        let said = first
+            .help
+            .take()
+            .into_iter()
+            .chain(warnings.iter().map(|notice| format!("of the mesh: {notice}")));
+        first.help = Some(said.collect::<Vec<_>>().join("\n")).filter(|help| !help.is_empty());
+    }
+    source.check(faults)?;
+
+    let audits = audits(config, &full_mesh);
+    warnings.extend(audits.iter().filter_map(Audited::warning));
+    let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
+    let mut sink = DiagnosticSink::new(config, source, probe_faults(config, source, &full_mesh, &mesh));
+    let conditions = &config.boundaries;
+    let free = conditions.flux_parallel.is_empty()
+        && conditions.flux_normal.is_empty()
+        && conditions.uniform_field.is_none();
+    let motion_alone = purpose == Purpose::Inspection && config.morph.is_some();
+    if free && conductors.is_empty() && !motion_alone {
+        let fault = source
+            .diagnostic(
+                "boundaries",
+                "no surface has a condition: the potential is known up to a constant only",
+            )
+            .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
+        sink.take::<()>(Err(source.error(vec![fault]).into()))?;
+    }
+    progress.stage(Stage::Unknowns);
+    let share = team.map(|team| share::of_mesh(config, &mesh, team)).transpose()?;
+    let coils = sink.take(field::coils(config, source, &mesh))?;
+    let design = match (&config.design, &config.remesh) {
+        (Some(design), Some(remesh)) => Some(shape::Inputs {
+            source,
+            design,
+            remesh,
+            full_mesh: &full_mesh,
+            mesh: &mesh,
+            share: share.as_ref(),
+        }),
+        _ => None,
+    };
+    let body = match &design {
+        Some(inputs) => sink.take(shape::body(inputs, config, &mut warnings))?,
+        None => None,
+    };
+    // Neither needs the other: what is wrong with them is told together.
+    let states = match coils {
+        Some(coils) => sink.take(field::field_models(config, &mesh, &conductors, &coils, share.as_ref()))?,
+        None => None,
+    };
+    sink.check()?;
+    let states = states.expect("without faults there are coils and states");
+    warnings.extend(field::coil_notices(&states[0]));
+    if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
+        warnings.push(
+            "nothing excites a field, it is zero everywhere; add [[coils]], a magnet's remanence or an applied field"
+                .to_owned(),
+        );
+    }
+    let objective = functional::objective(config, &mesh, &states)?;
+    let (mut shape, mut constraints) = (None, Vec::new());
+    if let (Some(inputs), Some(body)) = (&design, body) {
+        let observed = functional::observed(config, &mesh, &states)?;
+        progress.stage(Stage::Elasticity);
+        let made = shape::shape(inputs, config, body, &states[0], &observed)?;
+        constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
+        shape = Some(made);
+    }
+    progress.stage(Stage::Other);
+    if shape.is_none() && !config.constraints.is_empty() {
+        warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
+    }
+    let problem = Problem::new(mesh, states, objective, constraints, shape).shared_out(share);
+    Ok(Setup { problem, audits, warnings, full_mesh })
+}
+
+/// Number of design variables of a configuration.
+///
+/// # Errors
+/// [`Error::Config`] when the configuration has no design or names no surface of the mesh.
+pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Error> {
+    let Some(design) = &config.design else {
+        let fault = source.diagnostic("design", "there is no [design], so a design has no meaning");
+        return Err(source.error(vec![fault]).into());
+    };
+    if let (Some([n, m]), []) = (design.grid, design.symmetry.as_slice()) {
+        return Ok(n * m);
+    }
+    let mesh = build_mesh(config, source)?;
+    source.check(name_faults(config, source, mesh.topology()))?;
+    Ok(design::surface(config, source, design, &mesh)?.variable_count())
+}
+
+/// Skin-depth audits of all conductors at all frequencies, on the mesh with all regions.
+fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
+    let of = |(name, region): (&String, &config::Region)| {
+        let id = mesh.topology().region(name).ok()?;
+        let material = material(config, name);
+        let at = |&frequency: &f64| {
+            let audit = skin_audit(mesh, id, &material, frequency, field::order(config))?;
+            Some(Audited { audit, model: region.model })
+        };
+        Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
+    };
+    config.regions.iter().filter_map(of).flatten().collect()
+}
+
+/// The material of a region; air where the configuration says nothing.
+fn material(config: &Config, region: &str) -> Material {
+    let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
+    entry.map_or(Material::AIR, |m| Material {
+        relative_permeability: m.relative_permeability,
+        conductivity: m.conductivity,
+    })
+}
+
+/// The peak phasor of a coil [A].
+fn phasor(coil: &config::Coil) -> c64 {
+    c64::from_polar(coil.ampere_turns, coil.phase)
+}
+
+/// Faults of a text from which on its names are not looked at as well.
+const MOST_BESIDE: usize = 100;
+
+/// A report of what is wrong with the text of a configuration, with what is wrong with its names in the mesh as well.
+///
+/// That is looked at where the tables of the mesh are sound. What could be read stands in for the rest: a name that is
+/// missing or faulty is empty, and left out.
+pub fn with_names(error: ConfigError) -> ConfigError {
+    match error {
+        ConfigError::Invalid(report) => ConfigError::Invalid(Box::new(report_with_names(*report))),
+        other => other,
+    }
+}
+
+fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
+    let DiagnosticReport { source, diagnostics: mut faults, of, unfinished } = report;
+    let of_mesh = |fault: &Diagnostic| {
+        let path = fault.path.as_str();
+        path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
+    };
+    let is_short = faults.len() <= MOST_BESIDE;
+    let Some(config) = unfinished.filter(|_| is_short && !faults.iter().any(of_mesh)) else {
+        return DiagnosticReport { source, diagnostics: faults, of, unfinished: None };
+    };
+    let confined = source.confined(config::OutputNamedBy::User).is_ok();
+    if confined && crate::build::memory_limit::check_mesh(&config, &source).is_ok() {
+        match mesh::build(&config, &source) {
+            Ok(built) => {
+                let found = names(&config, &source, built.mesh.topology());
+                // A place that has a fault already says enough.
+                let new = |fault: &Diagnostic| faults.iter().all(|known| known.span != fault.span);
+                let found: Vec<Diagnostic> = found.into_iter().filter(new).collect();
+                faults.extend(found);
+                faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
+            }
+            // Places of the mesh file belong to the texts of its own report, behind those of the configuration.
+            Err(Error::Config(ConfigError::Invalid(mut of_mesh))) => {
+                of_mesh.diagnostics.splice(0..0, faults);
+                return *of_mesh;
+            }
+            Err(_) => {}
+        }
+    }
+    DiagnosticReport { source, diagnostics: faults, of, unfinished: None }
+}
+
+/// Every name of the configuration that the mesh does not have, every region named that is empty, and every one that cannot
+/// be used as it is.
+fn name_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let mut faults = names(config, source, topology);
+    faults.extend(field::coil_faults(config, source));
+    faults.extend(mesh::inner_faults(config, source, topology));
+    faults.extend(functional::faults(config, source, topology));
+    faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
+    faults
+}
+
+/// Every name of the configuration that the mesh does not have, and every region named that is empty; empty names are left
+/// out.
+fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
+    let mut region = |path: String, name: &str| match topology.region(name) {
+        _ if name.is_empty() => {}
+        Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
+        Ok(id) if is_empty(topology, id) => {
+            faults.push(source.diagnostic(&path, format!("the region `{name}` has no elements")));
+        }
+        Ok(_) => {}
+    };
+    for name in config.regions.keys() {
+        region(format!("regions.{name}"), name);
+    }
+    for (i, coil) in config.coils.iter().enumerate() {
+        if let config::CoilShape::Region(own) = &coil.shape {
+            region(format!("coils[{i}].region"), &own.region);
+        }
+    }
+    for (path, name) in functional::regions(config) {
+        region(path, name);
+    }
+    if let Some(remesh) = &config.remesh {
+        if let config::RemeshExtent::Regions(names) = &remesh.extent {
+            for (i, name) in names.iter().enumerate() {
+                region(format!("remesh.region[{i}]"), name);
+            }
+        }
+        for (i, subregion) in remesh.subregions.iter().enumerate() {
+            region(format!("remesh.subregions[{i}].name"), &subregion.name);
+        }
+    }
+    faults.extend(mesh::surface_faults(config, source, topology));
+    faults
+}
+
+/// Every probe point that no element holds, before a run is spent on it.
+fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let points: Vec<(usize, usize, [f64; 3])> = config
+        .probes
+        .iter()
+        .enumerate()
+        .flat_map(|(i, probe)| probe.points.iter().enumerate().map(move |(j, &point)| (i, j, point)))
+        .collect();
+    let places: Vec<[f64; 3]> = points.iter().map(|&(_, _, point)| point).collect();
+    let outside: Vec<_> = points
+        .iter()
+        .zip(locate(mesh, &places))
+        .filter(|(_, found)| found.is_none())
+        .map(|(p, _)| *p)
+        .collect();
+    let places: Vec<[f64; 3]> = outside.iter().map(|&(_, _, point)| point).collect();
+    for ((i, j, point), replaced) in outside.into_iter().zip(locate(full_mesh, &places)) {
+        let at = millimetres(point);
+        let name = &config.probes[i].name;
+        let (message, expected) = match replaced {
+            Some(_) => (
+                format!(
+                    "the point {at} of the probe `{name}` lies in a region that its impedance surface replaces"
+                ),
+                "a point in a region that is meshed".to_owned(),
+            ),
+            None => {
+                let [lower, upper] = full_mesh.bounding_box().map(millimetres);
+                (
+                    format!("the point {at} of the probe `{name}` lies outside the mesh"),
+                    format!("a point inside the mesh, which goes from {lower} to {upper}"),
+                )
+            }
+        };
+        faults.push(source.diagnostic(&format!("probes[{i}].points[{j}]"), message).expected(expected));
+    }
+    faults
+}
+
+/// A point for messages, to a micrometre.
+fn millimetres([x, y, z]: [f64; 3]) -> String {
+    let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
+    format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
+}
+
+fn is_empty(topology: &Topology, region: RegionId) -> bool {
+    !topology.region_of().contains(&region)
+}

@@ -1,0 +1,136 @@
+//! What a report draws: the mesh of a configuration with its design surface and its audits, without a field problem.
+//!
+//! No matrix is made and no elastic body factored, so that a large mesh costs no more than being read or generated.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_remesh::KinematicConstraint;
+
+use super::shape::{regions_at, remesh_setup, thickened};
+use super::{Audited, audits, design, field, mesh, name_faults};
+use crate::config::{Config, SourceMap};
+use crate::error::Error;
+use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::geometric::WallThickness;
+
+/// Mesh, design surface and audits of a configuration.
+#[derive(Debug)]
+pub struct Outline {
+    /// The undeformed mesh with all its regions.
+    pub full_mesh: Mesh,
+    /// The undeformed mesh that is solved on: without the regions that impedance surfaces replace.
+    pub mesh: Mesh,
+    /// For every node of `full_mesh` the same node of `mesh`; `None` inside a region that is replaced.
+    pub node_of: Vec<Option<NodeId>>,
+    /// Skin-depth audit of every conductor at every frequency.
+    pub audits: Vec<Audited>,
+    /// What moves; `None` without a design.
+    pub design: Option<OutlinedDesign>,
+}
+
+/// The design surface and what it belongs to.
+#[derive(Debug)]
+pub struct OutlinedDesign {
+    /// The surface, on nodes of `full_mesh`.
+    pub surface: DesignSurface,
+    /// Its triangles, each once, on nodes of `full_mesh`.
+    pub triangles: Vec<[NodeId; 3]>,
+    /// The region that a positive design thickens; else those with an entry of their own at the surface; else none.
+    pub bodies: Vec<RegionId>,
+    /// WallThickness of the designed body, where it has one.
+    pub thickness: Option<WallThickness>,
+    /// Elements of `mesh` that may move, ascending.
+    pub moving: Vec<ElementId>,
+}
+
+/// Reads or generates the mesh of a configuration, and finds its design surface.
+///
+/// # Errors
+/// Faults of names and of the mesh, as [`super::set_up`].
+pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
+    let full_mesh = mesh::build(config, source)?.mesh;
+    source.check(name_faults(config, source, full_mesh.topology()))?;
+    let (mesh, _) = field::without_impedance_regions(config, &full_mesh)?;
+    let node_of = same_nodes(&full_mesh, &mesh);
+    let design = match &config.design {
+        Some(_) => Some(outlined(config, source, &full_mesh, &mesh, &node_of)?),
+        None => None,
+    };
+    let audits = audits(config, &full_mesh);
+    Ok(Outline { full_mesh, mesh, node_of, audits, design })
+}
+
+/// Nodes keep their places, bit by bit, where others are taken out.
+fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
+    let key = |point: [f64; 3]| point.map(f64::to_bits);
+    if full_mesh.points().len() == mesh.points().len() {
+        return mesh.topology().nodes().map(Some).collect();
+    }
+    let kept: BTreeMap<_, NodeId> = mesh.topology().nodes().map(|n| (key(mesh.point(n)), n)).collect();
+    full_mesh.points().iter().map(|&point| kept.get(&key(point)).copied()).collect()
+}
+
+fn outlined(
+    config: &Config,
+    source: &SourceMap,
+    full_mesh: &Mesh,
+    mesh: &Mesh,
+    node_of: &[Option<NodeId>],
+) -> Result<OutlinedDesign, Error> {
+    let design = config.design.as_ref().expect("asked for with a design");
+    let surface = design::surface(config, source, design, full_mesh)?;
+    let triangles = design::triangles(design, full_mesh)?;
+    let topology = full_mesh.topology();
+    let body = thickened(full_mesh, &surface, config);
+    let thickness = body.and_then(|region| WallThickness::measure(full_mesh, region, &surface));
+    let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
+    let bodies = match body {
+        Some(region) => vec![region],
+        None => regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect(),
+    };
+    let moving = match &config.remesh {
+        Some(remesh) => {
+            let nodes: Vec<NodeId> =
+                surface.nodes().iter().filter_map(|node| node_of[node.index()]).collect();
+            let body =
+                remesh_setup(source, remesh, mesh, &nodes, KinematicConstraint::Free, &mut Vec::new())?;
+            let elements = body.subregions.iter().flat_map(|part| part.elements.iter().copied());
+            elements.collect::<BTreeSet<_>>().into_iter().collect()
+        }
+        None => Vec::new(),
+    };
+    Ok(OutlinedDesign { surface, triangles, bodies, thickness, moving })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::{Purpose, set_up};
+
+    fn shield(name: &str) -> (Config, SourceMap) {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
+        Config::from_file(&path, &["mesh.shield.refinement=0.5".to_owned()]).expect("a shipped configuration")
+    }
+
+    #[test]
+    fn the_outline_is_that_of_the_problem() {
+        for name in ["shield.toml", "shield_impedance.toml"] {
+            let (config, source) = shield(name);
+            let outline = outline(&config, &source).expect("an outline");
+            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a problem");
+            assert_eq!(outline.mesh.points(), setup.problem.original().points());
+            let shape = setup.problem.shape().expect("a shape");
+            let design = outline.design.as_ref().expect("a design");
+            let kept: Vec<NodeId> =
+                design.surface.nodes().iter().filter_map(|n| outline.node_of[n.index()]).collect();
+            assert_eq!(kept, shape.surface().nodes());
+            assert_eq!(design.moving, setup.problem.moving_elements());
+            let plate = outline.full_mesh.topology().region("plate").expect("a plate");
+            assert_eq!(design.bodies, [plate]);
+            let flat = vec![0.0; design.surface.nodes().len()];
+            let (low, high) = design.thickness.as_ref().expect("a plate has one").range(&flat);
+            assert!((low - 0.01).abs() < 1e-12 && (high - 0.01).abs() < 1e-12, "{low} {high}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The mesh of the best design in the forms that users go on with: a Gmsh file, and STL files of surfaces.
+//!
+//! It is the mesh that was solved on: a region that its impedance surface replaces is not in it. Coordinates are in the unit
+//! of the mesh file, and in millimetres where the mesh was generated.
+
+use fluxmorph_geometry::io::{MshEncoding, msh_bytes, stl_bytes};
+use fluxmorph_geometry::{Mesh, MeshError};
+
+use crate::build::mesh;
+use crate::config::{Config, LengthUnit};
+use crate::error::Error;
+use crate::files::{RunDirectory, surface_files};
+use crate::show::Observer;
+
+/// Largest mesh written as text, which people can read and compare: about 25 MB. Beyond, bytes are read faster.
+const LARGEST_TEXT: usize = 500_000;
+
+/// Writes what `[output]` asks for.
+///
+/// A surface that cannot be written is a warning: the result of a run is worth more than one of its forms.
+///
+/// # Errors
+/// When the operating system refuses.
+pub(crate) fn write(
+    config: &Config,
+    directory: &RunDirectory,
+    mesh: &Mesh,
+    observer: &mut dyn Observer,
+) -> Result<(), Error> {
+    let unit = mesh::unit(config);
+    if config.output.mesh {
+        match optimum(mesh, unit) {
+            Ok(bytes) => directory.write(&directory.optimum(), &bytes)?,
+            Err(error) => observer.warning(&format!("the mesh of the optimum is not written: {error}")),
+        }
+    }
+    for (name, file) in config.output.stl.iter().zip(surface_files(&config.output.stl)) {
+        let triangles = mesh.topology().surface(name).unwrap_or_default();
+        if triangles.is_empty() {
+            observer.warning(&format!(
+                "the surface `{name}` is not written: nothing of it is left in the mesh that was solved on"
+            ));
+            continue;
+        }
+        match stl_bytes(mesh, triangles, unit.metres()) {
+            Ok(bytes) => directory.write(&directory.surface(&file), &bytes)?,
+            Err(error) => observer.warning(&format!("the surface `{name}` is not written: {error}")),
+        }
+    }
+    Ok(())
+}
+
+/// The Gmsh file of a mesh.
+fn optimum(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
+    let large = mesh.topology().tets().len() > LARGEST_TEXT;
+    msh_bytes(mesh, unit.metres(), if large { MshEncoding::Binary } else { MshEncoding::Ascii })
+}

@@ -1,0 +1,151 @@
+//! The layer through which everything is written: whole files, the history, and the run directory.
+
+mod csv;
+mod design_file;
+mod disk;
+pub(crate) mod exports;
+mod field_files;
+pub mod fields;
+mod finite;
+mod history;
+mod host;
+mod json_place;
+mod manifest;
+mod names;
+mod result;
+mod run_directory;
+mod synced;
+
+use std::path::PathBuf;
+
+pub(crate) use csv::csv_text;
+pub use design_file::{DesignFileError, read_design};
+pub use disk::{Disk, DiskFile, system_disk};
+pub use field_files::FieldForm;
+pub(crate) use finite::check_finite;
+pub use fluxmorph_optimizer::driver::StopReason;
+pub use history::History;
+pub use host::{hostname, peak_memory_bytes, utc_timestamp};
+pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
+pub(crate) use names::shell_word;
+pub use names::{extend_command, resume_command, surface_files};
+pub(crate) use result::to_json;
+pub use result::{
+    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
+    StateResult, TermResult, Verification,
+};
+pub use run_directory::{OlderRun, RunDirectory};
+pub use synced::SyncedLog;
+pub(crate) use synced::write_whole;
+
+/// Why something could not be written or read back.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The output directory holds something that is not a run of this program.
+    #[error(
+        "the output directory `{path}` is not empty and holds no run of fluxmorph; nothing in it was touched: \
+         choose an empty or new directory with --out or output.directory"
+    )]
+    NotOurs {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The output directory holds an earlier run, which was not to be replaced.
+    #[error(
+        "the output directory `{path}` holds an earlier run; replace it with --force, or choose another \
+         directory with --out"
+    )]
+    HoldsRun {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// The output directory is something else.
+    #[error(
+        "the output directory `{path}` is a file or lies below one; choose a directory with --out or output.directory"
+    )]
+    NotADirectory {
+        /// The path.
+        path: PathBuf,
+    },
+    /// There is no run in a directory.
+    #[error("`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into")]
+    NoRun {
+        /// The directory.
+        path: PathBuf,
+    },
+    /// Another process writes into the run directory.
+    #[error(
+        "`{path}` is written by another process: wait for it or stop it; a new run may write elsewhere with --out"
+    )]
+    InUse {
+        /// The file that it holds.
+        path: PathBuf,
+    },
+    /// A folder of a run is a link.
+    #[error(
+        "`{path}` is a link, and nothing is written through links; remove it; a new run may write elsewhere with --out"
+    )]
+    Linked {
+        /// The link.
+        path: PathBuf,
+    },
+    /// A file of a run does not hold what it should.
+    #[error("`{path}` is damaged: {message}; it must be a file as fluxmorph wrote it")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// The run is one of an earlier version.
+    #[error(
+        "`{path}` is the journal of version {version:?} of fluxmorph in a form that this version does not read: go on with the \
+         program that wrote it, or start the run again with --force"
+    )]
+    OlderJournal {
+        /// The journal.
+        path: PathBuf,
+        /// The version that wrote it.
+        version: String,
+    },
+    /// The operating system refused.
+    #[error("cannot {action} `{path}`: {source}; {}", advice(.source))]
+    Io {
+        /// What was tried: a verb.
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The cause.
+        source: std::io::Error,
+    },
+}
+
+/// What to do about an error of the operating system.
+fn advice(error: &std::io::Error) -> &'static str {
+    use std::io::ErrorKind;
+    match error.kind() {
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+            "choose a directory you may write to, for a new run with --out"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "free some space, or keep fewer files with output.fields"
+        }
+        ErrorKind::NotFound => "check that the path exists",
+        _ => "check the path and the disk",
+    }
+}
+
+impl OutputError {
+    /// Turns an error of the operating system into one that names the path, for `map_err`.
+    pub(crate) fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source: std::io::Error| match source.kind() {
+            std::io::ErrorKind::ResourceBusy => Self::InUse { path },
+            _ => Self::Io { action, path, source },
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) use result::tests::example as example_result;

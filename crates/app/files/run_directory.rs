@@ -1,0 +1,477 @@
+//! The run directory: which folder may become one, and the names of the files in it; those of the fields are in
+//! `field_files`.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::OutputError;
+use super::disk::Disk;
+use super::field_files::is_fields;
+use super::manifest::Manifest;
+use super::names::{is_case, is_surface, morph_name};
+use super::synced::{SyncedLog, UNFINISHED, folder_of, write_whole};
+
+/// What to do with an earlier run in the same folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OlderRun {
+    /// Leave it, and fail.
+    Keep,
+    /// Remove its files, and no others.
+    Replace,
+}
+
+/// The folder one run writes into.
+#[derive(Debug, Clone)]
+pub struct RunDirectory {
+    disk: Arc<dyn Disk>,
+    path: PathBuf,
+}
+
+const MANIFEST: &str = "manifest.json";
+const JOURNAL: &str = "journal.jsonl";
+const CONFIG: &str = "config.toml";
+/// What a damaged journal is kept as.
+const DAMAGED_JOURNAL: &str = "journal.damaged.jsonl";
+/// The journal of earlier versions.
+const OLDER_JOURNAL: &str = "journal.bin";
+/// The files of a run beside its manifest, at last those of earlier versions. The journal goes first: it must not be taken
+/// for that of a new run.
+const FILES: &[&str] = &[
+    JOURNAL,
+    DAMAGED_JOURNAL,
+    CONFIG,
+    "resolved.toml",
+    "history.csv",
+    "fields.pvd",
+    "result.json",
+    "before.vtu",
+    "after.vtu",
+    "morph.csv",
+    "tuned.toml",
+    OPTIMUM,
+    REPORT,
+    OLDER_JOURNAL,
+    "journal.damaged.bin",
+    "history.jsonl",
+];
+const OPTIMUM: &str = "optimum.msh";
+const REPORT: &str = "report.html";
+
+impl RunDirectory {
+    /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
+    ///
+    /// The manifest of an earlier run stays until the new one takes its place, so that the folder is never
+    /// without its mark.
+    ///
+    /// # Errors
+    /// When the folder holds something else, or the operating system refuses.
+    pub fn create(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        Self { disk: Arc::clone(disk), path: path.to_owned() }.refuse_link()?;
+        let directory = Self::create_flat(disk, path, older)?;
+        directory.make_fields()?;
+        Ok(directory)
+    }
+
+    /// Makes the folder of the fields, if it is not there.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn make_fields(&self) -> Result<(), OutputError> {
+        self.make(&self.fields())
+    }
+
+    /// Whether the configuration of a run has been saved, without which it cannot be resumed.
+    pub fn holds_configuration(&self) -> bool {
+        self.holds(CONFIG)
+    }
+
+    /// Refuses a run whose journal has the form of earlier versions.
+    ///
+    /// # Errors
+    /// [`OutputError::OlderJournal`].
+    pub fn refuse_older_journal(&self) -> Result<(), OutputError> {
+        if self.holds(JOURNAL) || !self.holds(OLDER_JOURNAL) {
+            return Ok(());
+        }
+        let version = Manifest::read(self).map(|manifest| manifest.version).unwrap_or_default();
+        Err(OutputError::OlderJournal { path: self.path.join(OLDER_JOURNAL), version })
+    }
+
+    fn holds(&self, file: &str) -> bool {
+        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| name == file))
+    }
+
+    /// The same without a folder for fields.
+    ///
+    /// # Errors
+    /// As [`RunDirectory::create`].
+    pub fn create_flat(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        match disk.names(path) {
+            Ok(names) if names.is_empty() => {}
+            Ok(_) => directory.clear(older)?,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => directory.make(path)?,
+            Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+                return Err(OutputError::NotADirectory { path: path.to_owned() });
+            }
+            Err(error) => return Err(OutputError::io("read", path)(error)),
+        }
+        Ok(directory)
+    }
+
+    /// The folder of an earlier run.
+    ///
+    /// # Errors
+    /// When the folder does not hold one.
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, OutputError> {
+        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        match Manifest::read(&directory) {
+            Ok(manifest) if manifest.is_ours() => {}
+            // One that cannot be understood is that of a run all the same, unless it says that it is another program's.
+            Err(damaged @ OutputError::Damaged { .. }) if !Manifest::is_of_another(&directory) => {
+                return Err(damaged);
+            }
+            _ => return Err(OutputError::NoRun { path: path.to_owned() }),
+        }
+        directory.refuse_link()?;
+        Ok(directory)
+    }
+
+    /// A link may lead anywhere, and what lies in an older folder may come from others.
+    fn refuse_link(&self) -> Result<(), OutputError> {
+        let path = self.fields();
+        if self.disk.is_link(&path) { Err(OutputError::Linked { path }) } else { Ok(()) }
+    }
+
+    /// Makes a folder, and those above it that are missing; their names are on the disk then.
+    pub(super) fn make(&self, path: &Path) -> Result<(), OutputError> {
+        let is_missing = |folder: &&Path| {
+            let names = self.disk.names(folder);
+            !folder.as_os_str().is_empty()
+                && names.is_err_and(|error| error.kind() == io::ErrorKind::NotFound)
+        };
+        let missing = path.ancestors().skip(1).take_while(is_missing).count();
+        self.disk.create_dir(path).map_err(OutputError::io("create", path))?;
+        for folder in path.ancestors().take(missing + 1) {
+            match self.disk.sync_dir(folder_of(folder)) {
+                // Whoever may write into a folder may not always read it.
+                Err(error) if error.kind() != io::ErrorKind::PermissionDenied => {
+                    return Err(OutputError::io("create", path)(error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn holds_run(&self) -> bool {
+        Manifest::read(self).is_ok_and(|manifest| manifest.is_ours())
+    }
+
+    fn clear(&self, older: OlderRun) -> Result<(), OutputError> {
+        if !self.holds_run() {
+            // What is left of a start that was broken off before its manifest was complete is ours as well.
+            return if self.holds_only_leftovers()? {
+                self.remove_unfinished(&self.path)
+            } else {
+                Err(OutputError::NotOurs { path: self.path.clone() })
+            };
+        }
+        if older == OlderRun::Keep {
+            return Err(OutputError::HoldsRun { path: self.path.clone() });
+        }
+        self.check_unused()?;
+        let surfaces = Manifest::read(self).map(|manifest| manifest.surfaces).unwrap_or_default();
+        // The list is a file's content: only names that this program gives are taken from it.
+        let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
+        for name in FILES.iter().copied().chain(surfaces) {
+            self.remove(&self.path.join(name))?;
+        }
+        for name in self.entries(&self.path)?.iter().filter(|name| is_case(name)) {
+            self.remove(&self.path.join(name))?;
+        }
+        self.remove_unfinished(&self.path)?;
+        self.remove_fields(&[])
+    }
+
+    /// Whether no other process writes a run here.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] where one does.
+    fn check_unused(&self) -> Result<(), OutputError> {
+        let path = self.journal();
+        match self.disk.hold(&path) {
+            Err(error) if error.kind() == io::ErrorKind::ResourceBusy => Err(OutputError::InUse { path }),
+            // What cannot be opened is found out by whoever needs it.
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes what a killed process left half-written, and the fields of all evaluations but some.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn remove_leftovers(&self, kept: &[usize]) -> Result<(), OutputError> {
+        self.remove_unfinished(&self.path)?;
+        self.remove_fields(kept)
+    }
+
+    fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
+        for name in self.entries(&self.path)? {
+            let leftover = name.starts_with(UNFINISHED) || (is_fields(&name) && self.has_no_fields()?);
+            if !leftover {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    pub(super) fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
+        for name in self.entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
+            self.remove(&folder.join(name))?;
+        }
+        Ok(())
+    }
+
+    /// Names in a folder, sorted; none when there is no folder.
+    pub(super) fn entries(&self, folder: &Path) -> Result<Vec<String>, OutputError> {
+        match self.disk.names(folder) {
+            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+                Ok(Vec::new())
+            }
+            other => other.map_err(OutputError::io("read", folder)),
+        }
+    }
+
+    /// Removes a file of the run, if it is there.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn remove(&self, path: &Path) -> Result<(), OutputError> {
+        match self.disk.remove(path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(OutputError::io("remove", path)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Writes a whole file of the run, replacing an older one: at any moment its place holds the one or the other.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+        write_whole(&*self.disk, path, bytes)
+    }
+
+    /// A new log of the run, in place of an older one.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn log(&self, path: &Path, start: &[u8]) -> Result<SyncedLog, OutputError> {
+        SyncedLog::create(&*self.disk, path, start)
+    }
+
+    /// A log of the run, to go on behind its first `length` bytes.
+    ///
+    /// # Errors
+    /// As [`SyncedLog::append`], and [`OutputError::InUse`].
+    pub fn reopened(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
+        SyncedLog::reopen(&*self.disk, path, length)
+    }
+
+    /// The disk that the folder is on.
+    pub fn disk(&self) -> &dyn Disk {
+        &*self.disk
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// `manifest.json`.
+    pub fn manifest(&self) -> PathBuf {
+        self.path.join(MANIFEST)
+    }
+
+    /// `config.toml`, the configuration as given.
+    pub fn config(&self) -> PathBuf {
+        self.path.join(CONFIG)
+    }
+
+    /// `resolved.toml`, with every default.
+    pub fn resolved(&self) -> PathBuf {
+        self.path.join("resolved.toml")
+    }
+
+    /// `history.csv`.
+    pub fn history_csv(&self) -> PathBuf {
+        self.path.join("history.csv")
+    }
+
+    /// `journal.jsonl`, all evaluations to the last bit.
+    pub fn journal(&self) -> PathBuf {
+        self.path.join(JOURNAL)
+    }
+
+    /// `journal.damaged.jsonl`, what a damaged journal is kept as.
+    pub fn damaged_journal(&self) -> PathBuf {
+        self.path.join(DAMAGED_JOURNAL)
+    }
+
+    /// `result.json`.
+    pub fn result(&self) -> PathBuf {
+        self.path.join("result.json")
+    }
+
+    /// The undeformed mesh of a prescribed motion; `case` is the number of a case of a sweep, from 0.
+    pub fn before(&self, case: Option<usize>) -> PathBuf {
+        self.path.join(morph_name(case, "before"))
+    }
+
+    /// The mesh after a prescribed motion.
+    pub fn after(&self, case: Option<usize>) -> PathBuf {
+        self.path.join(morph_name(case, "after"))
+    }
+
+    /// `morph.csv`, one row for each case of a prescribed motion.
+    pub fn morph_csv(&self) -> PathBuf {
+        self.path.join("morph.csv")
+    }
+
+    /// `tuned.toml`, the configuration that the tuner found.
+    pub fn tuned(&self) -> PathBuf {
+        self.path.join("tuned.toml")
+    }
+
+    /// `report.html`, one page about the run.
+    pub fn report(&self) -> PathBuf {
+        self.path.join(REPORT)
+    }
+
+    /// `optimum.msh`, the mesh of the best design.
+    pub fn optimum(&self) -> PathBuf {
+        self.path.join(OPTIMUM)
+    }
+
+    /// A surface of the best design, by the name that [`surface_files`] gives its file.
+    pub fn surface(&self, file: &str) -> PathBuf {
+        self.path.join(file)
+    }
+
+    /// `fields.pvd`, the collection of the field files.
+    pub fn collection(&self) -> PathBuf {
+        self.path.join("fields.pvd")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::disk::system_disk;
+    use super::*;
+
+    fn started(path: &Path) -> RunDirectory {
+        let run = RunDirectory::create(&system_disk(), path, OlderRun::Keep).expect("a new run directory");
+        Manifest::started("run", 2).write(&run).expect("a manifest");
+        run
+    }
+
+    #[test]
+    fn an_absent_or_empty_folder_is_taken() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        assert!(RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).is_ok());
+        let run =
+            RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OlderRun::Keep).expect("made");
+        assert!(run.fields().is_dir());
+        // Broken off before the manifest: still nothing of anybody.
+        std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
+        assert!(RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).is_ok());
+        assert!(!run.path().join(".fluxmorph-abc").exists());
+    }
+
+    #[test]
+    fn a_foreign_folder_is_left_alone_even_when_forced() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let note = folder.path().join("thesis.txt");
+        fs::write(&note, "years of work").expect("written");
+        for manifest in ["", "{}", r#"{"program": "other"}"#, "[]"] {
+            for older in [OlderRun::Keep, OlderRun::Replace] {
+                let error = RunDirectory::create(&system_disk(), folder.path(), older).expect_err("foreign");
+                assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
+            }
+            fs::write(folder.path().join("manifest.json"), manifest).expect("written");
+        }
+        assert!(note.exists());
+        let error = RunDirectory::create(&system_disk(), &note, OlderRun::Replace).expect_err("a file");
+        assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
+        assert!(RunDirectory::open(&system_disk(), folder.path()).is_err());
+    }
+
+    #[test]
+    fn an_earlier_run_is_replaced_only_when_forced_and_foreign_files_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run = started(&folder.path().join("run"));
+        assert!(RunDirectory::open(&system_disk(), run.path()).is_ok());
+        let mut ours =
+            vec![run.result(), run.history_csv(), run.field(0), run.field(10_000), run.collection()];
+        ours.extend([
+            run.before(None),
+            run.after(Some(0)),
+            run.before(Some(99)),
+            run.morph_csv(),
+            run.tuned(),
+            run.report(),
+        ]);
+        let foreign = ["notes.md", "fields/eval_best.vtu", "case_1_before.vtu", "case_01.vtu"];
+        let foreign = foreign.map(|name| run.path().join(name));
+        for path in ours.iter().chain(&foreign) {
+            fs::write(path, b"x").expect("written");
+        }
+        let error =
+            RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).expect_err("holds a run");
+        assert!(matches!(error, OutputError::HoldsRun { .. }) && error.to_string().contains("--force"));
+        assert!(ours.iter().all(|path| path.exists()));
+
+        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        assert!(ours.iter().all(|path| !path.exists()));
+        assert!(foreign.iter().all(|path| path.exists()));
+        assert!(run.manifest().exists(), "the mark stays until the next manifest");
+    }
+
+    #[test]
+    fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let run =
+            RunDirectory::create(&system_disk(), &folder.path().join("run"), OlderRun::Keep).expect("new");
+        let mut manifest = Manifest::started("run", 1);
+        manifest.surfaces =
+            ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
+        manifest.write(&run).expect("written");
+        let (ours, theirs) = (run.surface("optimum_a.stl"), run.surface("optimum_b.stl"));
+        for path in [&ours, &theirs, &folder.path().join("stay.stl"), &run.optimum()] {
+            fs::write(path, b"x").expect("written");
+        }
+        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        assert!(!ours.exists() && !run.optimum().exists());
+        assert!(theirs.exists() && folder.path().join("stay.stl").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn fields_behind_a_link_stay() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let other = started(&folder.path().join("other"));
+        fs::write(other.field(0), b"x").expect("written");
+        let run = started(&folder.path().join("run"));
+        fs::remove_dir(run.fields()).expect("removed");
+        std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
+        let error = RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect_err("a link");
+        assert!(matches!(error, OutputError::Linked { .. }), "{error}");
+        RunDirectory::create_flat(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        assert!(other.field(0).exists());
+    }
+}

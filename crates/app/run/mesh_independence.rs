@@ -1,0 +1,408 @@
+//! Is the gain of a run the shape's, or the mesh's? Initial and best shape again, on a mesh the optimiser never saw.
+//!
+//! An optimiser sees the discrete objective: the field's, and the error of a mesh that moves along with the design. What it
+//! gains from that error is lost where all nodes lie elsewhere. So the run's mesh is generated anew with another refinement,
+//! brought to both shapes, and the ratio of the two values is the *verified ratio*. Variables of a control grid mean the
+//! same on any mesh; where the nodes are the variables, the displacement of the old surface is interpolated on the fresh one
+//! ([`Triangulation::transferred`]). A check that cannot be made is told, and costs a run nothing else.
+//!
+//! Does not live here: whether the gradient is the objective's, which is `verify`.
+
+use fluxmorph_geometry::tet4::Point;
+
+use crate::build::memory_limit;
+use crate::build::{Purpose, Setup, design_triangulation, set_up};
+use crate::config::{Config, MeshConfig, SourceMap};
+use crate::error::Error;
+use crate::files::{ObjectiveResult, Verification};
+use crate::show::Observer;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::design::Triangulation;
+use fluxmorph_optimizer::driver::StopReason;
+use fluxmorph_optimizer::memory_estimate::of_other_mesh;
+use fluxmorph_optimizer::problem::SolverCache;
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem};
+
+/// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
+/// alone counts, and not the way to it.
+const LEAST_ROUNDS: usize = 20;
+
+/// Initial and best shape of a run, in a form that another mesh can take.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shapes {
+    /// The initial shape is the best.
+    Unchanged,
+    /// Variables of a control grid [m].
+    Variables([Vec<f64>; 2]),
+    /// Displacements of a surface's nodes [m], each of shape `(n_nodes, 3)`.
+    Displacements {
+        /// The undeformed surface.
+        surface: Box<Triangulation>,
+        /// One displacement per node.
+        pair: [Vec<Point>; 2],
+    },
+}
+
+impl Shapes {
+    /// The initial shape of a run that has been set up, and its best one.
+    ///
+    /// # Errors
+    /// When the design surface is not one of the mesh's.
+    ///
+    /// # Panics
+    /// If `best` has another length than there are variables.
+    pub fn of(config: &Config, setup: &Setup, best: &[f64]) -> Result<Self, Error> {
+        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
+            return Ok(Self::Unchanged);
+        };
+        if best == shape.initial() {
+            return Ok(Self::Unchanged);
+        }
+        if design.grid.is_some() {
+            return Ok(Self::Variables([shape.initial().to_vec(), best.to_vec()]));
+        }
+        let surface = Box::new(design_triangulation(design, &setup.full_mesh)?);
+        Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
+    }
+
+    /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
+    fn displacements(&self, config: &Config, setup: &Setup) -> Result<[Vec<Point>; 2], Error> {
+        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
+            return Ok(Default::default());
+        };
+        match self {
+            Self::Unchanged => Ok([shape.initial(), shape.initial()].map(|p| shape.displacement(p))),
+            Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
+            Self::Displacements { surface, pair: [initial, best] } => {
+                let fresh = design_triangulation(design, &setup.full_mesh)?;
+                let transferred = [initial, best].map(|values| surface.transferred(values, &fresh));
+                let [initial, best] = transferred.map(|values| values.map_err(OptimizerError::from));
+                Ok([initial?, best?])
+            }
+        }
+    }
+}
+
+/// Whether a check was brought to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Check {
+    /// It was, or none was wanted, or the run itself had been cut short.
+    Finished,
+    /// A signal came first.
+    CutShort,
+}
+
+/// A run whose gain is to be checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Gain<'a> {
+    /// Its configuration.
+    pub config: &'a Config,
+    /// Where that stands.
+    pub source: &'a SourceMap,
+    /// How it ended.
+    pub stop_reason: StopReason,
+    /// Its initial and its best shape.
+    pub shapes: &'a Shapes,
+    /// Bytes that the check needs, about.
+    pub memory: usize,
+}
+
+impl Gain<'_> {
+    /// Fills in the verified ratio. Where there is none, the observer is told why.
+    ///
+    /// `interrupted` is asked before each part of the work.
+    pub fn verify(
+        &self,
+        objective: &mut ObjectiveResult,
+        interrupted: &dyn Fn() -> bool,
+        observer: &mut dyn Observer,
+    ) -> Check {
+        let factor = self.config.output.verify_refinement;
+        if factor == 0.0 {
+            return Check::Finished;
+        }
+        if *self.shapes == Shapes::Unchanged {
+            objective.verified_ratio = Some(1.0);
+            return Check::Finished;
+        }
+        let refined = self.config.mesh.refined(factor);
+        if let (Some(_), Some(shortage)) = (&refined, memory_limit::shortage(self.memory)) {
+            observer
+                .notice(&format!("the best shape is not checked on a fresh mesh, which takes {shortage}"));
+            return Check::Finished;
+        }
+        let cut_short = matches!(self.stop_reason, StopReason::Interrupted | StopReason::MaxTime);
+        let outcome = match refined {
+            _ if cut_short || interrupted() => Ok(None),
+            Some(mesh) => {
+                observer.phase("checking the best shape on a fresh mesh");
+                self.computed(mesh, factor, interrupted)
+            }
+            None => {
+                observer.notice(
+                    "the best shape is not checked on a fresh mesh: only the generators `shield`, `boxes` and `sphere` make \
+                     one",
+                );
+                return Check::Finished;
+            }
+        };
+        match outcome {
+            Ok(Some(verification)) => {
+                objective.verified_ratio = Some(verification.ratio);
+                objective.verification = Some(verification);
+            }
+            Ok(None) => {
+                observer.notice(
+                    "the best shape is not checked on a fresh mesh: the run was told to end before that",
+                );
+                if !cut_short {
+                    return Check::CutShort;
+                }
+            }
+            Err(error) => {
+                observer.warning(&format!("the best shape could not be checked on a fresh mesh: {error}"));
+            }
+        }
+        Check::Finished
+    }
+
+    /// Both values on the fresh mesh; `None` where a signal came first.
+    fn computed(
+        &self,
+        mesh: MeshConfig,
+        refinement: f64,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Option<Verification>, Error> {
+        let config = fresh_configuration(self.config, mesh);
+        let setup = set_up(&config, self.source, Purpose::Optimisation)?;
+        if interrupted() {
+            return Ok(None);
+        }
+        let displacements = self.shapes.displacements(&config, &setup)?;
+        // Constraints decide nothing here.
+        let mut problem = setup.problem.without_constraints();
+        let tets = problem.original().topology().tets().len();
+        let mut values = [0.0; 2];
+        let mut memory = SolverCache::default();
+        for (value, displacement) in values.iter_mut().zip(displacements) {
+            if interrupted() {
+                return Ok(None);
+            }
+            *value = match objective_at(&mut problem, &mut memory, displacement, interrupted) {
+                Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(None),
+                value => value?,
+            };
+        }
+        let [initial, best] = values;
+        let ratio = best / initial;
+        if !ratio.is_finite() {
+            let cause = "the objective of the initial design is zero on the fresh mesh";
+            return Err(OptimizerError::Optimisation { cause }.into());
+        }
+        Ok(Some(Verification { refinement, tets, initial, best, ratio }))
+    }
+}
+
+/// Bytes that the process holds at the peak of the check, about; `None` where there is none to be made.
+pub fn memory_estimate(config: &Config, problem: &Problem) -> Option<usize> {
+    let factor = config.output.verify_refinement;
+    if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
+        return None;
+    }
+    let fresh = config.mesh.refined(factor)?.tet_count()?;
+    let growth = fresh as f64 / config.mesh.tet_count()?.max(1) as f64;
+    Some(of_other_mesh(problem, growth))
+}
+
+/// The configuration with another mesh, and without what belongs to the old one.
+fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
+    let mut fresh = Config { mesh, probes: Vec::new(), ..config.clone() };
+    if let Some(design) = &mut fresh.design {
+        // A list has one value for every node of the old surface.
+        design.initial = crate::config::InitialDesign::Uniform(0.0);
+    }
+    if let Some(remesh) = &mut fresh.remesh {
+        remesh.rounds = remesh.rounds.max(LEAST_ROUNDS);
+    }
+    fresh
+}
+
+/// The objective at a shape, reached from the undeformed mesh.
+fn objective_at(
+    problem: &mut Problem,
+    memory: &mut SolverCache,
+    displacement: Vec<Point>,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<f64, Error> {
+    let undeformed = problem.shape().map(|shape| shape.motion().clone());
+    problem.continue_to_displacement(displacement.clone(), interrupted)?;
+    let moved = match problem.shape() {
+        Some(shape) => shape.motion().moved(&displacement)?,
+        None => problem.moved(&[])?,
+    };
+    let analysis = problem.analyse(moved, &[], Derivatives::None, memory, &mut NoProgress)?;
+    if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
+        shape.set_motion(motion);
+    }
+    Ok(analysis.objective.unwrap_or(f64::NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::BlockMesh;
+
+    /// The coarse shield; without its control grid every node is a variable.
+    fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
+        let (mut config, source) = Config::from_file(&path, &[]).expect("a shipped configuration");
+        if variables_on_nodes && let Some(design) = &mut config.design {
+            design.grid = None;
+        }
+        (config, source)
+    }
+
+    /// A smooth shape near the frame that the shield's optimiser finds, by the place of every variable.
+    fn dished(setup: &Setup) -> Vec<f64> {
+        let points = setup.problem.shape().expect("a shape").surface().points();
+        points.iter().map(|x| 0.2 * x[0].max(0.5 * x[1]) - 4e-3).collect()
+    }
+
+    /// What the observer was told.
+    #[derive(Default)]
+    struct Told {
+        notices: Vec<String>,
+        warnings: Vec<String>,
+    }
+
+    impl Observer for Told {
+        fn notice(&mut self, message: &str) {
+            self.notices.push(message.to_owned());
+        }
+
+        fn warning(&mut self, message: &str) {
+            self.warnings.push(message.to_owned());
+        }
+    }
+
+    fn verified(
+        config: &Config,
+        source: &SourceMap,
+        shapes: &Shapes,
+        stop_reason: StopReason,
+        interrupted: bool,
+    ) -> (ObjectiveResult, Told) {
+        let mut objective = ObjectiveResult {
+            initial: 1.0,
+            best: 0.5,
+            ratio: 0.5,
+            best_evaluation: 1,
+            verified_ratio: None,
+            verification: None,
+            terms: Vec::new(),
+        };
+        let mut told = Told::default();
+        Gain { config, source, stop_reason, shapes, memory: 0 }.verify(
+            &mut objective,
+            &|| interrupted,
+            &mut told,
+        );
+        (objective, told)
+    }
+
+    #[test]
+    fn the_same_cells_give_the_same_ratio_whatever_carries_the_shape() {
+        for on_nodes in [false, true] {
+            let (mut config, source) = quick(on_nodes);
+            config.output.verify_refinement = 1.0;
+            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+            let best = dished(&setup);
+            let value = |p: &[f64]| {
+                let analysis = setup
+                    .problem
+                    .evaluate(p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+                    .expect("a valid mesh");
+                analysis.objective.expect("an objective")
+            };
+            let shape = setup.problem.shape().expect("a shape");
+            let expected = value(&best) / value(shape.initial());
+            let shapes = Shapes::of(&config, &setup, &best).expect("a design surface");
+            assert_eq!(matches!(shapes, Shapes::Displacements { .. }), on_nodes);
+            let (objective, told) =
+                verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+            let found = objective.verification.unwrap_or_else(|| panic!("{:?}", told.warnings));
+            assert_eq!(objective.verified_ratio, Some(found.ratio));
+            // The residual that every linear solution has to reach, twice.
+            assert!((found.ratio - expected).abs() < 2e-9 * expected, "{} {expected}", found.ratio);
+        }
+    }
+
+    #[test]
+    fn a_smooth_shape_on_nodes_keeps_its_value_on_a_finer_surface() {
+        let ratio = |on_nodes| {
+            let (mut config, source) = quick(on_nodes);
+            // Over the plate the cells are halved.
+            config.output.verify_refinement = 3.0;
+            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+            let shapes = Shapes::of(&config, &setup, &dished(&setup)).expect("a design surface");
+            let (objective, told) =
+                verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+            objective.verified_ratio.unwrap_or_else(|| panic!("{:?}", told.warnings))
+        };
+        let (grid, nodes) = (ratio(false), ratio(true));
+        println!("verified ratio of one shape: on a grid {grid:.6}, on nodes {nodes:.6}");
+        // Bilinear on squares or linear on triangles: the two differ along the ridge of the shape alone.
+        assert!((grid - nodes).abs() < 2e-3, "{grid} {nodes}");
+        assert!(grid < 0.99, "the shape changes the field: {grid}");
+    }
+
+    #[test]
+    fn a_mesh_that_cannot_be_generated_anew_is_told_once() {
+        let (mut config, source) = quick(false);
+        config.mesh = MeshConfig::Block(BlockMesh::default());
+        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let (objective, told) = verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+        assert_eq!((objective.verified_ratio, objective.verification), (None, None));
+        assert!(told.notices.len() == 1 && told.notices[0].contains("generators"), "{:?}", told.notices);
+        assert!(told.warnings.is_empty());
+    }
+
+    #[test]
+    fn a_run_told_to_end_is_not_checked() {
+        let (config, source) = quick(false);
+        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        for (reason, interrupted) in [
+            (StopReason::Interrupted, false),
+            (StopReason::MaxTime, false),
+            (StopReason::ObjectiveConverged, true),
+        ] {
+            let (objective, told) = verified(&config, &source, &shapes, reason, interrupted);
+            assert_eq!(objective.verified_ratio, None);
+            assert!(told.notices.len() == 1 && told.notices[0].contains("told to end"), "{:?}", told.notices);
+        }
+    }
+
+    #[test]
+    fn a_check_that_fails_is_a_warning_with_its_cause() {
+        let (mut config, source) = quick(false);
+        // 50 times the default, where the generator ends at 20.
+        config.output.verify_refinement = 100.0;
+        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let (objective, told) = verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+        assert_eq!(objective.verified_ratio, None);
+        assert!(told.warnings.len() == 1 && told.warnings[0].contains("refinement"), "{:?}", told.warnings);
+    }
+
+    #[test]
+    fn the_initial_design_as_the_best_is_the_ratio_one() {
+        let (config, source) = quick(false);
+        let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+        let shapes = Shapes::of(&config, &setup, &[0.0; 91]).expect("a design");
+        assert_eq!(shapes, Shapes::Unchanged);
+        let (objective, told) = verified(&config, &source, &shapes, StopReason::MeshLimit, false);
+        assert_eq!((objective.verified_ratio, objective.verification), (Some(1.0), None));
+        assert!(told.notices.is_empty() && told.warnings.is_empty());
+    }
+}

@@ -1,0 +1,290 @@
+//! One run or one analysis with its directory: what the commands `run`, `resume` and `solve` do, without a terminal; beside
+//! them `morph` (mesh motion alone) and `sweep` (many runs).
+//!
+//! The manifest is written first and completed last; journal, history and fields are written as evaluations come
+//! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
+//! final name is whole, and it can be resumed.
+
+pub mod journal;
+pub(crate) mod launcher;
+pub mod mesh_independence;
+pub mod morph;
+mod pieces;
+mod prepared;
+mod recorder;
+mod resume;
+mod solve;
+mod summary;
+pub mod sweep;
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::parallel::{RankGroup, Role};
+
+use crate::build::locate_error::attribute_error;
+use crate::build::{Purpose, Setup, set_up_watched};
+use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
+use crate::error::Error;
+use crate::files::exports;
+use crate::files::{
+    Disk, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus, check_finite,
+    peak_memory_bytes, resume_command,
+};
+use crate::show::{RunObserver, Started};
+use fluxmorph_optimizer::problem::RoundEvent;
+use fluxmorph_optimizer::{Error as OptimizerError, driver};
+use journal::{Identity, Journal};
+use mesh_independence::{Check, Gain, Shapes};
+use pieces::SharedPieces;
+use prepared::Prepared;
+use recorder::DirectoryRecorder;
+pub(crate) use resume::configuration;
+pub use resume::{Limits, SavedRun, resume};
+pub use solve::solve;
+use summary::{constraints, linear_solver, terms};
+
+/// What a session is told beside the configuration.
+#[derive(Clone, Copy)]
+pub struct Options<'a> {
+    /// Where run directories are.
+    pub disk: &'a Arc<dyn Disk>,
+    /// What happens to an earlier run in the output directory.
+    pub older_run: OlderRun,
+    /// Threads in use, for the manifest.
+    pub threads: usize,
+    /// The ranks among which the work is shared out; `None` for one process.
+    pub team: Option<&'a RankGroup>,
+    /// Whether the user wants to stop; asked after the set-up and before each evaluation.
+    pub interrupted: &'a dyn Fn() -> bool,
+}
+
+/// Optimises and writes everything into the run directory.
+///
+/// # Errors
+/// Faults of the configuration before anything is written; afterwards whatever fails, with the manifest completed.
+pub fn run(
+    config: &Config,
+    source: &SourceMap,
+    options: Options<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<RunResult, Error> {
+    let prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
+    let session = prepared.approach_initial()?.begin("run", observer)?;
+    session.conclude(observer, |session, observer| {
+        let journal = Journal::create(&session.directory, session.identity())?;
+        let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;
+        session.optimise(recorder, observer)
+    })
+}
+
+/// The work of a rank that is not the first: it sets the same problem up, and executes commands until the first one ends.
+/// A set-up that fails here and not there is reported to the first one with its first command.
+///
+/// # Panics
+/// At the first rank.
+pub fn serve(group: &RankGroup, config: &Config, source: &SourceMap, purpose: Purpose) {
+    assert_eq!(group.role(), Role::Worker, "the first rank leads");
+    let setup = set_up_watched(config, source, purpose, Some(group), &mut |_| ());
+    let directory = config.output.directory.clone();
+    let _pieces = setup.as_ref().ok().and_then(|setup| SharedPieces::of(&setup.problem, directory));
+    group.serve(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
+}
+
+/// A run directory with its manifest, and the problem.
+struct Session<'a> {
+    command: &'static str,
+    config: &'a Config,
+    source: &'a SourceMap,
+    setup: Setup,
+    /// Steps that took the mesh near the first design.
+    approach: Vec<RoundEvent>,
+    directory: RunDirectory,
+    manifest: Manifest,
+    clock: Instant,
+    setup_seconds: f64,
+    interrupted: &'a dyn Fn() -> bool,
+}
+
+impl Session<'_> {
+    /// Reports what is set up.
+    fn announce(&self, observer: &mut dyn RunObserver) {
+        let Self { command, config, setup, directory, .. } = self;
+        let mesh = setup.problem.original().topology();
+        observer.started(&Started {
+            title: &config.title,
+            optimizer: (*command == "run").then_some(&config.optimizer),
+            objective: config.objective.as_ref(),
+            variables: setup.problem.shape().map_or(0, |s| s.surface().variable_count()),
+            nodes: mesh.node_count(),
+            tets: mesh.tets().len(),
+            unknowns: setup.problem.states().iter().map(|model| model.unknown_count()).sum(),
+            directory: Some(directory.path()),
+        });
+        for warning in &setup.warnings {
+            observer.warning(warning);
+        }
+    }
+
+    /// What all ranks write fields with; `None` for one process.
+    fn pieces(&self) -> Option<SharedPieces> {
+        SharedPieces::of(&self.setup.problem, self.directory.path().to_owned())
+    }
+
+    /// What the journal of this run belongs to.
+    fn identity(&self) -> Identity {
+        let problem = &self.setup.problem;
+        let (shape, constraints) = (problem.shape(), problem.constraints());
+        let variables = shape.map_or(0, |shape| shape.surface().variable_count());
+        Identity::new(self.config, &self.setup.full_mesh, variables, constraints.len())
+    }
+
+    /// Optimises, and writes what the best design leaves.
+    fn optimise(
+        &mut self,
+        mut recorder: DirectoryRecorder,
+        observer: &mut dyn RunObserver,
+    ) -> Result<RunResult, Error> {
+        let config = self.config;
+        self.approach.iter().for_each(|event| observer.round(event));
+        let problem = &mut self.setup.problem;
+        let optimised = driver::optimise(
+            problem,
+            &config.optimizer.settings(),
+            observer,
+            &mut recorder,
+            self.interrupted,
+        )?;
+        let best = &optimised.best;
+        if config.output.fields == FieldsKept::FirstLast {
+            recorder.write(best.evaluation, problem, &best.analysis)?;
+        }
+        exports::write(config, &self.directory, &best.analysis.mesh, observer)?;
+        let problem = &self.setup.problem;
+        let result = RunResult {
+            evaluations: optimised.evaluations,
+            iterations: optimised.iterations,
+            objective: Some(ObjectiveResult {
+                initial: optimised.initial,
+                best: best.objective,
+                ratio: best.objective / optimised.initial,
+                best_evaluation: best.evaluation,
+                verified_ratio: None,
+                verification: None,
+                terms: terms(problem, &best.analysis),
+            }),
+            constraints: constraints(problem, &best.analysis, &optimised.bounds),
+            rounds: self.approach.iter().chain(&optimised.rounds).cloned().collect(),
+            linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
+            ..self.result(
+                optimised.stop_reason,
+                &best.analysis,
+                Some(&best.values),
+                optimised.initial_quality,
+                &optimised.timings,
+                observer,
+            )?
+        };
+        let shapes = Shapes::of(config, &self.setup, &best.values)?;
+        drop(optimised);
+        // The ranks' part of the problem goes with it.
+        drop(recorder);
+        self.verified(result, &shapes, observer)
+    }
+
+    /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
+    fn conclude(
+        mut self,
+        observer: &mut dyn RunObserver,
+        work: impl FnOnce(&mut Self, &mut dyn RunObserver) -> Result<RunResult, Error>,
+    ) -> Result<RunResult, Error> {
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            self.write_configuration()?;
+            let result = work(&mut self, observer).map_err(|error| match error {
+                Error::Optimizer(OptimizerError::Constraint { .. } | OptimizerError::FirstDesign { .. }) => {
+                    attribute_error(error, self.config, self.source)
+                }
+                other => other,
+            })?;
+            check_finite(&result)?;
+            result.write(&self.directory)?;
+            Ok::<RunResult, Error>(result)
+        }));
+        let status = match &outcome {
+            Ok(Ok(result)) => result.status,
+            Ok(Err(Error::Optimizer(OptimizerError::InterruptedRun))) => RunStatus::Interrupted,
+            _ => RunStatus::Failed,
+        };
+        self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
+        let completed = self.manifest.write(&self.directory);
+        let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
+        if let Err(error) = &outcome
+            && self.command == "run"
+            && error.is_resumable()
+            && self.directory.holds_configuration()
+        {
+            let command = resume_command(self.directory.path());
+            observer.warning(&format!("what was computed is kept: go on with `{command}`"));
+        }
+        let result = outcome?;
+        completed?;
+        observer.finished(&result);
+        Ok(result)
+    }
+
+    fn write_configuration(&self) -> Result<(), Error> {
+        self.directory.write(&self.directory.config(), self.source.text().as_bytes())?;
+        Ok(self.directory.write(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
+    }
+
+    /// The result with the gain checked on a fresh mesh; the run's own problem is gone then.
+    ///
+    /// # Errors
+    /// When the result cannot be written.
+    fn verified(
+        &mut self,
+        mut result: RunResult,
+        shapes: &Shapes,
+        observer: &mut dyn RunObserver,
+    ) -> Result<RunResult, Error> {
+        // The check may need more memory or patience than there is: what the run has found is safe before.
+        check_finite(&result)?;
+        result.write(&self.directory)?;
+        let memory = mesh_independence::memory_estimate(self.config, &self.setup.problem).unwrap_or(0);
+        self.setup.problem.release();
+        let clock = Instant::now();
+        let (config, source) = (self.config, self.source);
+        let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
+        if let Some(objective) = &mut result.objective
+            && gain.verify(objective, self.interrupted, observer) == Check::CutShort
+        {
+            // It can be made up for: the search is whole, the run is not.
+            result.status = RunStatus::Interrupted;
+        }
+        let seconds = clock.elapsed().as_secs_f64();
+        result.timings_s.insert("verification".to_owned(), seconds);
+        result.timings_s.insert("total".to_owned(), self.clock.elapsed().as_secs_f64());
+        result.peak_memory_bytes = peak_memory_bytes();
+        Ok(result)
+    }
+}
+
+/// Origin and content hash of the mesh with all its regions.
+pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
+    let origin = match &config.mesh {
+        MeshConfig::Shield(_) => "shield".to_owned(),
+        MeshConfig::Block(_) => "block".to_owned(),
+        MeshConfig::Boxes(_) => "boxes".to_owned(),
+        MeshConfig::Sphere(_) => "sphere".to_owned(),
+        MeshConfig::File { path, .. } => path.display().to_string(),
+    };
+    let topology = mesh.topology();
+    MeshHash {
+        origin,
+        blake3: journal::mesh_hash(mesh),
+        nodes: topology.node_count(),
+        tets: topology.tets().len(),
+    }
+}

@@ -1,0 +1,18 @@
+//! Mesh regeneration alone: the prescribed motion of `[morph]`, and what becomes of the elements.
+//!
+//! [`path`] says where the moved nodes go, `stepping` takes the mesh along in one or more increments, `report` measures what
+//! comes out of it, `table` shows it, `session` writes the run directory, and `tune` searches for better elastic
+//! parameters. Quality is that of the elements of the elastic body; those outside it do not move.
+
+pub mod path;
+mod report;
+mod session;
+mod stepping;
+mod table;
+mod tune;
+
+pub use report::{CaseReport, CaseResult, Inversion, MorphReport, QualityShares, WorstElement};
+pub use session::{MotionSummary, inspected, morph};
+pub use stepping::{Walk, walk};
+pub use table::{csv, text};
+pub use tune::{Parameters, TuneReport, TunedRegion};

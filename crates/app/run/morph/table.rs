@@ -1,0 +1,302 @@
+//! The result of a motion as text and as CSV.
+
+use super::{CaseReport, CaseResult, MorphReport, TuneReport};
+use crate::config::Paper;
+use crate::files::csv_text;
+
+/// The columns of the first table.
+const ROW: [&str; 9] =
+    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "increments", "rescues"];
+/// The columns of the table of shares.
+const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
+/// The columns of the table of places.
+const PLACES: [&str; 8] =
+    ["case", "worst element", "region", "at mm", "first inverts", "at motion x", "region", "at mm"];
+
+/// The report as text: tables with a row for each case, published values in brackets behind the own ones: counts, shares
+/// and places; each fits a terminal of 120 columns.
+pub fn text(report: &MorphReport) -> String {
+    let mut text = report.tuned.as_ref().map_or_else(String::new, TuneReport::text);
+    text +=
+        &format!("quality (Eq. 4) of the elements of the {}, before -> after the motion", report.quality_of);
+    if report.cases.iter().any(|case| case.paper.is_some()) {
+        text += "; (in brackets: the paper)";
+    }
+    text += "\n\n";
+    let rows: Vec<Vec<String>> = report.cases.iter().map(row).collect();
+    text += &aligned(&ROW, &rows);
+    text.push('\n');
+    let rows: Vec<Vec<String>> = report.cases.iter().map(shares).collect();
+    text += &aligned(&SHARES, &rows);
+    text.push('\n');
+    let rows: Vec<Vec<String>> = report.cases.iter().map(places).collect();
+    text += &aligned(&PLACES, &rows);
+    for case in report.cases.iter().filter(|case| !case.valid) {
+        text += &format!("\n{}: {}", case.name, trouble(case));
+    }
+    text.push('\n');
+    text
+}
+
+/// Why a case is not valid.
+fn trouble(case: &CaseReport) -> String {
+    let Some(case) = &case.result else { return case.error.clone().unwrap_or_default() };
+    if case.inverted > 0 {
+        return format!(
+            "{} inverted elements: take more increments or increments = \"auto\", another remesh.stiffness, or a \
+             larger remesh region",
+            case.inverted
+        );
+    }
+    if case.reached < 1.0 {
+        return format!("the mesh allows {:.1} % of the motion only", case.reached * 100.0);
+    }
+    format!("the worst quality {:.4} is below morph.least_quality", case.after.worst)
+}
+
+fn row(case: &CaseReport) -> Vec<String> {
+    let paper = case.paper.unwrap_or_default();
+    let Some(result) = &case.result else { return without_result(case, ROW.len()) };
+    let CaseResult { before, after, .. } = result;
+    vec![
+        case.name.clone(),
+        beside(result.equations.to_string(), paper.equations.map(|n| n.to_string())),
+        after.elements.to_string(),
+        beside(
+            format!("{:.4} -> {:.4}", before.worst, after.worst),
+            paper.worst_quality.map(|q| format!("{q:.4}")),
+        ),
+        beside(format!("{} -> {}", before.poor, after.poor), paper.poor.map(|n| n.to_string())),
+        result.inverted.to_string(),
+        format!("{:.1}", result.reached * 100.0),
+        result.increments.to_string(),
+        result.rescues.to_string(),
+    ]
+}
+
+fn shares(case: &CaseReport) -> Vec<String> {
+    let paper = case.paper.unwrap_or_default();
+    let Some(CaseResult { before, after, .. }) = &case.result else {
+        return without_result(case, SHARES.len());
+    };
+    let share = |k: usize, published: Option<f64>| {
+        let [was, is] = [before, after].map(|quality| quality.shares_percent[k]);
+        beside(format!("{was:.2} -> {is:.2}"), published.map(|value| format!("{value}")))
+    };
+    vec![
+        case.name.clone(),
+        share(0, paper.share_poor_percent),
+        share(1, paper.share_fair_percent),
+        share(2, paper.share_good_percent),
+    ]
+}
+
+/// A value with the published one in brackets, where there is one.
+fn beside(own: String, published: Option<String>) -> String {
+    match published {
+        Some(published) => format!("{own} ({published})"),
+        None => own,
+    }
+}
+
+/// The row of a case that could not be computed.
+fn without_result(case: &CaseReport, columns: usize) -> Vec<String> {
+    let mut cells = vec!["-".to_owned(); columns];
+    cells[0].clone_from(&case.name);
+    cells
+}
+
+fn places(case: &CaseReport) -> Vec<String> {
+    let place = |p: [f64; 3]| {
+        let [x, y, z] = p.map(|c| (c * 1e6).round() * 1e-3 + 0.0);
+        format!("{x:.2} {y:.2} {z:.2}")
+    };
+    let dash = || "-".to_owned();
+    let Some(CaseResult { inversion, worst_element: worst, .. }) = &case.result else {
+        return without_result(case, PLACES.len());
+    };
+    vec![
+        case.name.clone(),
+        worst.element.to_string(),
+        worst.region.clone(),
+        place(worst.at_m),
+        inversion.element.map_or_else(dash, |e| e.to_string()),
+        inversion.step.map_or_else(|| "never".to_owned(), |step| format!("{step:.4}")),
+        inversion.region.clone().unwrap_or_else(dash),
+        inversion.at_m.map_or_else(dash, place),
+    ]
+}
+
+/// Columns of equal width, the first to the left.
+pub(super) fn aligned(header: &[&str], rows: &[Vec<String>]) -> String {
+    let width = |column: usize| {
+        let cells = rows.iter().map(|row| row[column].chars().count());
+        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..header.len()).map(width).collect();
+    let line = |cells: Vec<&str>| {
+        let padded: Vec<String> = cells
+            .into_iter()
+            .zip(&widths)
+            .enumerate()
+            .map(|(column, (cell, &width))| match column {
+                0 => format!("{cell:<width$}"),
+                _ => format!("{cell:>width$}"),
+            })
+            .collect();
+        format!("{}\n", padded.join("  ").trim_end())
+    };
+    let mut text = line(header.to_vec());
+    rows.iter().for_each(|row| text += &line(row.iter().map(String::as_str).collect()));
+    text
+}
+
+/// The columns of `morph.csv`.
+const COLUMNS: [&str; 27] = [
+    "case",
+    "valid",
+    "equations",
+    "elements",
+    "worst_before",
+    "worst_after",
+    "poor_before",
+    "poor_after",
+    "fair_before",
+    "fair_after",
+    "good_before",
+    "good_after",
+    "inverted",
+    "worst_element",
+    "worst_region",
+    "inversion_step",
+    "inversion_element",
+    "reached",
+    "increments",
+    "rescues",
+    "paper_worst_quality",
+    "paper_poor",
+    "paper_share_poor_percent",
+    "paper_share_fair_percent",
+    "paper_share_good_percent",
+    "paper_equations",
+    "error",
+];
+
+/// The report as CSV, one row for each case; shortest digits that read back as the same number, empty for what is not
+/// known.
+pub fn csv(report: &MorphReport) -> String {
+    let mut text = format!("{}\n", COLUMNS.join(","));
+    for case in &report.cases {
+        let paper = case.paper.unwrap_or_default();
+        let mut cells = vec![csv_text(&case.name), case.valid.to_string()];
+        cells.extend(case.result.as_ref().map_or_else(|| vec![String::new(); 18], result_cells));
+        cells.extend(paper_cells(&paper));
+        cells.push(case.error.as_deref().map_or_else(String::new, csv_text));
+        text += &format!("{}\n", cells.join(","));
+    }
+    text
+}
+
+fn result_cells(result: &CaseResult) -> Vec<String> {
+    let CaseResult { before, after, worst_element: worst, inversion, .. } = result;
+    vec![
+        result.equations.to_string(),
+        after.elements.to_string(),
+        number(Some(before.worst)),
+        number(Some(after.worst)),
+        before.poor.to_string(),
+        after.poor.to_string(),
+        before.fair.to_string(),
+        after.fair.to_string(),
+        before.good.to_string(),
+        after.good.to_string(),
+        result.inverted.to_string(),
+        worst.element.to_string(),
+        csv_text(&worst.region),
+        number(inversion.step),
+        inversion.element.map_or_else(String::new, |e| e.to_string()),
+        number(Some(result.reached)),
+        result.increments.to_string(),
+        result.rescues.to_string(),
+    ]
+}
+
+fn paper_cells(paper: &Paper) -> Vec<String> {
+    let count = |value: Option<usize>| value.map_or_else(String::new, |value| value.to_string());
+    vec![
+        number(paper.worst_quality),
+        count(paper.poor),
+        number(paper.share_poor_percent),
+        number(paper.share_fair_percent),
+        number(paper.share_good_percent),
+        count(paper.equations),
+    ]
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| format!("{value:?}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::report::verdict;
+    use super::*;
+    use crate::exit_code::ExitCode;
+    use crate::files::{RunStatus, StopReason, to_json};
+
+    fn broken() -> CaseReport {
+        CaseReport {
+            name: "b, stiff".to_owned(),
+            valid: false,
+            error: Some("the matrix is singular".to_owned()),
+            nodes: 125,
+            tets: 384,
+            moved_nodes: 1,
+            result: None,
+            paper: Some(Paper { equations: Some(360), poor: Some(7), ..Paper::default() }),
+        }
+    }
+
+    fn report(cases: Vec<CaseReport>) -> MorphReport {
+        let (status, stop_reason) = verdict(&cases);
+        MorphReport {
+            schema_version: 1,
+            command: "morph",
+            status,
+            stop_reason,
+            quality_of: "elastic body",
+            cases,
+            tuned: None,
+            timings_s: [].into(),
+            peak_memory_bytes: 0,
+        }
+    }
+
+    #[test]
+    fn a_case_that_could_not_be_computed_is_a_row_with_its_error() {
+        let report = report(vec![broken(), broken()]);
+        let csv = csv(&report);
+        let rows: Vec<&str> = csv.lines().collect();
+        assert_eq!(rows[0].split(',').count(), COLUMNS.len());
+        let empty = ",".repeat(18);
+        assert_eq!(rows[1], format!("\"b, stiff\",false{empty},,7,,,,360,the matrix is singular"));
+        let text = text(&report);
+        assert!(text.contains("\nb, stiff: the matrix is singular"), "{text}");
+        let json = String::from_utf8(to_json(&report)).expect("UTF-8");
+        assert!(
+            json.contains("\"error\": \"the matrix is singular\"") && !json.contains("\"after\""),
+            "{json}"
+        );
+    }
+
+    #[test]
+    fn a_broken_case_stops_a_sweep_and_a_single_motion_fails_only_if_inverted() {
+        let stopped = report(vec![broken(), CaseReport { valid: true, ..broken() }]);
+        assert_eq!((stopped.status, stopped.stop_reason), (RunStatus::Stopped, StopReason::MeshLimit));
+        assert_eq!(stopped.exit_code(), ExitCode::Stopped);
+        assert_eq!(report(vec![broken()]).exit_code(), ExitCode::Stopped);
+        assert_eq!(report(Vec::new()).exit_code(), ExitCode::Success);
+        let failed = MorphReport { status: RunStatus::Failed, ..report(vec![broken()]) };
+        assert_eq!(failed.exit_code(), ExitCode::Numerical);
+    }
+}

@@ -1,0 +1,135 @@
+//! What a run keeps as its evaluations come: fields, journal, history.
+//!
+//! The order is that of what must be on the disk first: a field file and the collection that names it, then the record in
+//! the journal, which makes the evaluation one that a resumed run replays, then the row of the history.
+
+use std::collections::VecDeque;
+
+use fluxmorph_geometry::io::pvd_text;
+
+use super::Session;
+use super::pieces::SharedPieces;
+use crate::config::FieldsKept;
+use crate::error::Error;
+use crate::files::fields::{self, FieldData};
+use crate::files::{History, RunDirectory};
+use crate::run::journal::Journal;
+use crate::show::Evaluation;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::{Record, Recorder};
+use fluxmorph_optimizer::problem::{Analysis, Problem};
+
+/// Writes journal, history and fields into the run directory.
+pub(super) struct DirectoryRecorder {
+    directory: RunDirectory,
+    journal: Journal,
+    history: History,
+    kept: FieldsKept,
+    /// Evaluations with a field file, ascending.
+    written: Vec<usize>,
+    /// Evaluations of before that are still to be replayed.
+    replayed: VecDeque<Record>,
+    /// The most ranks that had a share in these; `None` where one process computed them.
+    ranks: Option<usize>,
+    /// Where all ranks write the fields.
+    pieces: Option<SharedPieces>,
+}
+
+impl DirectoryRecorder {
+    /// Behind the records that the journal holds: history, collection and field files are brought to these.
+    pub(super) fn new(session: &Session<'_>, journal: Journal, replayed: Vec<Record>) -> Result<Self, Error> {
+        let (directory, problem) = (session.directory.clone(), &session.setup.problem);
+        let kept = session.config.output.fields;
+        let names: Vec<&str> =
+            problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect();
+        let rows: Vec<&Evaluation> = replayed.iter().map(|record| &record.row).collect();
+        let history = History::create(&directory, &names, &rows)?;
+        let mut written = directory.evaluations_with_fields()?;
+        written.retain(|&evaluation| replayed.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
+        // No collection names a file that is removed.
+        if written.is_empty() {
+            directory.remove(&directory.collection())?;
+        } else {
+            write_collection(&directory, &written)?;
+        }
+        directory.remove_leftovers(&written)?;
+        let (pieces, ranks) = (session.pieces(), session.manifest.ranks);
+        let replayed = replayed.into();
+        Ok(Self { directory, journal, history, kept, written, replayed, ranks, pieces })
+    }
+
+    /// Writes the field of an evaluation, and the collection of all.
+    pub(super) fn write(
+        &mut self,
+        evaluation: usize,
+        problem: &Problem,
+        analysis: &Analysis,
+    ) -> Result<(), Error> {
+        if self.written.last() == Some(&evaluation) {
+            return Ok(());
+        }
+        write_field(&self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
+        self.written.push(evaluation);
+        write_collection(&self.directory, &self.written)
+    }
+
+    /// Keeps a complete evaluation.
+    fn keep(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {
+        if is_wanted(self.kept, record) {
+            self.write(record.row.evaluation, problem, analysis)?;
+        }
+        self.journal.append(record)?;
+        Ok(self.history.append(&record.row)?)
+    }
+}
+
+impl Recorder for DirectoryRecorder {
+    fn is_bitwise_reproducible(&self) -> bool {
+        self.ranks.is_none()
+    }
+
+    fn replay(&mut self) -> Option<Record> {
+        self.replayed.pop_front()
+    }
+
+    fn record(
+        &mut self,
+        record: &Record,
+        analysis: &Analysis,
+        problem: &Problem,
+    ) -> Result<(), OptimizerError> {
+        Ok(self.keep(record, analysis, problem)?)
+    }
+}
+
+/// Whether the field of an evaluation is written when it is computed.
+fn is_wanted(kept: FieldsKept, record: &Record) -> bool {
+    match kept {
+        FieldsKept::Every => true,
+        FieldsKept::Improved => record.improved,
+        FieldsKept::FirstLast => record.row.evaluation == 0,
+        FieldsKept::Nothing => false,
+    }
+}
+
+/// Writes the field file of an evaluation, or the pieces of all ranks.
+pub(super) fn write_field(
+    directory: &RunDirectory,
+    pieces: Option<&SharedPieces>,
+    evaluation: usize,
+    problem: &Problem,
+    analysis: &Analysis,
+) -> Result<(), Error> {
+    if let Some(pieces) = pieces {
+        return pieces.write(directory, evaluation, problem, analysis);
+    }
+    let bytes = fields::vtu(problem.states(), &FieldData::of(analysis))?;
+    Ok(directory.write_field(evaluation, &bytes)?)
+}
+
+/// Writes the PVD file over all field files; its time is the evaluation number.
+pub(super) fn write_collection(directory: &RunDirectory, evaluations: &[usize]) -> Result<(), Error> {
+    let files = directory.fields_in_collection(evaluations)?;
+    let text = pvd_text(evaluations.iter().zip(&files).map(|(&e, file)| (e as f64, file.as_str())))?;
+    Ok(directory.write(&directory.collection(), text.as_bytes())?)
+}

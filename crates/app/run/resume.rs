@@ -1,0 +1,218 @@
+//! Resuming an interrupted run: its directory holds all that is needed.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use fluxmorph_geometry::parallel::RankGroup;
+
+use super::prepared::Prepared;
+use super::recorder::DirectoryRecorder;
+use super::{Options, Session};
+use crate::build::Purpose;
+use crate::config::{Config, SourceMap};
+use crate::error::Error;
+use crate::files::{
+    Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
+    surface_files,
+};
+use crate::run::journal::{Contents, Identity, Journal, Rest};
+use crate::show::RunObserver;
+use fluxmorph_optimizer::Error as OptimizerError;
+
+/// Largest configuration and largest result that are read [bytes].
+const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
+
+/// Limits in place of those that the run was started with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Limits {
+    /// Most evaluations, those of before counted in.
+    pub max_evaluations: Option<usize>,
+    /// Longest time from now [s].
+    pub max_time: Option<f64>,
+}
+
+/// A run as its directory holds it.
+#[derive(Debug)]
+pub struct SavedRun {
+    directory: RunDirectory,
+    manifest: Manifest,
+    config: Config,
+    source: SourceMap,
+}
+
+impl SavedRun {
+    /// Reads manifest and configuration; nothing is written.
+    ///
+    /// # Errors
+    /// [`Error::NotResumable`] where there is no run to resume, [`OutputError::OlderJournal`], faults of the configuration, files that cannot be read.
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
+        let directory = RunDirectory::open(disk, path)?;
+        let manifest = Manifest::read(&directory)?;
+        if manifest.command != "run" {
+            let cause = format!("it holds a `{}`, which is done in one go: start it again", manifest.command);
+            return Err(not_resumable(&directory, cause));
+        }
+        directory.refuse_older_journal()?;
+        let (mut config, source) = configuration(&directory, &manifest)?;
+        config.output.directory = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        Ok(Self { directory, manifest, config, source })
+    }
+
+    /// The configuration that the run was started with.
+    pub fn config(&self) -> (&Config, &SourceMap) {
+        (&self.config, &self.source)
+    }
+}
+
+/// Resumes an interrupted run: history, fields, journal and result are those of a run without a break, but for times.
+///
+/// A run that has ended by itself is left as it is, and its result returned; so is one that used up its evaluations, unless
+/// `limits` allows more.
+///
+/// # Errors
+/// [`Error::OtherRun`] where configuration, mesh or program are others, [`Error::Replay`]; before anything is written.
+/// Afterwards as [`super::run`].
+pub fn resume(
+    saved: SavedRun,
+    limits: Limits,
+    options: Options<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<RunResult, Error> {
+    let SavedRun { directory, manifest, mut config, source } = saved;
+    let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
+    config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
+    config.optimizer.max_time = limits.max_time.or(in_force.max_time_s);
+    if let Some(result) = ended(&directory, &manifest, config.optimizer.max_evaluations) {
+        observer.note(&format!("nothing to resume: {}", advice(&result)));
+        return Ok(result);
+    }
+    let prepared = Prepared::new(&config, &source, Purpose::Optimisation, options, observer)
+        .and_then(Prepared::approach_initial)
+        .map_err(|error| match error {
+            Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
+            other => other,
+        })?;
+    let mut session = prepared.session("run", directory.clone(), manifest);
+    let contents = journal(&directory, &session.identity(), observer)?;
+    session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
+    session.announce(observer);
+    directory.make_fields()?;
+    // Before the manifest is touched: the journal holds the directory against other processes.
+    let (journal, records) = match contents {
+        Some(contents) => (Journal::reopen(&directory, &contents)?, contents.records),
+        None => {
+            observer.warning("there is no journal.jsonl: all evaluations are computed anew");
+            (Journal::create(&directory, session.identity())?, Vec::new())
+        }
+    };
+    let recorder = DirectoryRecorder::new(&session, journal, records)?;
+    session.manifest.write(&directory)?;
+    session.conclude(observer, |session, observer| session.optimise(recorder, observer))
+}
+
+impl Session<'_> {
+    /// Adds a resumption behind so many evaluations to the manifest, which is not written yet.
+    fn note_resumption(&mut self, evaluations: usize, options: Options<'_>) {
+        let Self { manifest, config, .. } = self;
+        manifest.ranks = manifest.ranks.max(options.team.map(RankGroup::size));
+        manifest.resumed(Resumption::now(evaluations, LimitsInForce::of(&config.optimizer), options.threads));
+        for file in surface_files(&config.output.stl) {
+            if !manifest.surfaces.contains(&file) {
+                manifest.surfaces.push(file);
+            }
+        }
+    }
+}
+
+fn not_resumable(directory: &RunDirectory, cause: String) -> Error {
+    Error::NotResumable { path: directory.path().to_owned(), cause }
+}
+
+/// The configuration that the run was started with, read again.
+///
+/// # Errors
+/// [`Error::NotResumable`] where it is gone, faults of its text, or when it cannot be read.
+pub(crate) fn configuration(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+) -> Result<(Config, SourceMap), Error> {
+    let path = directory.config();
+    let bytes = match directory.disk().read(&path, LARGEST[0]) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let cause = match Journal::read(directory) {
+                Ok(None) => {
+                    "it was broken off before its configuration was saved, and nothing is lost: start it again with --force"
+                }
+                _ => {
+                    "its config.toml is gone: restore it from the file that manifest.json names, and its evaluations are kept"
+                }
+            };
+            return Err(not_resumable(directory, cause.to_owned()));
+        }
+        other => other.map_err(OutputError::io("read", &path))?,
+    };
+    let text = String::from_utf8(bytes)
+        .map_err(|error| OutputError::Damaged { path: path.clone(), message: error.to_string() })?;
+    let given = manifest.config.as_ref().map_or("", |config| config.path.as_str());
+    let stem = Path::new(given).file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
+    let folder = manifest.folder.clone().unwrap_or_default();
+    Ok(Config::again(path.display().to_string(), text, folder, &stem, &manifest.overrides)?)
+}
+
+/// The result of a run that has ended and would end in the same way again.
+fn ended(directory: &RunDirectory, manifest: &Manifest, max_evaluations: usize) -> Option<RunResult> {
+    let bytes = directory.disk().read(&directory.result(), LARGEST[1]).ok()?;
+    let result: RunResult = serde_json::from_slice(&bytes).ok()?;
+    let may_go_on = match result.stop_reason {
+        StopReason::MaxEvaluations => max_evaluations > result.evaluations,
+        StopReason::MaxTime => true,
+        _ => false,
+    };
+    let has_ended = matches!(manifest.status, RunStatus::Converged | RunStatus::Stopped);
+    (has_ended && !may_go_on).then_some(result)
+}
+
+/// Why there is nothing to resume, and what can be done.
+fn advice(result: &RunResult) -> String {
+    let reason = result.stop_reason.describe();
+    match result.stop_reason {
+        StopReason::MaxEvaluations => {
+            format!("{reason}; go on with --max-evaluations above {}", result.evaluations)
+        }
+        _ => reason.to_owned(),
+    }
+}
+
+/// The journal, if it is that of this run.
+fn journal(
+    directory: &RunDirectory,
+    now: &Identity,
+    observer: &mut dyn RunObserver,
+) -> Result<Option<Contents>, Error> {
+    let Some(contents) = Journal::read(directory)? else { return Ok(None) };
+    let path = directory.journal();
+    if let Err(cause) = contents.identity.check(now) {
+        return Err(Error::OtherRun { path, cause });
+    }
+    let (count, file) = (contents.records.len(), path.display());
+    let behind = match count.checked_sub(1) {
+        Some(last) => format!("behind evaluation {last}"),
+        None => "before the first evaluation".to_owned(),
+    };
+    match contents.rest {
+        Rest::Nothing => {}
+        Rest::Torn(bytes) => observer.warning(&format!(
+            "`{file}`: {bytes} bytes {behind} are no whole record, as after a loss of power; they are dropped"
+        )),
+        Rest::Damaged(bytes) => {
+            Journal::keep_damaged(directory)?;
+            observer.warning(&format!(
+                "`{file}` is damaged {behind}: what follows, {bytes} bytes, cannot be trusted and is computed again; the \
+                 file is kept as `{}`",
+                directory.damaged_journal().display()
+            ));
+        }
+    }
+    observer.note(&format!("going on behind {} evaluations of the journal", contents.records.len()));
+    Ok(Some(contents))
+}

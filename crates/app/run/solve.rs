@@ -1,0 +1,98 @@
+//! One analysis with its directory: the field of a single design.
+
+use super::prepared::Prepared;
+use super::recorder::{write_collection, write_field};
+use super::summary::{constraints, terms};
+use super::{Options, Session};
+use crate::build::Purpose;
+use crate::config::{Config, FieldsKept, SourceMap};
+use crate::error::Error;
+use crate::files::exports;
+use crate::files::{ObjectiveResult, RunResult, StopReason};
+use crate::show::RunObserver;
+use fluxmorph_optimizer::problem::SolverCache;
+use fluxmorph_optimizer::problem::Stage;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem};
+
+/// Analyses one design and writes its field and result.
+///
+/// # Errors
+/// As [`super::run`].
+pub fn solve(
+    config: &Config,
+    source: &SourceMap,
+    design: Option<Vec<f64>>,
+    options: Options<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<RunResult, Error> {
+    let mut prepared = Prepared::new(config, source, Purpose::Analysis, options, observer)?;
+    let values = design_values(&prepared.setup.problem, design, observer);
+    // A design that breaks the mesh is refused before an earlier run is replaced.
+    let p = values.as_deref().unwrap_or_default();
+    let problem = &mut prepared.setup.problem;
+    prepared.approach = problem.continue_to(p, options.interrupted)?;
+    let moved = problem.moved(p)?;
+    let session = prepared.begin("solve", observer)?;
+    session.conclude(observer, |session, observer| {
+        let problem = &session.setup.problem;
+        session.approach.iter().for_each(|event| observer.round(event));
+        observer.phase("solving the field");
+        let (cache, stages) = (&mut SolverCache::default(), &mut |stage| observer.stage(stage));
+        let analysis = problem.analyse(moved, p, Derivatives::First, cache, stages)?;
+        session.write_analysis(values.as_deref(), &analysis, observer)
+    })
+}
+
+/// The design to analyse: the one given, or the initial one; `None` without a design surface.
+fn design_values(
+    problem: &Problem,
+    given: Option<Vec<f64>>,
+    observer: &mut dyn RunObserver,
+) -> Option<Vec<f64>> {
+    let shape = problem.shape()?;
+    let values = given.unwrap_or_else(|| shape.initial().to_vec());
+    let outside = |k: usize| values[k] < shape.lower()[k] || values[k] > shape.upper()[k];
+    if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
+        observer.warning(&format!("design variable {k} = {} mm lies outside its bounds", values[k] * 1e3));
+    }
+    Some(values)
+}
+
+impl Session<'_> {
+    /// Writes the field and the exports of an analysis; returns its result.
+    fn write_analysis(
+        &self,
+        values: Option<&[f64]>,
+        analysis: &Analysis,
+        observer: &mut dyn RunObserver,
+    ) -> Result<RunResult, Error> {
+        let (config, problem) = (self.config, &self.setup.problem);
+        observer.stage(Stage::Writing);
+        for event in &analysis.solver_events {
+            observer.notice(&event.to_string());
+        }
+        let bounds = problem.bounds(values.unwrap_or_default(), analysis)?;
+        if config.output.fields != FieldsKept::Nothing {
+            write_field(&self.directory, self.pieces().as_ref(), 0, problem, analysis)?;
+            write_collection(&self.directory, &[0])?;
+        }
+        exports::write(config, &self.directory, &analysis.mesh, observer)?;
+        let initial_quality = problem.quality(problem.original()).worst;
+        let (reason, timings) = (StopReason::Done, &analysis.timings);
+        Ok(RunResult {
+            evaluations: 1,
+            objective: analysis.objective.map(|value| ObjectiveResult {
+                initial: value,
+                best: value,
+                ratio: 1.0,
+                best_evaluation: 0,
+                verified_ratio: None,
+                verification: None,
+                terms: terms(problem, analysis),
+            }),
+            constraints: constraints(problem, analysis, &bounds),
+            rounds: self.approach.clone(),
+            ..self.result(reason, analysis, values, initial_quality, timings, observer)?
+        })
+    }
+}

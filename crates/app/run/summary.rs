@@ -1,0 +1,159 @@
+//! What the result of a run and that of a single analysis have in common: the best design, its mesh, losses and probes.
+
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::locate::{Located, locate};
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_solver::{SolverError, recovery};
+
+use super::Session;
+use crate::error::Error;
+use crate::files::{
+    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ProbeResult, RunResult, StateResult,
+    StopReason, TermResult, peak_memory_bytes,
+};
+use crate::show::RunObserver;
+use fluxmorph_optimizer::constraint::{Bound, Constraint};
+use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
+
+impl Session<'_> {
+    /// The parts of a result that run and solve share.
+    pub(super) fn result(
+        &self,
+        stop_reason: StopReason,
+        analysis: &Analysis,
+        values: Option<&[f64]>,
+        initial_quality: f64,
+        timings: &Timings,
+        observer: &mut dyn RunObserver,
+    ) -> Result<RunResult, Error> {
+        let problem = &self.setup.problem;
+        let mesh = &analysis.mesh;
+        let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
+        let located = locate(mesh, &places);
+        let states = (0..problem.states().len())
+            .map(|index| self.state_result(index, analysis, &located, observer))
+            .collect::<Vec<_>>();
+        let StateResult { probes, losses_w, .. } = states[0].clone();
+        let design = match (problem.shape(), values) {
+            (Some(shape), Some(values)) => Some(DesignResult {
+                values_m: values.to_vec(),
+                lower_m: shape.lower().to_vec(),
+                upper_m: shape.upper().to_vec(),
+                points_m: shape.surface().points().to_vec(),
+            }),
+            _ => None,
+        };
+        let topology = mesh.topology();
+        Ok(RunResult {
+            schema_version: 1,
+            command: self.command.to_owned(),
+            status: stop_reason.into(),
+            stop_reason,
+            evaluations: 0,
+            iterations: 0,
+            objective: None,
+            constraints: Vec::new(),
+            rounds: Vec::new(),
+            design,
+            mesh: MeshResult {
+                nodes: topology.node_count(),
+                tets: topology.tets().len(),
+                unknowns: problem.states().iter().map(|model| model.unknown_count()).sum(),
+                worst_quality_initial: initial_quality,
+                worst_quality_final: analysis.quality.worst,
+            },
+            frequencies_hz: self.config.analysis.frequencies().to_vec(),
+            probes,
+            losses_w,
+            states: if states.len() > 1 { states } else { Vec::new() },
+            linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
+            timings_s: BTreeMap::from([
+                ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
+                ("setup".to_owned(), self.setup_seconds),
+                ("remesh".to_owned(), timings.remesh),
+                ("assembly".to_owned(), timings.assembly),
+                ("factor".to_owned(), timings.factor),
+                ("state".to_owned(), timings.state),
+                ("adjoint".to_owned(), timings.adjoint),
+                ("gradient".to_owned(), timings.gradient),
+            ]),
+            peak_memory_bytes: peak_memory_bytes(),
+        })
+    }
+
+    /// Losses and probes of one state; `located` has an entry for every point of every probe.
+    fn state_result(
+        &self,
+        index: usize,
+        analysis: &Analysis,
+        located: &[Option<Located>],
+        observer: &mut dyn RunObserver,
+    ) -> StateResult {
+        let (model, solution) = (&self.setup.problem.states()[index], &analysis.solutions[index]);
+        let mesh = &analysis.mesh;
+        let mut located = located.iter();
+        let probes = self
+            .config
+            .probes
+            .iter()
+            .map(|probe| {
+                let mut at = |&point| match located.next().copied().flatten() {
+                    Some((e, _)) => Some(recovery::recovered_flux_density(solution, model, mesh, e, point)),
+                    // It was inside before the mesh moved: the result of a whole run is worth more than this point.
+                    None => {
+                        if index == 0 {
+                            let ([lower, upper], probe) = (mesh.bounding_box(), probe.name.clone());
+                            let error = SolverError::ProbeOutside { probe, point, lower, upper };
+                            observer.warning(&format!("{error}: its field is left out"));
+                        }
+                        None
+                    }
+                };
+                let b: Vec<_> = probe.points.iter().map(&mut at).collect();
+                ProbeResult {
+                    name: probe.name.clone(),
+                    points_m: probe.points.clone(),
+                    b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
+                    b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
+                }
+            })
+            .collect();
+        StateResult {
+            frequency_hz: self.config.analysis.frequencies()[index],
+            losses_w: solution.losses(model, mesh).into_iter().collect(),
+            probes,
+        }
+    }
+}
+
+/// The terms of the objective at a design.
+pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
+    let terms = problem.objective().into_iter().flat_map(|objective| &objective.terms);
+    let of = |(term, &value): (&Term, &f64)| TermResult {
+        kind: term.label.kind.to_owned(),
+        region: term.label.region.clone(),
+        frequency: term.label.frequency,
+        weight: term.weight,
+        value,
+    };
+    terms.zip(&analysis.terms).map(of).collect()
+}
+
+/// The constraints at a design.
+pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Bound]) -> Vec<ConstraintResult> {
+    let of = |((constraint, measured), bound): ((&Constraint, &Measured), &Bound)| ConstraintResult {
+        name: constraint.name.clone(),
+        value: measured.value,
+        bound: bound.value,
+        satisfied: bound.is_satisfied(measured.value),
+    };
+    problem.constraints().iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
+}
+
+/// How the linear systems were solved.
+pub(super) fn linear_solver(problem: &Problem, worst_residual: f64, iterations: usize) -> LinearSolverResult {
+    let methods = problem.states().iter().map(|model| model.method_name());
+    LinearSolverResult { methods: methods.collect(), worst_residual, iterations }
+}

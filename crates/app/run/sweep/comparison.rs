@@ -1,0 +1,226 @@
+//! What the runs of a sweep have found, side by side: `sweep.csv`, and the numbers of the page.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{Layout, Planned, Sweep, page, state};
+use crate::config::Goal;
+use crate::error::Error;
+use crate::files::{Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, csv_text};
+use crate::run::journal::Journal;
+
+/// The results of all combinations, in their order.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The directory of the sweep.
+    pub directory: String,
+    /// The swept keys.
+    pub keys: Vec<String>,
+    /// The row of the best objective relative to its start; `None` where nothing can be compared.
+    pub best: Option<usize>,
+    /// The rows.
+    pub combinations: Vec<Row>,
+}
+
+/// One combination.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Values of the swept keys.
+    pub values: Vec<String>,
+    /// How far its run is; `None` where it has not begun.
+    pub status: Option<RunStatus>,
+    /// Why it ended.
+    pub stop_reason: Option<StopReason>,
+    /// Evaluations so far.
+    pub evaluations: Option<usize>,
+    /// The objective at the initial design.
+    pub objective_initial: Option<f64>,
+    /// The objective at the best design.
+    pub objective_best: Option<f64>,
+    /// Best over initial objective.
+    pub ratio: Option<f64>,
+    /// The same on a freshly generated mesh.
+    pub verified_ratio: Option<f64>,
+    /// Worst quality (Eq. 4) of the mesh of the best design.
+    pub worst_quality: Option<f64>,
+    /// Wall time [s].
+    pub seconds: Option<f64>,
+    /// Most memory held [bytes].
+    pub peak_memory_bytes: Option<u64>,
+    /// The run directory, relative to that of the sweep.
+    pub directory: String,
+    /// Evaluation and ratio, as they came.
+    #[serde(skip)]
+    pub(super) curve: Vec<[f64; 2]>,
+    /// Whether all constraints are kept.
+    #[serde(skip)]
+    is_feasible: bool,
+    /// Which way the objective is better.
+    #[serde(skip)]
+    goal: Goal,
+    /// Whether there is a page about the run.
+    #[serde(skip)]
+    pub(super) is_reported: bool,
+}
+
+impl Comparison {
+    /// Reads what the run directories hold.
+    ///
+    /// # Errors
+    /// When a file that is there cannot be read.
+    pub fn read(sweep: &Sweep, layout: &Layout) -> Result<Self, Error> {
+        let rows = sweep.combinations.iter().map(|planned| Row::read(sweep, layout, planned));
+        let mut comparison = Self {
+            directory: layout.path().display().to_string(),
+            keys: sweep.swept().map(|setting| setting.key.clone()).collect(),
+            best: None,
+            combinations: rows.collect::<Result<_, _>>()?,
+        };
+        comparison.best = comparison.find_best();
+        Ok(comparison)
+    }
+
+    /// Reads one combination again.
+    ///
+    /// # Errors
+    /// As [`Comparison::read`].
+    pub fn update(&mut self, sweep: &Sweep, layout: &Layout, index: usize) -> Result<(), Error> {
+        self.combinations[index] = Row::read(sweep, layout, &sweep.combinations[index])?;
+        self.best = self.find_best();
+        Ok(())
+    }
+
+    /// Writes `sweep.csv` and `sweep.html`.
+    ///
+    /// # Errors
+    /// When the operating system refuses.
+    pub fn write(&self, sweep: &Sweep, layout: &Layout) -> Result<(), Error> {
+        layout.write("sweep.csv", self.csv().as_bytes())?;
+        Ok(layout.write("sweep.html", page::page(sweep, self).as_bytes())?)
+    }
+
+    /// The content of `sweep.csv`: shortest digits that read back as the same number; empty for what is not there.
+    pub fn csv(&self) -> String {
+        let columns = self.keys.iter().map(|key| csv_text(key)).chain(COLUMNS.map(str::to_owned));
+        let mut table = columns.collect::<Vec<_>>().join(",") + "\n";
+        for row in &self.combinations {
+            let value = serde_json::to_value(row).expect("numbers and text have a JSON form");
+            let cell = |column: &str| match &value[column] {
+                Value::Null if column == "status" => "not_begun".to_owned(),
+                Value::Null => String::new(),
+                Value::String(text) => csv_text(text),
+                other => other.to_string(),
+            };
+            let cells = row.values.iter().map(|value| csv_text(value)).chain(COLUMNS.map(cell));
+            table += &(cells.collect::<Vec<_>>().join(",") + "\n");
+        }
+        table
+    }
+
+    /// The best of the rows that keep their constraints and want the same.
+    fn find_best(&self) -> Option<usize> {
+        let goal = self.combinations.first()?.goal;
+        if self.combinations.iter().any(|row| row.goal != goal) {
+            return None;
+        }
+        let known = |(index, row): (usize, &Row)| Some((index, row.ratio.filter(|ratio| ratio.is_finite())?));
+        let sound = self.combinations.iter().enumerate().filter(|(_, row)| row.is_feasible);
+        let better = |a: f64, b: f64| match goal {
+            Goal::Minimise => a < b,
+            Goal::Maximise => a > b,
+        };
+        let mut best: Option<(usize, f64)> = None;
+        for (index, ratio) in sound.filter_map(known) {
+            if best.is_none_or(|(_, known)| better(ratio, known)) {
+                best = Some((index, ratio));
+            }
+        }
+        best.map(|(index, _)| index)
+    }
+}
+
+/// Columns of `sweep.csv` behind those of the keys.
+const COLUMNS: [&str; 11] = [
+    "status",
+    "stop_reason",
+    "evaluations",
+    "objective_initial",
+    "objective_best",
+    "ratio",
+    "verified_ratio",
+    "worst_quality",
+    "seconds",
+    "peak_memory_bytes",
+    "directory",
+];
+
+impl Row {
+    /// Reads the run directory of a combination.
+    ///
+    /// # Errors
+    /// When a file that is there cannot be read.
+    pub fn read(sweep: &Sweep, layout: &Layout, planned: &Planned) -> Result<Self, OutputError> {
+        let blank = Self::blank(planned);
+        let run = match RunDirectory::open(layout.disk(), &sweep.run_directory(planned)) {
+            Ok(run) => run,
+            Err(OutputError::NoRun { .. }) => return Ok(blank),
+            Err(error) => return Err(error),
+        };
+        let manifest = Manifest::read(&run)?;
+        let curve = curve(&run)?;
+        let result = state::result(&run, &manifest);
+        let objective = result.as_ref().and_then(|result| result.objective.as_ref());
+        let of_result = |value: fn(&RunResult) -> Option<f64>| result.as_ref().and_then(value);
+        let length = Some(curve.len()).filter(|length| *length > 0);
+        Ok(Self {
+            status: Some(manifest.status),
+            stop_reason: result.as_ref().map(|result| result.stop_reason),
+            evaluations: result.as_ref().map(|result| result.evaluations).or(length),
+            objective_initial: objective.map(|objective| objective.initial),
+            objective_best: objective.map(|objective| objective.best),
+            ratio: objective.map(|objective| objective.ratio),
+            verified_ratio: objective.and_then(|objective| objective.verified_ratio),
+            worst_quality: of_result(|result| Some(result.mesh.worst_quality_final)),
+            seconds: of_result(|result| result.timings_s.get("total").copied()),
+            peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
+            is_feasible: result.as_ref().is_some_and(|r| r.constraints.iter().all(|c| c.satisfied)),
+            is_reported: is_file(layout, &run.report()),
+            curve,
+            ..blank
+        })
+    }
+
+    fn blank(planned: &Planned) -> Self {
+        Self {
+            values: planned.combination.values.clone(),
+            status: None,
+            stop_reason: None,
+            evaluations: None,
+            objective_initial: None,
+            objective_best: None,
+            ratio: None,
+            verified_ratio: None,
+            worst_quality: None,
+            seconds: None,
+            peak_memory_bytes: None,
+            directory: planned.combination.name.clone(),
+            curve: Vec::new(),
+            is_feasible: false,
+            goal: planned.goal,
+            is_reported: false,
+        }
+    }
+}
+
+fn is_file(layout: &Layout, path: &Path) -> bool {
+    let folder = path.parent().unwrap_or(path);
+    layout.disk().names(folder).is_ok_and(|names| names.iter().any(|name| path.ends_with(name)))
+}
+
+/// Evaluation and ratio of every evaluation; a last one that is being written is left out.
+fn curve(run: &RunDirectory) -> Result<Vec<[f64; 2]>, OutputError> {
+    let records = Journal::read_records(run)?;
+    Ok(records.iter().map(|record| [record.row.evaluation as f64, record.row.ratio]).collect())
+}

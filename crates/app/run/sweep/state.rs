@@ -1,0 +1,176 @@
+//! What a run directory of a sweep holds, and so what is left to do.
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::{Planned, Sweep};
+use crate::build::build_mesh;
+use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
+use crate::files::{Disk, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason};
+use crate::run;
+
+/// Largest result that is read [bytes].
+const LARGEST: u64 = 1 << 30;
+
+/// How far a combination is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum State {
+    /// Nothing is there.
+    Missing,
+    /// It was broken off before there was anything to keep.
+    Unborn,
+    /// It was broken off, or its limits are wider now: it can be gone on with.
+    Broken,
+    /// It has ended, for this reason.
+    Finished(StopReason),
+    /// Another process works on it.
+    InUse,
+    /// It is something else, and this is the difference.
+    Other(String),
+}
+
+/// Looks into the run directories of a sweep.
+#[derive(Debug)]
+pub struct States<'a> {
+    disk: &'a Arc<dyn Disk>,
+    sweep: &'a Sweep,
+    /// Whether a mesh file still is the mesh of a hash: looked at once for all runs that share both.
+    meshes: BTreeMap<(PathBuf, String), bool>,
+}
+
+impl<'a> States<'a> {
+    /// Nothing is read yet.
+    pub fn new(disk: &'a Arc<dyn Disk>, sweep: &'a Sweep) -> Self {
+        Self { disk, sweep, meshes: BTreeMap::new() }
+    }
+
+    /// How far the run in the directory of a combination is.
+    ///
+    /// # Errors
+    /// When a file that is there cannot be read.
+    pub fn of(&mut self, planned: &Planned) -> Result<State, OutputError> {
+        let (disk, path) = (self.disk, self.sweep.run_directory(planned));
+        let names = match disk.names(&path) {
+            // A file in its place, or in that of the sweep, is found by whoever makes the folder.
+            Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+                return Ok(State::Missing);
+            }
+            other => other.map_err(OutputError::io("read", &path))?,
+        };
+        let run = match RunDirectory::open(disk, &path) {
+            Ok(run) => run,
+            Err(OutputError::NoRun { .. }) if hold_nothing(&names, disk, &path) => return Ok(State::Missing),
+            Err(OutputError::NoRun { .. }) => {
+                return Ok(State::Other("it is no run of fluxmorph".to_owned()));
+            }
+            Err(error) => return Err(error),
+        };
+        if let Err(error) = run.refuse_older_journal() {
+            return Ok(State::Other(error.to_string()));
+        }
+        if let Err(error) = disk.hold(&run.journal())
+            && error.kind() == ErrorKind::ResourceBusy
+        {
+            return Ok(State::InUse);
+        }
+        let manifest = Manifest::read(&run)?;
+        if manifest.command != "run" {
+            return Ok(State::Other(format!("it holds a `{}`", manifest.command)));
+        }
+        if !run.holds_configuration() && !names.iter().any(|name| run.journal().ends_with(name)) {
+            return Ok(State::Unborn);
+        }
+        let (config, source) = match run::configuration(&run, &manifest) {
+            Ok(read) => read,
+            Err(error) => return Ok(State::Other(error.to_string())),
+        };
+        if fingerprint(&config) != planned.fingerprint {
+            return Ok(State::Other("its configuration is another".to_owned()));
+        }
+        let other_mesh = || State::Other("its mesh file is another, or has changed since".to_owned());
+        let is_here = mesh_file(&config) == planned.mesh.as_deref();
+        Ok(match result(&run, &manifest).filter(|_| has_ended(&manifest)) {
+            Some(result) if !may_go_on(&result, self.sweep, planned) => {
+                match self.has_mesh(planned, config, &source, &manifest) {
+                    true => State::Finished(result.stop_reason),
+                    false => other_mesh(),
+                }
+            }
+            // Whether the file has changed is found out by the run that goes on.
+            _ if is_here => State::Broken,
+            _ => other_mesh(),
+        })
+    }
+
+    /// Whether the mesh of a run that has ended is that of now.
+    fn has_mesh(
+        &mut self,
+        planned: &Planned,
+        mut config: Config,
+        source: &SourceMap,
+        manifest: &Manifest,
+    ) -> bool {
+        let (MeshConfig::File { path, .. }, Some(now), Some(MeshHash { blake3, .. })) =
+            (&mut config.mesh, &planned.mesh, &manifest.mesh)
+        else {
+            return true;
+        };
+        path.clone_from(now);
+        let is_that = || {
+            let mesh = build_mesh(&config, source);
+            mesh.is_ok_and(|mesh| run::mesh_hash(&config, &mesh).blake3 == *blake3)
+        };
+        *self.meshes.entry((now.clone(), blake3.clone())).or_insert_with(is_that)
+    }
+}
+
+/// The file of a mesh that is read.
+pub(super) fn mesh_file(config: &Config) -> Option<&Path> {
+    match &config.mesh {
+        MeshConfig::File { path, .. } => Some(path),
+        _ => None,
+    }
+}
+
+/// BLAKE3 of a configuration without its title, its limits, and where its files are: with others of these a run that has
+/// ended is what it was.
+pub(super) fn fingerprint(config: &Config) -> [u8; 32] {
+    let mut bare = config.clone();
+    let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
+    (bare.optimizer.max_evaluations, bare.optimizer.max_time) = (max_evaluations, max_time);
+    bare.title.clear();
+    bare.output.directory.clear();
+    if let MeshConfig::File { path, .. } = &mut bare.mesh {
+        path.clear();
+    }
+    *blake3::hash(resolved_toml(&bare).as_bytes()).as_bytes()
+}
+
+/// The result of a run, where it is that of the run's last end.
+pub(super) fn result(run: &RunDirectory, manifest: &Manifest) -> Option<RunResult> {
+    let bytes = run.disk().read(&run.result(), LARGEST).ok()?;
+    let result: RunResult = serde_json::from_slice(&bytes).ok()?;
+    (result.status == manifest.status).then_some(result)
+}
+
+fn has_ended(manifest: &Manifest) -> bool {
+    matches!(manifest.status, RunStatus::Converged | RunStatus::Stopped)
+}
+
+/// Whether the limits of now are wider than those that ended a run.
+fn may_go_on(result: &RunResult, sweep: &Sweep, planned: &Planned) -> bool {
+    match result.stop_reason {
+        StopReason::MaxEvaluations => planned.limits.max_evaluations > result.evaluations,
+        // More time is what the user gives, and not what the configuration says every time.
+        StopReason::MaxTime => sweep.limits.max_time.is_some(),
+        _ => false,
+    }
+}
+
+/// Whether these names in a folder are only what the very start of a run leaves.
+fn hold_nothing(names: &[String], disk: &Arc<dyn Disk>, path: &Path) -> bool {
+    let is_empty = |name: &str| disk.names(&path.join(name)).is_ok_and(|names| names.is_empty());
+    names.iter().all(|name| name.starts_with(".fluxmorph-") || (name == "fields" && is_empty(name)))
+}

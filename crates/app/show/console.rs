@@ -1,0 +1,132 @@
+//! Plain lines: one for each evaluation, and a summary.
+
+use std::io::Write;
+use std::time::Instant;
+
+use super::lines::Lines;
+use super::table::Columns;
+use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
+use crate::files::RunResult;
+use fluxmorph_optimizer::problem::Stage;
+
+/// A stage that takes longer [s] is shown with its time, outside of evaluations: people begin to wonder then.
+const LONG_STAGE: f64 = 2.0;
+
+/// Shows one plain line for each evaluation, and a summary.
+#[derive(Debug)]
+pub struct Console<W> {
+    writer: W,
+    lines: Lines,
+    /// The stage in hand and when it began; `None` within the evaluations of a run, which have a line each.
+    stage: Option<(Stage, Instant)>,
+    has_evaluations: bool,
+}
+
+impl Console<std::io::Stderr> {
+    /// On standard error.
+    pub fn stderr() -> Self {
+        Self { lines: Lines::new(Styles::for_stderr(), Columns::All), ..Self::new(std::io::stderr()) }
+    }
+}
+
+impl<W: Write> Console<W> {
+    /// On any writer, without colours.
+    pub fn new(writer: W) -> Self {
+        let lines = Lines::new(Styles::default(), Columns::All);
+        Self { writer, lines, stage: None, has_evaluations: false }
+    }
+
+    /// Shows the time of the stage in hand, if it was long.
+    fn end_stage(&mut self) {
+        if let Some((stage, began)) = self.stage.take() {
+            let seconds = began.elapsed().as_secs_f64();
+            if seconds >= LONG_STAGE && stage != Stage::Other {
+                self.line(&format!("  {:<28} {seconds:>7.1} s", stage.describe()));
+            }
+        }
+    }
+}
+
+impl<W: Write> Observer for Console<W> {
+    fn line(&mut self, text: &str) {
+        show(&mut self.writer, text);
+    }
+
+    fn phase(&mut self, name: &str) {
+        self.end_stage();
+        self.line(&format!("{name} ..."));
+    }
+
+    fn stage(&mut self, stage: Stage) {
+        self.end_stage();
+        if !self.has_evaluations {
+            self.stage = Some((stage, Instant::now()));
+        }
+    }
+
+    fn evaluation(&mut self, row: &Evaluation) {
+        self.lines.evaluation(row).iter().for_each(|line| self.line(line));
+    }
+
+    fn warning(&mut self, message: &str) {
+        let line = self.lines.warning(message);
+        self.line(&line);
+    }
+}
+
+impl<W: Write> RunObserver for Console<W> {
+    fn started(&mut self, started: &Started<'_>) {
+        self.end_stage();
+        self.has_evaluations = started.optimizer.is_some();
+        self.lines.started(started).iter().for_each(|line| self.line(line));
+    }
+
+    fn finished(&mut self, result: &RunResult) {
+        self.end_stage();
+        self.lines.finished(result).iter().for_each(|line| self.line(line));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::evaluation;
+    use super::*;
+
+    #[test]
+    fn one_header_stands_over_all_rows() {
+        let mut bytes = Vec::new();
+        let mut console = Console::new(&mut bytes);
+        for number in [0, 10, 999] {
+            console.evaluation(&evaluation(number));
+        }
+        let text = String::from_utf8(bytes).expect("text");
+        assert_eq!((text.lines().count(), text.matches("F/F0").count()), (4, 1), "{text}");
+    }
+
+    #[test]
+    fn a_long_stage_is_shown_with_its_time() {
+        let mut bytes = Vec::new();
+        let mut console = Console::new(&mut bytes);
+        console.stage(Stage::Assembling);
+        let began = Instant::now().checked_sub(std::time::Duration::from_secs(3)).expect("the machine is up");
+        console.stage = Some((Stage::Factoring, began));
+        console.stage(Stage::State);
+        console.end_stage();
+        let text = String::from_utf8(bytes).expect("text");
+        assert!(text.starts_with("  factoring ") && text.ends_with("3.0 s\n"), "{text}");
+    }
+
+    #[test]
+    fn a_closed_writer_is_no_reason_to_stop() {
+        struct Closed;
+        impl Write for Closed {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(std::io::ErrorKind::BrokenPipe.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Err(std::io::ErrorKind::BrokenPipe.into())
+            }
+        }
+        Console::new(Closed).evaluation(&evaluation(0));
+    }
+}

@@ -1,0 +1,224 @@
+//! What a run directory holds, read for a page. What is missing is stated with its reason; what is damaged is an error.
+
+use std::path::{Path, PathBuf};
+
+use fluxmorph_geometry::io::VtuArray;
+use fluxmorph_geometry::tet4::Point;
+
+use super::ReportedRun;
+use super::field_file::field_contents;
+use crate::build::{Outline, outline};
+use crate::config::{Config, FieldsKept};
+use crate::error::Error;
+use crate::files::{Manifest, OutputError, RunDirectory, RunResult};
+use crate::run::journal::Journal;
+use crate::show::Evaluation;
+use fluxmorph_optimizer::driver::Record;
+
+/// Largest result and configuration that are read [bytes].
+const LARGEST_TEXT: u64 = 1 << 28;
+
+/// A run as its directory holds it.
+#[derive(Debug)]
+pub(super) struct RunData {
+    /// Absolute.
+    pub(super) directory: PathBuf,
+    pub(super) manifest: Manifest,
+    pub(super) config: Config,
+    /// `resolved.toml`; `None` where it was not written yet.
+    pub(super) resolved: Option<String>,
+    pub(super) history: Vec<Evaluation>,
+    /// `None` where the run has not come to an end.
+    pub(super) result: Option<RunResult>,
+    /// Evaluation of the best design; `None` before the first one.
+    pub(super) best: Option<usize>,
+    /// The variables before and after [m].
+    pub(super) designs: [Option<Vec<f64>>; 2],
+    /// Mesh and design surface, or why there are none.
+    pub(super) outline: Result<Outline, String>,
+    /// Fields before and after, or why there are none. A single analysis has only the second.
+    pub(super) fields: [Result<Snapshot, String>; 2],
+    /// Files of the directory that a reader may want to open, relative to it.
+    pub(super) files: Vec<String>,
+}
+
+/// What a field file holds, as far as a page shows it.
+#[derive(Debug)]
+pub(super) struct Snapshot {
+    /// Its evaluation.
+    pub(super) evaluation: usize,
+    /// Moved nodes [m].
+    pub(super) points: Vec<Point>,
+    /// |B| of every element at the first frequency [T].
+    pub(super) flux_density: Vec<f64>,
+}
+
+impl RunData {
+    /// Reads the directory.
+    ///
+    /// # Errors
+    /// [`OutputError::Damaged`], and files that cannot be read.
+    pub(super) fn read(run: ReportedRun) -> Result<Self, Error> {
+        let ReportedRun { directory, manifest, config, source } = run;
+        let result: Option<RunResult> = match text(&directory, &directory.result())? {
+            Some(text) => Some(serde_json::from_str(&text).map_err(damaged(&directory.result()))?),
+            None => None,
+        };
+        let records = Journal::read_records(&directory)?;
+        let history: Vec<Evaluation> = records.iter().map(|record| record.row.clone()).collect();
+        let best = match &result {
+            Some(RunResult { objective: Some(objective), .. }) => Some(objective.best_evaluation),
+            Some(_) => Some(0),
+            None => last_improved(&history),
+        };
+        let outline = outline(&config, &source)
+            .map_err(|error| format!("the mesh cannot be made again: {}", reason(&error)));
+        let kept = directory.evaluations_with_fields()?;
+        let fields = [Some(0).filter(|_| manifest.command == "run"), best].map(|evaluation| {
+            let Some(evaluation) = evaluation else { return Ok(Err(NO_EVALUATION.to_owned())) };
+            if !kept.contains(&evaluation) {
+                return Ok(Err(not_kept(&config, evaluation)));
+            }
+            Snapshot::read(&directory, evaluation, &outline)
+        });
+        let [before, after] = fields;
+        let mut files = vec!["fields.pvd".to_owned(), "optimum.msh".to_owned()];
+        files.extend(manifest.surfaces.iter().cloned());
+        files.extend(["history.csv", "result.json", "resolved.toml", "config.toml"].map(str::to_owned));
+        let there =
+            directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
+        files.retain(|file| there.contains(file));
+        files.extend(directory.fields_in_collection(&kept)?);
+        Ok(Self {
+            // However the path is typed, the page is the same.
+            directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
+            resolved: text(&directory, &directory.resolved())?,
+            designs: designs(&records, &config, result.as_ref(), best, &outline),
+            fields: [before?, after?],
+            manifest,
+            config,
+            history,
+            result,
+            best,
+            outline,
+            files,
+        })
+    }
+
+    /// Whether this is an optimisation, and no single analysis.
+    pub(super) fn is_run(&self) -> bool {
+        self.manifest.command == "run"
+    }
+
+    /// F of the best design over F of the first, if both are known.
+    pub(super) fn ratio(&self) -> Option<f64> {
+        let of_result = self.result.as_ref().and_then(|result| result.objective.as_ref()).map(|o| o.ratio);
+        of_result.or_else(|| self.row(self.best?).map(|row| row.ratio))
+    }
+
+    /// The row of an evaluation.
+    pub(super) fn row(&self, evaluation: usize) -> Option<&Evaluation> {
+        self.history.iter().find(|row| row.evaluation == evaluation)
+    }
+}
+
+/// Why there is no field.
+const NO_EVALUATION: &str = "no evaluation was completed";
+
+fn not_kept(config: &Config, evaluation: usize) -> String {
+    match config.output.fields {
+        FieldsKept::Nothing => "no field files were kept (output.fields = \"none\")".to_owned(),
+        kept => format!(
+            "the field of evaluation {evaluation} is not in the directory (output.fields = \"{}\")",
+            kept.name()
+        ),
+    }
+}
+
+/// An error in one line.
+fn reason(error: &Error) -> String {
+    error.to_string().lines().next().unwrap_or_default().to_owned()
+}
+
+/// The text of a file; `None` where there is none.
+fn text(directory: &RunDirectory, path: &Path) -> Result<Option<String>, OutputError> {
+    match directory.disk().read(path, LARGEST_TEXT) {
+        Ok(bytes) => Ok(Some(String::from_utf8(bytes).map_err(damaged(path))?)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(OutputError::io("read", path)(error)),
+    }
+}
+
+pub(super) fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> OutputError {
+    let path = path.to_owned();
+    move |error| OutputError::Damaged { path, message: error.to_string() }
+}
+
+/// The last evaluation that was better than all before it.
+fn last_improved(history: &[Evaluation]) -> Option<usize> {
+    let mut best: Option<&Evaluation> = None;
+    for row in history {
+        if best.is_none_or(|best| row.iteration > best.iteration) {
+            best = Some(row);
+        }
+    }
+    best.map(|row| row.evaluation)
+}
+
+/// The variables before and after: of the configuration and the result, else of the journal.
+fn designs(
+    records: &[Record],
+    config: &Config,
+    result: Option<&RunResult>,
+    best: Option<usize>,
+    outline: &Result<Outline, String>,
+) -> [Option<Vec<f64>>; 2] {
+    let Some(design) = &config.design else { return [None, None] };
+    let Some(outlined) = outline.as_ref().ok().and_then(|outline| outline.design.as_ref()) else {
+        return [None, None];
+    };
+    let variables = outlined.surface.variable_count();
+    let before = design.initial.values(variables, design.lower, design.upper);
+    let of_result = result.and_then(|result| result.design.as_ref()).map(|design| design.values_m.clone());
+    let of_journal = || Some(records.get(best?)?.design.clone());
+    let after = of_result.or_else(of_journal);
+    let fits = |values: &Vec<f64>| values.len() == variables && values.iter().all(|v| v.is_finite());
+    // A single analysis begins at the undeformed surface.
+    let before = if result.is_some_and(|result| result.command == "solve") {
+        Some(vec![0.0; variables])
+    } else {
+        before
+    };
+    [before, after].map(|values| values.filter(fits))
+}
+
+impl Snapshot {
+    /// Reads the field file of an evaluation.
+    fn read(
+        directory: &RunDirectory,
+        evaluation: usize,
+        outline: &Result<Outline, String>,
+    ) -> Result<Result<Self, String>, Error> {
+        let outline = match outline {
+            Ok(outline) => outline,
+            Err(cause) => return Ok(Err(cause.clone())),
+        };
+        let (path, mut contents) = field_contents(directory, evaluation)?;
+        let topology = outline.mesh.topology();
+        if contents.points.len() != topology.node_count() || contents.tets != topology.tets() {
+            return Ok(Err(
+                "the field file and the mesh of the configuration do not belong together".to_owned()
+            ));
+        }
+        let missing = |name: &str| damaged(&path)(format!("it has no array `{name}`"));
+        let Some(VtuArray::Scalar(flux_density)) = contents.cell_data.remove("B_abs") else {
+            return Err(missing("B_abs").into());
+        };
+        let points = contents.points;
+        let finite = points.iter().flatten().chain(&flux_density).all(|v| v.is_finite());
+        if !finite {
+            return Err(damaged(&path)("it holds a value that is no number").into());
+        }
+        Ok(Ok(Self { evaluation, points, flux_density }))
+    }
+}

@@ -1,0 +1,116 @@
+//! The head of the page: how the run ended, and its key figures.
+
+use maud::Markup;
+
+use super::data::RunData;
+use super::markup::{Card, header};
+use super::plane::bounds;
+use super::ticks::{duration, grouped, number, trimmed};
+use super::words;
+use crate::build::Outline;
+use crate::config::{MeshConfig, Objective};
+use crate::files::{ObjectiveResult, RunStatus, StopReason};
+
+/// Title, status, what was done in a sentence, and key figures.
+pub(super) fn head(data: &RunData) -> Markup {
+    let kind = if data.is_run() { "Shape optimisation" } else { "Field analysis" };
+    let (class, status) = status(data);
+    let variables = data.designs[1].as_ref().or(data.designs[0].as_ref()).map(Vec::len);
+    let lead = words::summary(&data.config, variables, data.is_run());
+    let objective = data.result.as_ref().and_then(|result| result.objective.as_ref());
+    let mut cards = if data.is_run() {
+        run_cards(data, objective)
+    } else {
+        objective.map(|o| ("objective F", number(o.best, 5), unit(data).to_owned())).into_iter().collect()
+    };
+    if let Some(seconds) = data.manifest.seconds {
+        cards.push(("time", duration(seconds), format!("on {} threads", data.manifest.threads)));
+    }
+    if let Some(result) = &data.result {
+        let unknowns = format!("{} unknowns", grouped(result.mesh.unknowns));
+        cards.push(("tetrahedra", grouped(result.mesh.tets), unknowns));
+    } else if let Some(mesh) = &data.manifest.mesh {
+        cards.push(("tetrahedra", grouped(mesh.tets), format!("{} nodes", grouped(mesh.nodes))));
+    }
+    cards.extend(data.outline.as_ref().ok().map(size_card));
+    header(kind, &data.config.title, (class, &status), &lead, &cards)
+}
+
+/// A class, and how far the run is in words.
+fn status(data: &RunData) -> (&'static str, String) {
+    let Some(result) = &data.result else {
+        let (class, text) = match data.manifest.status {
+            RunStatus::Running => ("fair", "Still running, or broken off: there is no result yet"),
+            RunStatus::Interrupted => ("fair", "Interrupted before there was a result"),
+            RunStatus::Failed => ("bad", "Failed before there was a result"),
+            _ => ("bad", "There is no result.json, though the run has ended"),
+        };
+        return (class, text.to_owned());
+    };
+    let reason = result.stop_reason.describe();
+    match result.status {
+        RunStatus::Converged => ("good", format!("Converged: {reason}")),
+        RunStatus::Done => ("good", "Done".to_owned()),
+        RunStatus::Stopped if result.stop_reason == StopReason::Infeasible => {
+            ("bad", format!("Stopped: {reason}"))
+        }
+        RunStatus::Stopped => ("fair", format!("Stopped at a limit: {reason}; the results are valid")),
+        RunStatus::Interrupted => ("fair", "Interrupted: the best design so far is shown".to_owned()),
+        RunStatus::Failed => ("bad", format!("Failed: {reason}; the best design before is shown")),
+        RunStatus::Running => ("fair", "Not ended".to_owned()),
+    }
+}
+
+/// The unit of the objective, where all its terms have the same.
+fn unit(data: &RunData) -> &'static str {
+    data.config.objective.as_ref().and_then(Objective::si_unit).unwrap_or_default()
+}
+
+/// What an optimisation has gained, and at which cost.
+fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
+    let mut cards = Vec::new();
+    if let Some(ratio) = data.ratio() {
+        let remark = objective.map_or("so far".to_owned(), |o| {
+            format!("{} → {} {}", number(o.initial, 4), number(o.best, 4), unit(data))
+        });
+        cards.push(("objective F / F₀", number(ratio, 4), remark));
+    }
+    cards.extend(objective.map(|objective| fresh_mesh_card(data, objective)));
+    let (evaluations, iterations) = match (&data.result, data.history.last()) {
+        (Some(result), _) => (result.evaluations, result.iterations),
+        (None, Some(row)) => (row.evaluation.saturating_add(1), row.iteration),
+        (None, None) => (0, 0),
+    };
+    let best = data.best.map_or(String::new(), |best| format!("; best: {best}"));
+    cards.push(("evaluations", evaluations.to_string(), format!("{iterations} iterations improved{best}")));
+    cards
+}
+
+/// The gain on a mesh that was not optimised on.
+fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
+    let (value, remark) = match (objective.verified_ratio, objective.verification, &data.config.mesh) {
+        (Some(ratio), Some(v), _) => {
+            let remark = format!("refined × {}, {} tetrahedra", trimmed(v.refinement, 3), grouped(v.tets));
+            (number(ratio, 4), remark)
+        }
+        (Some(ratio), None, _) => (number(ratio, 4), "the initial shape is the best".to_owned()),
+        (None, _, MeshConfig::File { .. }) => {
+            ("not checked".to_owned(), "the mesh is from a file: solve both shapes on another one".to_owned())
+        }
+        _ => ("not checked".to_owned(), "see the messages at the end of the run".to_owned()),
+    };
+    ("on a fresh mesh", value, remark)
+}
+
+/// Extents of the design surface and of the mesh.
+fn size_card(outline: &Outline) -> Card {
+    let extents = |[low, high]: [[f64; 3]; 2]| [0, 1, 2].map(|d| high[d] - low[d]);
+    let shown = |extents: &[f64]| extents.iter().map(|e| trimmed(1e3 * e, 1)).collect::<Vec<_>>().join(" × ");
+    let mesh = shown(&extents(outline.full_mesh.bounding_box()));
+    let Some(design) = &outline.design else {
+        return ("size", format!("{mesh} mm"), "of the whole mesh".to_owned());
+    };
+    let nodes = design.surface.nodes().iter().map(|&n| outline.full_mesh.point(n));
+    let surface: Vec<f64> = extents(bounds(nodes)).into_iter().filter(|e| *e > 1e-9).collect();
+    ("design surface", format!("{} mm", shown(&surface)), format!("in a mesh of {mesh} mm"))
+}

@@ -1,0 +1,132 @@
+//! `report.html`: one page about a run, made from its directory alone, that can be sent and read anywhere.
+//!
+//! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others show one
+//! thing each: `head`, `map`, `field`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
+//! `plot` (axes) and `frame` (pictures to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
+//! `field_cut`, `cut`, `coils` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
+//! configuration in plain words), `markup` (what the pages of this program share). The page holds its style and its script
+//! (`style.css`, `view.js`), asks no network, and says nothing of the moment at which it is made: equal directories make
+//! equal pages.
+//!
+//! Does not live here: anything that solves a field or moves a mesh. What is shown was computed by the run.
+
+mod coils;
+mod colour;
+mod convergence;
+mod cut;
+mod data;
+mod facts;
+mod field;
+mod field_cut;
+mod field_file;
+mod files;
+mod frame;
+mod head;
+mod histogram;
+mod map;
+pub(crate) mod markup;
+mod observed;
+mod page;
+mod plane;
+pub(crate) mod plot;
+mod png;
+mod raster;
+mod surface;
+mod tables;
+pub(crate) mod ticks;
+mod window;
+mod words;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::config::{Config, SourceMap};
+use crate::error::Error;
+use crate::files::{Disk, Manifest, RunDirectory};
+use crate::run;
+use data::RunData;
+
+/// A run directory that a page can be made of.
+#[derive(Debug)]
+pub struct ReportedRun {
+    directory: RunDirectory,
+    manifest: Manifest,
+    config: Config,
+    source: SourceMap,
+}
+
+impl ReportedRun {
+    /// Reads manifest and configuration of the directory of a `run` or a `solve`.
+    ///
+    /// # Errors
+    /// [`Error::NoReport`] for what another command has written, faults of the configuration, files that are damaged or
+    /// cannot be read.
+    pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
+        let directory = RunDirectory::open(disk, path)?;
+        let manifest = Manifest::read(&directory)?;
+        let refused = |cause: String| Error::NoReport { path: path.to_owned(), cause };
+        if !matches!(manifest.command.as_str(), "run" | "solve") {
+            let command = &manifest.command;
+            return Err(refused(format!(
+                "it holds a `{command}`; a report is made of the directory that `fluxmorph run` or `fluxmorph solve` has written"
+            )));
+        }
+        if !directory.holds_configuration() {
+            return Err(refused(
+                "it was broken off before its configuration was saved; start it again".into(),
+            ));
+        }
+        let (config, source) = run::configuration(&directory, &manifest)?;
+        Ok(Self { directory, manifest, config, source })
+    }
+
+    /// The configuration of the run, which names the mesh that is made or read again.
+    pub fn config(&self) -> (&Config, &SourceMap) {
+        (&self.config, &self.source)
+    }
+
+    /// Writes the page into the directory or to `out`; where it is written.
+    ///
+    /// # Errors
+    /// Damaged files, or when the operating system refuses.
+    pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
+        let directory = self.directory.clone();
+        let path = out.map_or_else(|| directory.report(), Path::to_owned);
+        let data = RunData::read(self)?;
+        let page = page::page(&data, &link_prefix(&path, directory.path()));
+        directory.write(&path, page.as_bytes())?;
+        Ok(path)
+    }
+}
+
+/// The relative path from the folder of a file to a directory, with a slash at its end; nothing where they are the same.
+fn link_prefix(file: &Path, directory: &Path) -> String {
+    // Links and `..` are followed where there is something; what is not there yet is taken as written.
+    let whole = |path: &Path| {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        path.canonicalize().or_else(|_| std::path::absolute(path)).unwrap_or_else(|_| path.to_owned())
+    };
+    let (from, to) = (file.parent().map(whole).unwrap_or_default(), whole(directory));
+    let from: Vec<_> = from.components().collect();
+    let to: Vec<_> = to.components().collect();
+    let same = from.iter().zip(&to).take_while(|(a, b)| a == b).count();
+    let down = to[same..].iter().map(|part| markup::address(&part.as_os_str().to_string_lossy()) + "/");
+    "../".repeat(from.len() - same) + &down.collect::<String>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::link_prefix;
+    use std::path::Path;
+
+    #[test]
+    fn links_lead_from_the_page_to_the_run() {
+        for (file, directory, expected) in [
+            ("runs/a/report.html", "runs/a", ""),
+            ("b.html", "runs/a b", "runs/a%20b/"),
+            ("out/b.html", "runs/a", "../runs/a/"),
+        ] {
+            assert_eq!(link_prefix(Path::new(file), Path::new(directory)), expected);
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Tables of the page: evaluations, constraints, terms, losses, probes, skin depths, rounds.
+
+use std::collections::BTreeMap;
+
+use maud::{Markup, html};
+
+use super::data::RunData;
+use super::markup::{note, table};
+use super::ticks::{number, trimmed};
+use crate::build::{Audited, Outline};
+use crate::config::RegionModel;
+use crate::files::{ConstraintResult, ProbeResult, RunResult, TermResult};
+use crate::show::Evaluation;
+
+/// Rows of a table that is shown at once; a longer one is opened by the reader.
+const SHOWN: usize = 12;
+
+/// Points of probes that a table holds.
+const MOST_POINTS: usize = 200;
+
+/// Rows that a table holds; of the evaluations the first and the last half of so many.
+const MOST_ROWS: usize = 800;
+
+/// Events of the mesh motion that are listed.
+const MOST_EVENTS: usize = 160;
+
+/// A table under its title, nothing where it is empty; of a very long one the beginning.
+fn titled(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
+    let shown = rows.len().min(most);
+    html! {
+        @if !rows.is_empty() {
+            h3 { (title) }
+            @if shown < rows.len() { (note(&format!("The first {shown} of {} rows; result.json has all.", rows.len()))) }
+            (table(head, &rows[..shown], None))
+        }
+    }
+}
+
+/// What a column says of an evaluation.
+type Cell<'a> = Box<dyn Fn(&Evaluation) -> String + 'a>;
+
+/// The columns of the table of evaluations.
+fn columns(rows: &[Evaluation]) -> Vec<(&str, Cell<'_>)> {
+    fn column<'a>(title: &'a str, cell: impl Fn(&Evaluation) -> String + 'a) -> (&'a str, Cell<'a>) {
+        (title, Box::new(cell))
+    }
+    let thickness = |row: &Evaluation| {
+        let [low, high] = [row.min_thickness_m?, row.max_thickness_m?].map(|t| trimmed(1e3 * t, 2));
+        Some(format!("{low}–{high}"))
+    };
+    let mut all = vec![
+        column("evaluation", |row| row.evaluation.to_string()),
+        column("iteration", |row| row.iteration.to_string()),
+        column("F", |row| number(row.objective, 6)),
+        column("F / F₀", |row| number(row.ratio, 4)),
+        column("‖dF/dp‖ [F/m]", |row| number(row.gradient_norm, 3)),
+        column("step [mm]", |row| number(1e3 * row.step_norm, 3)),
+        column("worst quality", |row| number(row.worst_quality, 3)),
+    ];
+    if rows.iter().any(|row| row.min_thickness_m.is_some()) {
+        all.push(column("thickness [mm]", move |row| thickness(row).unwrap_or_default()));
+    }
+    all.extend([
+        column("inversion at", |row| {
+            row.step_to_inversion.map_or("never".to_owned(), |step| format!("{} ×", number(step, 3)))
+        }),
+        column("solver iterations", |row| row.linear_iterations.to_string()),
+        column("round", |row| row.round.to_string()),
+        column("time [s]", |row| number(row.seconds, 3)),
+    ]);
+    for name in rows.iter().take(1).flat_map(|row| row.constraints.keys()) {
+        let value = |row: &Evaluation| row.constraints.get(name).map(|v| number(*v, 3));
+        all.push(column(name.strip_prefix("c_").unwrap_or(name), move |row| value(row).unwrap_or_default()));
+    }
+    all
+}
+
+/// The rows of the history.
+pub(super) fn evaluations(data: &RunData) -> Markup {
+    let rows = &data.history;
+    let (titles, cells): (Vec<&str>, Vec<Cell<'_>>) = columns(rows).into_iter().unzip();
+    let kept: Vec<&Evaluation> = if rows.len() > MOST_ROWS {
+        rows[..MOST_ROWS / 2].iter().chain(&rows[rows.len() - MOST_ROWS / 2..]).collect()
+    } else {
+        rows.iter().collect()
+    };
+    let marked = kept.iter().position(|row| Some(row.evaluation) == data.best);
+    let body: Vec<Vec<String>> =
+        kept.iter().map(|row| cells.iter().map(|cell| cell(row)).collect()).collect();
+    let left_out = rows.len() - kept.len();
+    let table = table(&titles, &body, marked);
+    html! {
+        @if left_out > 0 {
+            (note(&format!("{left_out} rows in the middle are left out here; history.csv has all.")))
+        }
+        @if body.len() <= SHOWN {
+            (table)
+        } @else {
+            details { summary { "All " (rows.len()) " evaluations" } (table) }
+        }
+        (note(
+            "The best design is marked. An iteration is an evaluation that improves on all before; “inversion at” is the \
+             multiple of the motion from the round's reference mesh at which the first element would invert."
+        ))
+    }
+}
+
+/// Losses and probes of a field, at its frequency [Hz].
+type State<'a> = (f64, &'a BTreeMap<String, f64>, &'a [ProbeResult]);
+
+/// What the result says beside the objective: constraints and terms of the objective, losses and probes.
+pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
+    let states: Vec<State<'_>> = if result.states.is_empty() {
+        let frequency = result.frequencies_hz.first().copied().unwrap_or(data.config.analysis.frequency());
+        vec![(frequency, &result.losses_w, &result.probes)]
+    } else {
+        result.states.iter().map(|s| (s.frequency_hz, &s.losses_w, s.probes.as_slice())).collect()
+    };
+    html! {
+        (constraints(&result.constraints))
+        @if let Some(objective) = &result.objective { (terms(&objective.terms)) }
+        (losses(&states))
+        (probes(&states))
+    }
+}
+
+fn constraints(constraints: &[ConstraintResult]) -> Markup {
+    let row = |c: &ConstraintResult| {
+        let verdict = if c.satisfied { "kept" } else { "broken" };
+        vec![c.name.clone(), number(c.value, 5), number(c.bound, 5), verdict.to_owned()]
+    };
+    let rows: Vec<Vec<String>> = constraints.iter().map(row).collect();
+    let head = ["constraint", "value [SI]", "bound [SI]", ""];
+    titled("Constraints at the best design", &head, &rows, MOST_ROWS)
+}
+
+fn terms(terms: &[TermResult]) -> Markup {
+    let row = |t: &TermResult| {
+        vec![
+            t.kind.replace('_', " "),
+            t.region.clone().unwrap_or_else(|| "whole mesh".to_owned()),
+            t.frequency.map_or("all".to_owned(), hertz),
+            trimmed(t.weight, 6),
+            number(t.value, 6),
+            number(t.weight * t.value, 6),
+        ]
+    };
+    let rows: Vec<Vec<String>> = terms.iter().map(row).collect();
+    let head = ["term", "region", "frequency", "weight", "value [SI]", "weighted"];
+    titled("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
+}
+
+fn losses(states: &[State<'_>]) -> Markup {
+    let row = |frequency: f64, (region, loss): (&String, &f64)| {
+        vec![region.clone(), hertz(frequency), number(*loss, 5)]
+    };
+    let rows: Vec<Vec<String>> =
+        states.iter().flat_map(|(f, losses, _)| losses.iter().map(|entry| row(*f, entry))).collect();
+    let head = ["region", "frequency", "loss [W]"];
+    titled("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
+}
+
+fn probes(states: &[State<'_>]) -> Markup {
+    let rows: Vec<Vec<String>> =
+        states.iter().flat_map(|(f, _, probes)| probes.iter().flat_map(|probe| rows_of(*f, probe))).collect();
+    let head = ["probe", "x, y, z [mm]", "frequency", "|B| [mT]", "Bx [mT]", "By [mT]", "Bz [mT]"];
+    titled("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
+}
+
+fn hertz(frequency: f64) -> String {
+    format!("{} Hz", trimmed(frequency, 6))
+}
+
+/// The rows of one probe.
+fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
+    // A file may be cut short.
+    let count = probe.points_m.len().min(probe.b_re_t.len()).min(probe.b_im_t.len());
+    let component = |re: f64, im: f64| {
+        let real = number(1e3 * re, 3);
+        let sign = if im < 0.0 { "−" } else { "+" };
+        if frequency == 0.0 { real } else { format!("{real} {sign} {} j", number(1e3 * im.abs(), 3)) }
+    };
+    let row = |k: usize| {
+        let place = probe.points_m[k].map(|c| trimmed(1e3 * c, 2)).join(", ");
+        let mut cells = vec![probe.name.clone(), place, hertz(frequency)];
+        if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {
+            let size = re.iter().chain(&im).map(|c| c * c).sum::<f64>().sqrt();
+            cells.push(number(1e3 * size, 4));
+            cells.extend((0..3).map(|d| component(re[d], im[d])));
+        } else {
+            cells.extend(["outside the moved mesh", "", "", ""].map(str::to_owned));
+        }
+        cells
+    };
+    (0..count).map(row).collect()
+}
+
+/// The skin-depth audit.
+pub(super) fn skin(outline: &Outline) -> Markup {
+    if outline.audits.is_empty() {
+        return html! { p { "No region conducts at a frequency above zero: there are no skin depths to resolve." } };
+    }
+    let row = |audited: &Audited| {
+        let a = &audited.audit;
+        let model = match audited.model {
+            RegionModel::Volume => "meshed",
+            RegionModel::Impedance => "surface impedance",
+        };
+        let [median, least] =
+            [a.median_elements_per_skin_depth, a.least_elements_per_skin_depth].map(|n| number(n, 3));
+        vec![
+            a.region.clone(),
+            model.to_owned(),
+            number(1e3 * a.skin_depth, 3),
+            format!("{median} (least {least})"),
+            number(a.thickness_in_skin_depths, 3),
+        ]
+    };
+    let rows: Vec<Vec<String>> = outline.audits.iter().map(row).collect();
+    let head =
+        ["conductor", "model", "skin depth [mm]", "elements per skin depth", "thickness 2V/S [skin depths]"];
+    let warnings: Vec<String> = outline.audits.iter().filter_map(|a| a.warning()).collect();
+    html! {
+        (table(&head, &rows, None))
+        @if warnings.is_empty() { (note("The audit has no objections.")) }
+        @for warning in warnings { p class="warning" { (warning) } }
+    }
+}
+
+/// Rounds and remedies of the mesh motion; nothing where there were none.
+pub(super) fn rounds(result: &RunResult) -> Markup {
+    let listed = result.rounds.len().min(MOST_EVENTS);
+    html! {
+        @if listed > 0 {
+            h3 { "Rounds and remedies of the mesh motion" }
+            ul {
+                @for event in &result.rounds[..listed] { li { (event.describe()) } }
+                @if listed < result.rounds.len() { li { "and " (result.rounds.len() - listed) " more" } }
+            }
+        }
+    }
+}

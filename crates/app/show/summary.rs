@@ -1,0 +1,164 @@
+//! The end of a run, or of a single analysis, in a few lines.
+
+use super::styles::{Styles, styled};
+use super::{Started, probes};
+use crate::config::{Goal, Objective};
+use crate::files::{ConstraintResult, ObjectiveResult, RunResult, RunStatus};
+
+/// What the objective of a run is called, and its unit.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Named {
+    name: String,
+    /// Behind a value, with a blank before it; empty where terms of several units are added.
+    unit: String,
+}
+
+impl Named {
+    pub(super) fn of(started: &Started<'_>) -> Self {
+        started.objective.map_or_else(Self::default, Self::objective)
+    }
+
+    fn objective(objective: &Objective) -> Self {
+        let goal = match objective.goal {
+            Goal::Minimise => "minimise",
+            Goal::Maximise => "maximise",
+        };
+        let terms = objective.terms();
+        let unit = terms[0].functional.dimension().si_unit();
+        let is_one_unit = terms.iter().all(|term| term.functional.dimension().si_unit() == unit);
+        let name = match terms {
+            [term] => {
+                let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
+                format!("{goal} {}{}", term.functional.kind.name(), region.unwrap_or_default())
+            }
+            _ => format!("{goal} a sum of {} terms", terms.len()),
+        };
+        Self { name, unit: if is_one_unit { format!(" {unit}") } else { String::new() } }
+    }
+}
+
+/// A name and its text.
+type Row = (&'static str, String);
+
+/// The lines, without a blank one before them.
+pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<String> {
+    let is_run = result.command != "solve";
+    let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
+    rows.extend(result.constraints.iter().map(|constraint| kept(constraint, styles)));
+    for (frequency, losses) in states(result) {
+        let at = if result.states.len() > 1 { format!(" at {frequency} Hz") } else { String::new() };
+        rows.extend(losses.iter().map(|(region, loss)| ("loss", format!("{loss:.6e} W in {region}{at}"))));
+    }
+    let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
+    if is_run {
+        rows.push(("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations)));
+        rows.push(("worst quality", format!("{last:.4}, was {first:.4}")));
+    } else {
+        rows.push(("worst quality", format!("{last:.4}")));
+    }
+    let method = result.linear_solver.methods.first().map_or(String::new(), |method| format!(", {method}"));
+    rows.push(("worst residual", format!("{:.1e}{method}", result.linear_solver.worst_residual)));
+    rows.push(("time", times(result)));
+    rows.push(("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0))));
+    let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
+    let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
+    rows.chain(probes::lines(&result.probes, frequency)).collect()
+}
+
+/// How a run ended, and what it has gained.
+fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
+    let style = match result.status {
+        RunStatus::Converged | RunStatus::Done => styles.good,
+        RunStatus::Failed => styles.bad,
+        _ => styles.warning,
+    };
+    let mut rows = vec![("ended", styled(style, result.stop_reason.describe()))];
+    let Some(objective) = &result.objective else { return rows };
+    if !named.name.is_empty() {
+        rows.push(("objective", named.name.clone()));
+    }
+    let ObjectiveResult { initial, best, best_evaluation, ratio, .. } = objective;
+    let unit = &named.unit;
+    rows.push(("objective, initial", format!("{initial:.6e}{unit}")));
+    rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
+    rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
+    if let Some(fresh) = &objective.verification {
+        rows.push(("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets)));
+    }
+    rows
+}
+
+/// The frequencies of an analysis, and what was measured.
+fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
+    let frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
+    let mut rows = vec![("analysed at", frequencies.join(", "))];
+    if let Some(objective) = &result.objective {
+        let value = styled(styles.strong, &format!("{:.6e}{}", objective.best, named.unit));
+        // Of an analysis it is a measured quantity: there is no goal.
+        let what = named.name.split_once(' ').map_or("", |(_, what)| what);
+        rows.push(("value", format!("{value}  {what}").trim_end().to_owned()));
+    }
+    rows
+}
+
+fn kept(constraint: &ConstraintResult, styles: &Styles) -> Row {
+    let ConstraintResult { name, value, bound, satisfied } = constraint;
+    let verdict = if *satisfied { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
+    ("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"))
+}
+
+/// Losses by frequency [Hz].
+fn states(result: &RunResult) -> Vec<(f64, &std::collections::BTreeMap<String, f64>)> {
+    if result.states.is_empty() {
+        let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
+        return vec![(frequency, &result.losses_w)];
+    }
+    result.states.iter().map(|state| (state.frequency_hz, &state.losses_w)).collect()
+}
+
+/// The whole time, and the parts that took a tenth of it or more.
+fn times(result: &RunResult) -> String {
+    let of = |name: &str| result.timings_s.get(name).copied().unwrap_or_default();
+    let total = of("total");
+    let parts = ["setup", "remesh", "assembly", "factor", "state", "adjoint", "gradient", "verification"];
+    let shown: Vec<String> = parts
+        .into_iter()
+        .filter(|part| of(part) >= 0.1 * total && of(part) > 0.0)
+        .map(|part| format!("{part} {:.1}", of(part)))
+        .collect();
+    let shown = if shown.is_empty() { String::new() } else { format!(" ({})", shown.join(", ")) };
+    format!("{total:.1} s{shown}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_names_the_outcome() {
+        let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
+        let text = lines(&crate::files::example_result(), &named, &Styles::default()).join("\n");
+        for fragment in [
+            "the objective has converged",
+            "minimise loss in plate",
+            "1.000000e0 W at evaluation 7",
+            "F/F0                   0.50000",
+            "8 (7 iterations)",
+            "in plate",
+            "0.50000 (147000 tetrahedra)",
+        ] {
+            assert!(text.contains(fragment), "{fragment}\n{text}");
+        }
+    }
+
+    #[test]
+    fn an_analysis_does_not_read_like_an_optimisation() {
+        let result = RunResult { command: "solve".to_owned(), ..crate::files::example_result() };
+        let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
+        let text = lines(&result, &named, &Styles::default()).join("\n");
+        assert!(text.contains("value                  1.000000e0 W  loss in plate"), "{text}");
+        for word in ["F/F0", "ended", "iterations", "minimise", "was "] {
+            assert!(!text.contains(word), "{word}\n{text}");
+        }
+    }
+}
