@@ -129,7 +129,7 @@ proptest! {
 }
 
 fn seeds() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/seeds/journal")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/journal")
 }
 
 /// Writes the seeds of the fuzz target: `cargo test --release -p fluxmorph-optimizer --lib -- --ignored write_the_journals`.

@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_shield_is_described_in_a_sentence() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
         let (config, _) = Config::from_file(&path.join("shield.toml"), &[]).expect("shipped");
         assert_eq!(
             summary(&config, Some(91), true),
