@@ -225,5 +225,5 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     let changes = [&[("[design]", limit), STATIC, MESHED[0]], &MESHED[2..]].concat();
     let (mut problem, settings) = changed("shield_quick.toml", &changes);
     let text = try_optimised(&mut problem, &settings).0.expect_err("no share").to_string();
-    assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
+    assert!(text.contains("field_component_observation") && text.contains("to be a share of"), "{text}");
 }

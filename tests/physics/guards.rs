@@ -28,7 +28,7 @@ fn weight(growth: f64) -> f64 {
 
 /// Keys whose value may be missing: everything else in a published file is a number, a text, a list or a table of these.
 const MAY_BE_NULL: &str = "verified_ratio region frequency frequency_hz admitted min_thickness_m max_thickness_m \
-                           step_to_inversion inversion_element inversion_region";
+                           step_to_inversion inversion_element inversion_region methods";
 
 /// No `null` where a number belongs, which is how JSON would write NaN.
 fn no_null(value: &Value, key: &str) {
