@@ -5,8 +5,11 @@
 //! gathers what is wrong. The same declarations describe the keys for `schema`. Names of regions and surfaces are known
 //! once the mesh is: [`SourceMap`] keeps the places for those checks.
 
+mod confinement;
 pub mod diagnostics;
+mod error;
 mod load;
+mod required;
 pub mod schema;
 mod section;
 mod table;
@@ -14,10 +17,13 @@ mod tables;
 mod text;
 mod value;
 
+pub use confinement::OutputNamedBy;
+pub use error::{ConfigError, DiagnosticReport, Subject};
 pub use load::resolved_toml;
+pub use required::{Morphing, Optimisation};
 pub use tables::*;
-pub use text::OutputNamedBy;
 pub use text::diagnostic::{Diagnostic, Span};
-pub use text::source::{ConfigError, DiagnosticReport, Document, SourceMap, Subject};
-pub use value::nearest::{nearest, nearest_two};
-pub use value::quantity::{Dimension, QuantityError, parse_quantity};
+pub use text::document::Document;
+pub use text::nearest::{nearest, nearest_two};
+pub use text::quantity::{Dimension, QuantityError, parse_quantity};
+pub use text::source::SourceMap;

@@ -3,8 +3,10 @@
 //! The unit is converted once, here; everything behind this module is in SI. A decimal prefix is applied to
 //! the exponent of the written number before it is parsed, so `"22 mm"` has the very bits of `0.022`.
 
-use crate::config::text::tree::shown;
 use std::fmt;
+
+use super::message::shown;
+use super::nearest::nearest;
 
 /// What a quantity measures, and so which units it may carry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -305,7 +307,7 @@ fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text));
     by_case
         .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
-        .or_else(|| super::nearest::nearest(text, known.iter().copied()))
+        .or_else(|| nearest(text, known.iter().copied()))
 }
 
 /// Units by their full names.
