@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 use super::document::document;
 use super::prose::{self, Prose};
 use crate::config::table::overlay;
-use crate::config::text::quantity::Dimension;
+use crate::config::text::dimension::Dimension;
 
 /// All units, tables and keys.
 pub fn page() -> String {

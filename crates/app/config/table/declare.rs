@@ -1,7 +1,13 @@
 //! The declarations of the configuration: `table!` for the keys of a table, `one_of!` for a value of several forms.
 //!
-//! A key is declared once. From its line follow the field of the struct with its documentation, how it is read with all
-//! diagnostics, its default, its part of the JSON schema and of `docs/configuration.md`, and its place among the known keys:
+//! A key is declared once. To add one:
+//!
+//! 1. In the file of its table in `tables/`, write its line into `table!`, as below: what it does, name, type, kind, default.
+//! 2. What it asks of other keys goes into `check`, in words for the user, and into `rules`, for editors.
+//! 3. Read the field where it is used, and run `just generate` for the shipped schema and `docs/configuration.md`.
+//!
+//! From the line follow the field of the struct with its documentation, how it is read with all diagnostics, its default, its
+//! part of the schema and of the page, and its place among the known keys:
 //!
 //! ```text
 //! table! {

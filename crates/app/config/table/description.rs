@@ -4,7 +4,8 @@ use serde_json::{Value as Json, json};
 
 use super::field::{Also, Field};
 use super::rules::Rules;
-use crate::config::text::quantity::{Dimension, parse_quantity};
+use crate::config::text::dimension::Dimension;
+use crate::config::text::quantity::parse_quantity;
 use crate::config::value::definitions::{Definitions, Keywords, described, plain};
 use crate::config::value::{Kind, Value};
 

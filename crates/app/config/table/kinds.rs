@@ -3,8 +3,8 @@
 use super::nested::{Keys, NamedTables, SubTable, Tables};
 use super::unread::{OneOf, SomeQuantity};
 pub(in crate::config) use super::unread::{overlay, unread};
-use crate::config::text::quantity::Dimension;
-pub(in crate::config) use crate::config::text::quantity::Dimension::*;
+use crate::config::text::dimension::Dimension;
+pub(in crate::config) use crate::config::text::dimension::Dimension::*;
 use crate::config::value::range::Range;
 use crate::config::value::{Column, Flag, NameOrNames, Names, Number, PerAxis, Text, Whole, Word, ZeroOr};
 

@@ -9,7 +9,7 @@ use crate::config::section::Section;
 use crate::config::table::kinds::{WORD, quantity};
 use crate::config::table::rules::{Rules, Then, is, present};
 use crate::config::table::{Group, Unread, table};
-use crate::config::text::quantity::Dimension;
+use crate::config::text::dimension::Dimension;
 use crate::config::value::Column;
 use crate::config::value::choice::choice;
 use crate::config::value::range::Range;

@@ -4,7 +4,7 @@ use super::design::{COMPONENTS, unit_vector};
 use crate::config::section::Section;
 use crate::config::table::rules::{Rules, Then};
 use crate::config::table::table;
-use crate::config::text::quantity::Dimension;
+use crate::config::text::dimension::Dimension;
 use crate::config::value::choice::choice;
 
 table! {

@@ -2,6 +2,7 @@
 
 pub(super) mod cases;
 pub(super) mod diagnostic;
+pub(super) mod dimension;
 pub(super) mod document;
 pub(super) mod message;
 pub(super) mod nearest;

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::limits::{LONGEST_LENGTH, LONGEST_LIST};
 use super::range::{End, Range};
-use crate::config::text::quantity::Dimension;
+use crate::config::text::dimension::Dimension;
 
 /// Keywords of a JSON schema.
 pub(in crate::config) type Keywords = Map<String, Value>;

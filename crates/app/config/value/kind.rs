@@ -2,7 +2,7 @@
 
 use super::definitions::{Definitions, Keywords};
 use super::entry::Entry;
-use crate::config::text::quantity::Dimension;
+use crate::config::text::dimension::Dimension;
 
 /// A type that holds a value written as the kind `K` says.
 pub(in crate::config) trait Value<K>: Sized {

@@ -7,7 +7,8 @@ use super::entry::Entry;
 use super::kind::{Kind, Single, Value};
 use super::limits::LONGEST_LENGTH;
 use super::range::Range;
-use crate::config::text::quantity::{Dimension, parse_quantity};
+use crate::config::text::dimension::Dimension;
+use crate::config::text::quantity::parse_quantity;
 use crate::config::text::tree::Content;
 
 /// A number in a range, with a unit where it has a dimension.
