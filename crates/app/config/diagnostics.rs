@@ -8,8 +8,9 @@ use std::ops::Range;
 
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snippet};
 
+use super::error::DiagnosticReport;
 use super::text::diagnostic::{Diagnostic, Span};
-use super::text::source::{DiagnosticReport, Document};
+use super::text::document::Document;
 
 /// Most faults shown at once: a screen or two, and later ones often follow from earlier ones.
 const MOST_SHOWN: usize = 20;

@@ -6,14 +6,17 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::open_regular;
 
+use super::error::{ConfigError, DiagnosticReport};
 use super::schema::keys::known_keys;
-use super::section::{Context, Section};
+use super::section::Section;
 use super::table::Table;
 use super::tables::Config;
 use super::text::cases::{case_count, case_trees};
 use super::text::diagnostic::{self, Diagnostic, Span};
-use super::text::source::{ConfigError, DiagnosticReport, Document, SourceMap};
+use super::text::document::Document;
+use super::text::source::SourceMap;
 use super::text::tree;
+use super::value::Context;
 
 /// Largest configuration that is read [bytes]: a hundred times the longest sensible one.
 const LARGEST_FILE: u64 = 1024 * 1024;
@@ -101,7 +104,7 @@ fn read(
     overrides: &[String],
 ) -> Result<(Config, SourceMap), ConfigError> {
     let mut documents = vec![Document::whole(name, text)];
-    documents.extend(overrides.iter().map(|typed| tree::override_document(typed)));
+    documents.extend(overrides.iter().map(|typed| Document::of_override(typed)));
     let bare = SourceMap::of_documents(documents, directory, stem);
     let root = parse_documents(&bare).map_err(|diagnostics| bare.error(diagnostics))?;
     let mut source = bare.of_tree(&root);

@@ -5,10 +5,10 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::definitions::DEFINITIONS;
-use super::document;
-use super::overlay::SUFFIX;
-use crate::config::section::KnownKeys;
+use super::document::document;
+use crate::config::table::overlay::SUFFIX;
+use crate::config::value::KnownKeys;
+use crate::config::value::definitions::DEFINITIONS;
 
 /// The keys of the configuration.
 pub(in crate::config) fn known_keys() -> &'static KnownKeys {
@@ -46,5 +46,32 @@ fn collect<'d>(
             known.enter(&header, keys.keys());
             collect(&path, inner, document, known, entered);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::known_keys;
+
+    #[test]
+    fn tables_are_found_by_key_path() {
+        let keys = known_keys();
+        let has = |path: &str, key: &str| {
+            keys.table(path).is_some_and(|(_, keys)| keys.iter().any(|own| own == key))
+        };
+        assert!(has("coils[3]", "half_window"));
+        assert!(has("materials.soft steel", "density"));
+        assert!(has("morph.motion[0].rotation", "angle"));
+        assert!(keys.table("nothing").is_none());
+        assert_eq!(keys.table("coils").map(|(header, _)| header), Some("[[coils]]"));
+    }
+
+    #[test]
+    fn the_tables_of_a_key_are_named_without_its_own() {
+        let keys = known_keys();
+        assert_eq!(keys.owners("frequency", "mesh")[0], "[analysis]");
+        assert_eq!(keys.owners("algorithm", "design"), ["[optimizer]"]);
+        assert_eq!(keys.owners("angle", "morph.motion[1].rotation"), [""; 0]);
+        assert_eq!(keys.owners("nothing", ""), [""; 0]);
     }
 }

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use super::definitions::DEFINITIONS;
+use super::document::document;
 use super::prose::{self, Prose};
-use super::{document, overlay};
-use crate::config::value::quantity::Dimension;
+use crate::config::table::overlay;
+use crate::config::text::dimension::Dimension;
 
 /// All units, tables and keys.
 pub fn page() -> String {
@@ -195,9 +195,4 @@ impl<'a> Page<'a> {
             (is_table && !name.ends_with(overlay::SUFFIX)).then_some((form, name))
         })
     }
-}
-
-/// Name of the definition that a reference leads to.
-pub(super) fn definition(reference: &str) -> Option<&str> {
-    reference.strip_prefix(DEFINITIONS)
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value};
 
-use super::page::definition;
+use crate::config::value::definitions::DEFINITIONS;
 
 /// Says what a schema is.
 pub(super) struct Prose<'a> {
@@ -150,7 +150,7 @@ fn plural(one: &str) -> String {
 
 /// Name of the definition that a schema refers to.
 pub(super) fn named(schema: &Value) -> Option<&str> {
-    definition(schema.get("$ref")?.as_str()?)
+    schema.get("$ref")?.as_str()?.strip_prefix(DEFINITIONS)
 }
 
 /// A value as it is written in the file.

@@ -7,33 +7,10 @@ mod unknown;
 
 use std::cell::{Cell, RefCell};
 
-pub(super) use unknown::KnownKeys;
-
-use super::text::diagnostic::{Diagnostic, DiagnosticSink, Span};
-use super::text::tree::{Content, Node, Table, join, shown};
-use super::value::{Entry, Kind, Placeholder, Value, first_duplicate};
-
-/// What all tables of one reading share.
-pub(super) struct Context {
-    /// What is wrong.
-    pub(super) sink: DiagnosticSink,
-    /// The keys of all tables, for advice.
-    keys: fn() -> &'static KnownKeys,
-}
-
-impl Context {
-    /// For a reading with advice from these keys.
-    pub(super) fn new(keys: fn() -> &'static KnownKeys) -> Self {
-        Self { sink: DiagnosticSink::default(), keys }
-    }
-}
-
-impl Default for Context {
-    fn default() -> Self {
-        static NONE: KnownKeys = KnownKeys::NONE;
-        Self::new(|| &NONE)
-    }
-}
+use super::text::diagnostic::{Diagnostic, Span, suggest};
+use super::text::message::shown;
+use super::text::tree::{Content, Node, Table, join};
+use super::value::{Context, Entry, Kind, Placeholder, Value, first_duplicate};
 
 /// One table being read.
 pub(super) struct Section<'a> {
@@ -176,7 +153,7 @@ impl<'a> Section<'a> {
 
     /// Record that a name is none of the known ones.
     pub(super) fn unknown_name(&self, key: &str, message: String, name: &str, known: &[&str]) {
-        self.record(key, message, |diagnostic| super::text::source::suggest(diagnostic, name, known));
+        self.record(key, message, |diagnostic| suggest(diagnostic, name, known));
     }
 
     /// Record that two keys do not go together: at the second, with the first as the other place.

@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::linear_solver::LinearSolver;
 use super::petsc::Petsc;
-use crate::config::schema::definitions::Definitions;
 use crate::config::section::Section;
-use crate::config::table::{left_out, table};
-use crate::config::value::{Entry, Group, Keywords, Value, Whole};
+use crate::config::table::{Group, left_out, table};
+use crate::config::value::definitions::{Definitions, Keywords};
+use crate::config::value::{Entry, Value, Whole};
 
 table! {
     /// Which field problem is solved, and how exactly. Every frequency is a problem of its own, and all share one mesh.

@@ -3,12 +3,11 @@
 use serde::Serialize;
 use serde_json::json;
 
-use crate::config::schema::rules::{Rules, Then};
 use crate::config::section::Section;
-use crate::config::table::{one_of, table};
-use crate::config::value::Group;
+use crate::config::table::kinds::WORD;
+use crate::config::table::rules::{Rules, Then};
+use crate::config::table::{Group, one_of, table};
 use crate::config::value::choice::choice;
-use crate::config::value::kinds::WORD;
 
 table! {
     /// A source of current: either with a `shape`, of uniform current density and given by it alone, so that the mesh need not

@@ -5,14 +5,14 @@ use serde_json::json;
 
 use super::design::COMPONENTS;
 use super::functional::{Functional, ObjectiveKind, Weighting, keys_of_the_kind};
-use crate::config::schema::rules::{Rules, Then, is, present};
 use crate::config::section::Section;
-use crate::config::table::table;
+use crate::config::table::kinds::{WORD, quantity};
+use crate::config::table::rules::{Rules, Then, is, present};
+use crate::config::table::{Group, Unread, table};
+use crate::config::text::dimension::Dimension;
+use crate::config::value::Column;
 use crate::config::value::choice::choice;
-use crate::config::value::kinds::{WORD, quantity};
-use crate::config::value::quantity::Dimension;
 use crate::config::value::range::Range;
-use crate::config::value::{Column, Group, Unread};
 
 table! {
     /// What must keep within a bound while the objective is optimised; with the algorithms `mma`, `ccsaq` and `slsqp`, and

@@ -1,11 +1,11 @@
 //! What is measured of the field: the keys that `[objective]`, its terms and `[[constraints]]` share.
 
 use super::design::{COMPONENTS, unit_vector};
-use crate::config::schema::rules::{Rules, Then};
 use crate::config::section::Section;
+use crate::config::table::rules::{Rules, Then};
 use crate::config::table::table;
+use crate::config::text::dimension::Dimension;
 use crate::config::value::choice::choice;
-use crate::config::value::quantity::Dimension;
 
 table! {
     /// A real quantity of the field.

@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 
-use crate::config::schema::definitions::Definitions;
-use crate::config::schema::description::{Description, property};
 use crate::config::section::Section;
-use crate::config::table::{Table, table};
-use crate::config::value::kinds::{FINITE, TABLE, length};
-use crate::config::value::{Entry, Field, Keywords, OneOf, Value, any_of};
+use crate::config::table::description::property;
+use crate::config::table::field::Field;
+use crate::config::table::kinds::{FINITE, TABLE, length};
+use crate::config::table::{OneOf, Table, describe, table};
+use crate::config::value::definitions::{Definitions, Keywords, any_of};
+use crate::config::value::{Entry, Value};
 
 /// The design an optimisation starts from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,7 +49,7 @@ impl Value<OneOf> for InitialDesign {
         let form = |meaning| Field { key: "", meaning, also: &[] };
         let uniform = form(&[" All variables alike [m]. Default 0: the mesh as it is."]);
         let values = form(&[" Every variable [m], in the order of `design.points_m` in `result.json`."]);
-        let random = Description::of::<RandomDesign>(definitions).into_schema(RandomDesign::ABOUT);
+        let random = describe::<RandomDesign>(definitions).into_schema(RandomDesign::ABOUT);
         any_of(vec![
             property::<f64, _>(&length(FINITE), uniform, None, definitions).into(),
             property::<Vec<f64>, _>(&length(FINITE), values, None, definitions).into(),

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::json;
 
 mod boxes;
+mod grading;
 mod shield;
 mod sphere;
 
@@ -14,17 +15,11 @@ pub use boxes::{BoxOfRegion, BoxesMesh, Patch, SizeAlong};
 pub use shield::ShieldMesh;
 pub use sphere::SphereMesh;
 
-use crate::config::schema::rules::{Rules, is};
 use crate::config::section::Section;
-use crate::config::table::table;
+use crate::config::table::rules::{Rules, is};
+use crate::config::table::{Group, table};
+use crate::config::value::Placeholder;
 use crate::config::value::choice::{Choice, choice};
-use crate::config::value::range::Range;
-use crate::config::value::{Group, Placeholder};
-
-/// Ratios of neighbouring cells.
-const GROWTHS: Range = Range::closed(1.0, 100.0);
-/// Factors that all sizes of a mesh are divided by.
-const REFINEMENTS: Range = Range::closed(0.25, 20.0);
 
 /// Where the mesh comes from.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,10 +4,9 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::functional::{Functional, keys_of_the_kind};
-use crate::config::schema::rules::Then;
 use crate::config::section::Section;
-use crate::config::table::table;
-use crate::config::value::Group;
+use crate::config::table::rules::Then;
+use crate::config::table::{Group, table};
 use crate::config::value::choice::choice;
 
 /// The keys that belong to a term.

@@ -4,8 +4,7 @@ use serde::Serialize;
 
 use super::order::box_with_volume;
 use crate::config::section::Section;
-use crate::config::table::table;
-use crate::config::value::Group;
+use crate::config::table::{Group, table};
 use crate::config::value::choice::{Choice, choice};
 use crate::config::value::range::Range;
 

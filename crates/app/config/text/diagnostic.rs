@@ -3,6 +3,9 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
+use super::message::listed;
+use super::nearest::offer;
+
 /// A stretch of one of the texts a configuration was read from.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Span {
@@ -65,6 +68,12 @@ impl Diagnostic {
         self.help = Some(help.into());
         self
     }
+}
+
+/// The fault with the nearest known name as help and all known names as the expectation.
+pub(in crate::config) fn suggest(diagnostic: Diagnostic, name: &str, known: &[&str]) -> Diagnostic {
+    let help = offer(name, known.iter().copied());
+    Diagnostic { help, ..diagnostic }.expected(listed(known))
 }
 
 /// Faults from which on no more advice is given: far more than are shown.

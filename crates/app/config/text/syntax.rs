@@ -8,8 +8,8 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 use super::diagnostic::{Diagnostic, Span};
-use super::tree::shown;
-use crate::config::value::quantity::is_number_with_unit;
+use super::message::shown;
+use super::quantity::is_number_with_unit;
 
 /// Most lines whose errors are kept: more are not shown, and a hostile text may have as many as it has bytes.
 const MOST_LINES: usize = 40;

@@ -6,7 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::diagnostic::{Diagnostic, Span};
-use super::source::Document;
+use super::message::shown;
 use super::syntax;
 
 /// Longest path of a key [bytes]. The place of every value is kept by its path: without a limit one long name of a table
@@ -84,14 +84,6 @@ impl Content {
             _ => None,
         }
     }
-}
-
-/// A text for a message: escaped, and not longer than a line.
-pub(in crate::config) fn shown(text: &str) -> String {
-    const LONGEST: usize = 60;
-    let cut = text.char_indices().nth(LONGEST).map_or(text.len(), |(end, _)| end);
-    let dots = if cut < text.len() { "…" } else { "" };
-    format!("{}{dots}", text[..cut].escape_debug())
 }
 
 /// Parse one text.
@@ -224,28 +216,6 @@ fn collect_node(path: String, node: &Node, spans: &mut BTreeMap<String, Span>) {
 /// `path.key`, or `key` at the top.
 pub(in crate::config) fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
-}
-
-/// The TOML line for an override `key=value` as typed: `coils[0].width=30 mm` becomes
-/// `coils.0.width = "30 mm"`.
-///
-/// A value that is not TOML by itself is taken as text, so that a shell needs no second quotes.
-pub(in crate::config) fn override_document(typed: &str) -> Document {
-    let (key, value) = typed.split_once('=').unwrap_or((typed, ""));
-    let key = key.trim().replace('[', ".").replace(']', "");
-    let value = value.trim();
-    let plain = format!("{key} = {value}");
-    let is_one_line = !typed.contains(['\n', '\r']);
-    let text = if is_one_line && DeTable::parse(&plain).is_ok() {
-        plain
-    } else {
-        format!("{key} = {}", toml::Value::String(value.to_owned()))
-    };
-    // Long enough for any key and value in use.
-    const LONGEST: usize = 200;
-    let cut = typed.chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c });
-    let dots = if typed.chars().nth(LONGEST).is_some() { "…" } else { "" };
-    Document::whole(format!("--set '{}{dots}'", cut.collect::<String>()), text)
 }
 
 /// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.

@@ -1,9 +1,8 @@
 //! One value being read.
 
-use super::LONGEST_LIST;
-use crate::config::section::Context;
-use crate::config::text::diagnostic::Diagnostic;
-use crate::config::text::source::suggest;
+use super::context::Context;
+use super::limits::LONGEST_LIST;
+use crate::config::text::diagnostic::{Diagnostic, suggest};
 use crate::config::text::tree::{Content, Node};
 
 /// A value in the text, its key path, and where to say what is wrong with it.

@@ -2,20 +2,20 @@
 
 use serde_json::{Map, json};
 
-use super::quantity::{Dimension, parse_quantity};
+use super::definitions::{Definitions, Keywords, bounds, list_of};
+use super::entry::Entry;
+use super::kind::{Kind, Single, Value};
+use super::limits::LONGEST_LENGTH;
 use super::range::Range;
-use super::{Entry, Keywords, Kind, Single, Value, list_of};
-use crate::config::schema::definitions::{Definitions, bounds};
+use crate::config::text::dimension::Dimension;
+use crate::config::text::quantity::parse_quantity;
 use crate::config::text::tree::Content;
-
-/// Longest length and farthest coordinate of a device [m]: far beyond any use, and its powers stay far from overflow.
-pub(in crate::config) const LONGEST_LENGTH: f64 = 1e6;
 
 /// A number in a range, with a unit where it has a dimension.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::config) struct Number {
-    pub(super) dimension: Option<Dimension>,
-    pub(super) range: Range,
+    pub(in crate::config) dimension: Option<Dimension>,
+    pub(in crate::config) range: Range,
 }
 
 impl Single for Number {}
@@ -100,8 +100,8 @@ fn number(range: Range) -> Keywords {
 /// A whole number from `least` to `most`.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::config) struct Whole {
-    pub(super) least: usize,
-    pub(super) most: usize,
+    pub(in crate::config) least: usize,
+    pub(in crate::config) most: usize,
 }
 
 impl Single for Whole {}
@@ -140,7 +140,7 @@ impl Value<Whole> for usize {
 
 /// Three lengths, or one that holds along all three axes [m].
 #[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct PerAxis(pub(super) Range);
+pub(in crate::config) struct PerAxis(pub(in crate::config) Range);
 
 impl Kind for PerAxis {}
 
@@ -168,7 +168,7 @@ impl Value<PerAxis> for [f64; 3] {
 
 /// A number in a range, or 0 for none.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct ZeroOr(pub(super) Range);
+pub(in crate::config) struct ZeroOr(pub(in crate::config) Range);
 
 impl Kind for ZeroOr {}
 

@@ -6,10 +6,13 @@ use std::path::PathBuf;
 use serde_json::{Map, Value as Json, json};
 
 use super::choice::Choice;
-use super::{Entry, Keywords, Kind, LONGEST_LIST, Single, Value, list_of};
-use crate::config::schema::definitions::{Definitions, described};
+use super::definitions::{Definitions, Keywords, described, list_of};
+use super::entry::Entry;
+use super::kind::{Kind, Single, Value};
+use super::limits::LONGEST_LIST;
 use crate::config::text::diagnostic::Diagnostic;
-use crate::config::text::tree::{Content, shown};
+use crate::config::text::message::shown;
+use crate::config::text::tree::Content;
 
 /// A text that is not empty.
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +95,7 @@ impl Value<Column> for String {
 #[derive(Debug, Clone, Copy)]
 pub(in crate::config) struct Names {
     /// What a list of fixed length is expected to be.
-    pub(super) expected: Option<&'static str>,
+    pub(in crate::config) expected: Option<&'static str>,
 }
 
 impl Kind for Names {}

@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::generate::{AxisSize, BoxRegion, BoxesParameters, SizeLimit, SurfacePatch};
 
-use super::REFINEMENTS;
+use super::grading::REFINEMENTS;
 use crate::config::section::Section;
 use crate::config::table::table;
 use crate::config::tables::coil::AxisWord;

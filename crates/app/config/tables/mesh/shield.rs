@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::generate::{ObservationBox, ShieldParameters};
 
-use super::{GROWTHS, REFINEMENTS};
+use super::grading::{GROWTHS, REFINEMENTS};
 use crate::config::section::Section;
 use crate::config::table::table;
 use crate::config::tables::order::{check_interval, check_layers};

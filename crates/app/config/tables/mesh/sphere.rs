@@ -3,7 +3,7 @@
 use fluxmorph_geometry::generate::SphereParameters;
 use serde_json::json;
 
-use super::{GROWTHS, REFINEMENTS};
+use super::grading::{GROWTHS, REFINEMENTS};
 use crate::config::section::Section;
 use crate::config::table::table;
 use crate::config::tables::order::check_layers;

@@ -12,15 +12,14 @@ use serde_json::json;
 pub use motion::{DesignMotion, DesignWord, PrescribedMotion, Rotation, Scale, Target};
 pub use tune::{Tune, TunedParameter};
 
-use super::Config;
+use super::config::Config;
 use super::design::Design;
 use super::mesh::MeshConfig;
 use super::remesh::Remesh;
 use crate::config::section::Section;
-use crate::config::table::{one_of, table};
+use crate::config::table::{Group, Unread, one_of, table};
 use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
-use crate::config::value::{Group, Unread};
 
 /// Most increments: far beyond any use.
 const MOST_INCREMENTS: usize = 10_000;

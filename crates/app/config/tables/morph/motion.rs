@@ -3,12 +3,11 @@
 use serde::Serialize;
 use serde_json::json;
 
-use crate::config::schema::rules::{Then, present};
 use crate::config::section::Section;
-use crate::config::table::{one_of, table};
+use crate::config::table::rules::{Then, present};
+use crate::config::table::{Group, one_of, table};
 use crate::config::tables::coil::{Axis, check_axis};
 use crate::config::tables::order::{Corners, flat_box};
-use crate::config::value::Group;
 use crate::config::value::choice::choice;
 
 table! {

@@ -7,12 +7,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::source::{ConfigError, SourceMap};
-use super::tree::Table;
-
-/// The keys that hold paths.
-const MESH: [&str; 2] = ["mesh", "file"];
-const DIRECTORY: [&str; 2] = ["output", "directory"];
+use super::error::ConfigError;
+use super::text::source::SourceMap;
 
 /// Who names the directory that is written into.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,23 +17,6 @@ pub enum OutputNamedBy {
     Configuration,
     /// The user, on the command line.
     User,
-}
-
-/// The paths of a configuration as they are written; `None` for a key that is absent.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(in crate::config) struct WrittenPaths {
-    mesh: Option<String>,
-    directory: Option<String>,
-}
-
-impl WrittenPaths {
-    pub(in crate::config) fn of(root: &Table) -> Self {
-        Self { mesh: text_at(root, MESH), directory: text_at(root, DIRECTORY) }
-    }
-}
-
-fn text_at(root: &Table, [table, key]: [&str; 2]) -> Option<String> {
-    root.get(table)?.content.table()?.get(key)?.content.text().map(str::to_owned)
 }
 
 /// How a path leaves a folder.

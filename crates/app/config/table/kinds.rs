@@ -1,13 +1,12 @@
 //! The vocabulary of `table!`: what a key may hold, its unit and its range.
 
-use super::quantity::Dimension;
-pub(in crate::config) use super::quantity::Dimension::*;
-use super::range::Range;
-use super::{
-    Column, Flag, Keys, NameOrNames, NamedTables, Names, Number, OneOf, PerAxis, SomeQuantity, SubTable,
-    Tables, Text, Whole, Word, ZeroOr,
-};
-pub(in crate::config) use super::{overlay, unread};
+use super::nested::{Keys, NamedTables, SubTable, Tables};
+use super::unread::{OneOf, SomeQuantity};
+pub(in crate::config) use super::unread::{overlay, unread};
+use crate::config::text::dimension::Dimension;
+pub(in crate::config) use crate::config::text::dimension::Dimension::*;
+use crate::config::value::range::Range;
+use crate::config::value::{Column, Flag, NameOrNames, Names, Number, PerAxis, Text, Whole, Word, ZeroOr};
 
 /// A text that is not empty.
 pub(in crate::config) const TEXT: Text = Text;

@@ -1,18 +1,15 @@
-//! Tables within a table, groups of keys, and keys that are read elsewhere.
+//! Tables within a table, and groups of keys.
 
 use std::collections::BTreeMap;
-use std::marker::PhantomData;
 
-use serde::Serialize;
-use serde_json::{Map, json};
-
-use super::{Entry, Keywords, Kind, Value, list_of};
-use crate::config::schema::definitions::Definitions;
-use crate::config::schema::description::Description;
-use crate::config::schema::overlay;
+use super::declaration::{Table, describe};
+use super::description::Description;
+use super::field::Field;
 use crate::config::section::Section;
-use crate::config::table::Table;
-use crate::config::text::tree::{Content, join, shown};
+use crate::config::text::message::shown;
+use crate::config::text::tree::{Content, join};
+use crate::config::value::definitions::{Definitions, Keywords, list_of};
+use crate::config::value::{Entry, Kind, Value};
 
 /// A table `[key]`.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +31,7 @@ impl<G: Group> Value<SubTable> for G {
 
     fn schema(_: &SubTable, definitions: &mut Definitions) -> Keywords {
         definitions.reference(G::Written::NAME, |definitions| {
-            Description::of::<G::Written>(definitions).into_schema(G::Written::ABOUT)
+            describe::<G::Written>(definitions).into_schema(G::Written::ABOUT)
         })
     }
 }
@@ -146,31 +143,6 @@ pub(in crate::config) trait Plain<K> {
     fn describe(kind: &K, field: Field<'_>, description: &mut Description, definitions: &mut Definitions);
 }
 
-/// A key of a table with what is said of it.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct Field<'a> {
-    /// As it is written.
-    pub(in crate::config) key: &'a str,
-    /// Lines that say what it does.
-    pub(in crate::config) meaning: &'a [&'a str],
-    /// What holds beside its kind.
-    pub(in crate::config) also: &'a [Also],
-}
-
-/// What holds for a value beside its kind, for the schema; the check of the table says it in words.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(non_camel_case_types, reason = "they are written as words of a declaration")]
-pub(in crate::config) enum Also {
-    /// At least one item.
-    not_empty,
-    /// No item twice.
-    each_once,
-    /// Not 0.
-    not_zero,
-    /// A component that is not 0.
-    not_all_zero,
-}
-
 impl<K: Kind, T: Value<K>> Plain<K> for Option<T> {
     fn read_from(section: &Section<'_>, key: &'static str, kind: &K) -> Self {
         section.read(key, kind)
@@ -188,74 +160,5 @@ impl<G: Group> Plain<Keys> for G {
 
     fn describe(_: &Keys, _: Field<'_>, description: &mut Description, definitions: &mut Definitions) {
         G::Written::describe_keys(description, definitions);
-    }
-}
-
-/// One of the forms of a `one_of!`.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct OneOf;
-
-impl Kind for OneOf {}
-
-/// A quantity whose dimension another key decides.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct SomeQuantity;
-
-impl Kind for SomeQuantity {}
-
-/// A key that is written, and read elsewhere.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(in crate::config) struct Unread;
-
-impl Value<SomeQuantity> for Unread {
-    fn read(_: &SomeQuantity, _: &Entry<'_>) -> Option<Self> {
-        Some(Self)
-    }
-
-    fn schema(_: &SomeQuantity, _: &mut Definitions) -> Keywords {
-        Map::from_iter([("type".to_owned(), json!(["string", "number"]))])
-    }
-}
-
-/// A value as the kind says, read elsewhere.
-#[derive(Debug)]
-pub(in crate::config) struct ReadElsewhere<T, K>(K, PhantomData<T>);
-
-impl<T, K: Kind> Kind for ReadElsewhere<T, K> {}
-
-/// A value of a type, read elsewhere.
-pub(in crate::config) const fn unread<T: Value<K>, K>(kind: K) -> ReadElsewhere<T, K> {
-    ReadElsewhere(kind, PhantomData)
-}
-
-impl<T: Value<K>, K> Value<ReadElsewhere<T, K>> for Unread {
-    fn read(_: &ReadElsewhere<T, K>, _: &Entry<'_>) -> Option<Self> {
-        Some(Self)
-    }
-
-    fn schema(kind: &ReadElsewhere<T, K>, definitions: &mut Definitions) -> Keywords {
-        T::schema(&kind.0, definitions)
-    }
-}
-
-/// A table of which every key may be left out: it is laid over one that is complete, and read then.
-#[derive(Debug)]
-pub(in crate::config) struct Overlay<T>(PhantomData<T>);
-
-impl<T> Kind for Overlay<T> {}
-
-/// A table laid over another.
-pub(in crate::config) const fn overlay<T: Group>() -> Overlay<T> {
-    Overlay(PhantomData)
-}
-
-impl<T: Group> Value<Overlay<T>> for Unread {
-    fn read(_: &Overlay<T>, _: &Entry<'_>) -> Option<Self> {
-        Some(Self)
-    }
-
-    fn schema(_: &Overlay<T>, definitions: &mut Definitions) -> Keywords {
-        <T as Value<SubTable>>::schema(&SubTable, definitions);
-        overlay::reference(definitions, T::Written::NAME)
     }
 }

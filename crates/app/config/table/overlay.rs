@@ -2,11 +2,10 @@
 
 use serde_json::{Value, json};
 
-use super::definitions::{DEFINITIONS, Definitions};
-use crate::config::value::Keywords;
+use crate::config::value::definitions::{DEFINITIONS, Definitions, Keywords};
 
 /// What the names of such definitions end with.
-pub(super) const SUFFIX: &str = "Overlay";
+pub(in crate::config) const SUFFIX: &str = "Overlay";
 
 /// A reference to the overlay of a table that is defined; it is made from that.
 pub(in crate::config) fn reference(definitions: &mut Definitions, table: &str) -> Keywords {

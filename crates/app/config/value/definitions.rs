@@ -7,12 +7,15 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
 
-use crate::config::value::quantity::Dimension;
-use crate::config::value::range::{End, Range};
-use crate::config::value::{Keywords, LONGEST_LENGTH, LONGEST_LIST};
+use super::limits::{LONGEST_LENGTH, LONGEST_LIST};
+use super::range::{End, Range};
+use crate::config::text::dimension::Dimension;
+
+/// Keywords of a JSON schema.
+pub(in crate::config) type Keywords = Map<String, Value>;
 
 /// Where definitions are.
-pub(super) const DEFINITIONS: &str = "#/$defs/";
+pub(in crate::config) const DEFINITIONS: &str = "#/$defs/";
 
 /// The power of ten of a number.
 const EXPONENT: &str = "(?:[eE][+-]?[0-9]+)?";
@@ -53,7 +56,7 @@ impl Definitions {
     }
 
     /// A definition that is there.
-    pub(super) fn get(&self, name: &str) -> Option<&Value> {
+    pub(in crate::config) fn get(&self, name: &str) -> Option<&Value> {
         self.0.get(name)
     }
 
@@ -85,7 +88,7 @@ impl Definitions {
     }
 
     /// All of them, sorted by name.
-    pub(super) fn into_value(self) -> Value {
+    pub(in crate::config) fn into_value(self) -> Value {
         self.0.into_iter().collect::<Map<String, Value>>().into()
     }
 }
@@ -154,8 +157,18 @@ fn quantity(dimension: Dimension, range: Range) -> Value {
     schema
 }
 
+/// The schema of a list.
+pub(in crate::config) fn list_of(items: Keywords) -> Keywords {
+    Map::from_iter([("type".to_owned(), "array".into()), ("items".to_owned(), items.into())])
+}
+
+/// The schema of a value of several forms.
+pub(in crate::config) fn any_of<T: Into<Value>>(forms: Vec<T>) -> Keywords {
+    Map::from_iter([("anyOf".to_owned(), forms.into_iter().map(Into::into).collect())])
+}
+
 /// The keywords that keep a number within a range.
-pub(in crate::config) fn bounds(range: Range) -> Map<String, Value> {
+pub(in crate::config) fn bounds(range: Range) -> Keywords {
     let lower = match range.lower() {
         End::Open(bound) => Some(("exclusiveMinimum", bound)),
         End::Closed(bound) => Some(("minimum", bound)),
@@ -170,7 +183,7 @@ pub(in crate::config) fn bounds(range: Range) -> Map<String, Value> {
 }
 
 /// A number as it is best read: without a point where it is a small whole number.
-pub(super) fn plain(value: f64) -> Value {
+pub(in crate::config) fn plain(value: f64) -> Value {
     if value.fract() == 0.0 && value.abs() < 1e9 { json!(value as i64) } else { json!(value) }
 }
 

@@ -4,7 +4,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::definitions::Definitions;
+use crate::config::value::definitions::Definitions;
 
 /// The rules of a table.
 #[derive(Debug, Default)]

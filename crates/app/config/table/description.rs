@@ -2,11 +2,12 @@
 
 use serde_json::{Value as Json, json};
 
-use super::definitions::{Definitions, described, plain};
+use super::field::{Also, Field};
 use super::rules::Rules;
-use crate::config::table::Table;
-use crate::config::value::quantity::{Dimension, parse_quantity};
-use crate::config::value::{Also, Field, Keywords, Kind, Value};
+use crate::config::text::dimension::Dimension;
+use crate::config::text::quantity::parse_quantity;
+use crate::config::value::definitions::{Definitions, Keywords, described, plain};
+use crate::config::value::{Kind, Value};
 
 /// A table being described.
 #[derive(Debug, Default)]
@@ -17,13 +18,6 @@ pub(in crate::config) struct Description {
 }
 
 impl Description {
-    /// The description of a table.
-    pub(in crate::config) fn of<T: Table>(definitions: &mut Definitions) -> Self {
-        let mut description = Self::default();
-        T::describe_keys(&mut description, definitions);
-        description
-    }
-
     /// Adds a key.
     pub(in crate::config) fn key<T: Value<K>, K: Kind>(
         &mut self,

@@ -1,7 +1,13 @@
 //! The declarations of the configuration: `table!` for the keys of a table, `one_of!` for a value of several forms.
 //!
-//! A key is declared once. From its line follow the field of the struct with its documentation, how it is read with all
-//! diagnostics, its default, its part of the JSON schema and of `docs/configuration.md`, and its place among the known keys:
+//! A key is declared once. To add one:
+//!
+//! 1. In the file of its table in `tables/`, write its line into `table!`, as below: what it does, name, type, kind, default.
+//! 2. What it asks of other keys goes into `check`, in words for the user, and into `rules`, for editors.
+//! 3. Read the field where it is used, and run `just generate` for the shipped schema and `docs/configuration.md`.
+//!
+//! From the line follow the field of the struct with its documentation, how it is read with all diagnostics, its default, its
+//! part of the schema and of the page, and its place among the known keys:
 //!
 //! ```text
 //! table! {
@@ -25,33 +31,7 @@
 //! }
 //! ```
 //!
-//! The kinds are those of [`kinds`](super::value::kinds). `pub struct Name: Default` has a `Default` with every key left out.
-
-use super::schema::definitions::Definitions;
-use super::schema::description::Description;
-use super::section::{Context, Section};
-use super::text::diagnostic::Span;
-use super::text::tree;
-
-/// A table of the configuration.
-pub(in crate::config) trait Table: Sized {
-    /// Name of its definition in the schema.
-    const NAME: &'static str;
-    /// Lines that describe it.
-    const ABOUT: &'static [&'static str];
-
-    /// Reads its keys.
-    fn read_keys(section: &Section<'_>) -> Self;
-
-    /// Describes its keys.
-    fn describe_keys(description: &mut Description, definitions: &mut Definitions);
-}
-
-/// The table with every key left out.
-pub(in crate::config) fn left_out<T: Table>() -> T {
-    let (table, context) = (tree::Table::new(), Context::default());
-    T::read_keys(&Section::new(String::new(), &table, Span { document: 0, range: 0..0 }, &context))
-}
+//! The kinds are those of [`kinds`](super::kinds). `pub struct Name: Default` has a `Default` with every key left out.
 
 /// Declares a table: see the documentation of the module.
 macro_rules! table {
@@ -60,7 +40,7 @@ macro_rules! table {
 
         impl Default for $name {
             fn default() -> Self {
-                $crate::config::table::left_out()
+                $crate::config::table::declaration::left_out()
             }
         }
     };
@@ -91,13 +71,13 @@ macro_rules! table {
             )*
         }
 
-        impl $crate::config::table::Table for $name {
+        impl $crate::config::table::declaration::Table for $name {
             const NAME: &'static str = table!(@name $name $($written)?);
             const ABOUT: &'static [&'static str] = &[$($about),*];
 
             fn read_keys(section: &$crate::config::section::Section<'_>) -> Self {
                 #[allow(unused_imports, reason = "every declaration has the whole vocabulary")]
-                use $crate::config::value::kinds::*;
+                use $crate::config::table::kinds::*;
                 $(
                     let unused: fn(&$crate::config::section::Section<'_>) -> Vec<&'static str> = $unused;
                     section.hide(unused(section));
@@ -118,16 +98,16 @@ macro_rules! table {
             }
 
             fn describe_keys(
-                description: &mut $crate::config::schema::description::Description,
-                definitions: &mut $crate::config::schema::definitions::Definitions,
+                description: &mut $crate::config::table::description::Description,
+                definitions: &mut $crate::config::value::definitions::Definitions,
             ) {
                 #[allow(unused_imports, reason = "every declaration has the whole vocabulary")]
-                use $crate::config::value::kinds::*;
+                use $crate::config::table::kinds::*;
                 $(
-                    let field = $crate::config::value::Field {
+                    let field = $crate::config::table::field::Field {
                         key: table!(@name $field $($key)?),
                         meaning: &[$($meaning),*],
-                        also: &[$($($crate::config::value::Also::$also),+)?],
+                        also: &[$($($crate::config::table::field::Also::$also),+)?],
                     };
                     table!(
                         @describe description, definitions, field, $type, $kind;
@@ -136,8 +116,8 @@ macro_rules! table {
                 )*
                 $(
                     let rules: fn(
-                        $crate::config::schema::rules::Rules,
-                    ) -> $crate::config::schema::rules::Rules = $rules;
+                        $crate::config::table::rules::Rules,
+                    ) -> $crate::config::table::rules::Rules = $rules;
                     description.add_rules(rules, definitions);
                 )?
             }
@@ -148,7 +128,7 @@ macro_rules! table {
     (@name $field:ident $name:literal) => { $name };
 
     (@read $section:ident, $key:expr, $kind:expr;) => {
-        $crate::config::value::Plain::read_from($section, $key, &$kind)
+        $crate::config::table::nested::Plain::read_from($section, $key, &$kind)
     };
     (@read $section:ident, $key:expr, $kind:expr; => $default:expr) => {
         $section.read($key, &$kind).unwrap_or_else(|| $default)
@@ -161,7 +141,7 @@ macro_rules! table {
     };
 
     (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr;) => {
-        <$type as $crate::config::value::Plain<_>>::describe(&$kind, $field, $description, $definitions);
+        <$type as $crate::config::table::nested::Plain<_>>::describe(&$kind, $field, $description, $definitions);
     };
     (@describe $description:ident, $definitions:ident, $field:ident, $type:ty, $kind:expr; => $default:expr) => {
         let default: $type = $default;
@@ -198,12 +178,12 @@ macro_rules! one_of {
             $($(#[doc = $meaning])* $variant($type),)+
         }
 
-        impl $crate::config::value::Value<$crate::config::value::OneOf> for $name {
+        impl $crate::config::value::Value<$crate::config::table::unread::OneOf> for $name {
             fn read(
-                _: &$crate::config::value::OneOf,
+                _: &$crate::config::table::unread::OneOf,
                 entry: &$crate::config::value::Entry<'_>,
             ) -> Option<Self> {
-                use $crate::config::value::kinds::*;
+                use $crate::config::table::kinds::*;
                 $($(
                     if entry.node.content.$shape().is_some() {
                         return <$type as $crate::config::value::Value<_>>::read(&$kind, entry).map(Self::$variant);
@@ -214,19 +194,19 @@ macro_rules! one_of {
             }
 
             fn schema(
-                _: &$crate::config::value::OneOf,
-                definitions: &mut $crate::config::schema::definitions::Definitions,
-            ) -> $crate::config::value::Keywords {
-                use $crate::config::value::kinds::*;
+                _: &$crate::config::table::unread::OneOf,
+                definitions: &mut $crate::config::value::definitions::Definitions,
+            ) -> $crate::config::value::definitions::Keywords {
+                use $crate::config::table::kinds::*;
                 let forms = vec![$({
-                    let field = $crate::config::value::Field {
+                    let field = $crate::config::table::field::Field {
                         key: "",
                         meaning: &[$($meaning),*],
-                        also: &[$($($crate::config::value::Also::$also),+)?],
+                        also: &[$($($crate::config::table::field::Also::$also),+)?],
                     };
-                    $crate::config::schema::description::property::<$type, _>(&$kind, field, None, definitions)
+                    $crate::config::table::description::property::<$type, _>(&$kind, field, None, definitions)
                 }),+];
-                $crate::config::value::any_of(forms)
+                $crate::config::value::definitions::any_of(forms)
             }
         }
     };
