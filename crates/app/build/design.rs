@@ -9,7 +9,7 @@ use super::millimetres;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 use fluxmorph_optimizer::design::{
-    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
+    BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
 };
 
 /// The design surface on the mesh with all regions.
@@ -56,9 +56,9 @@ pub(super) fn surface(
             (None, None) => Control::Nodes,
         },
         mirrors: design.symmetry.iter().map(mirror).collect(),
-        rim: match design.rim {
-            RimMotion::Free => Rim::Free,
-            RimMotion::Fixed => Rim::Fixed,
+        boundary: match design.rim {
+            RimMotion::Free => BoundaryMotion::Free,
+            RimMotion::Fixed => BoundaryMotion::Fixed,
         },
         cuts: kept.iter().copied().filter(outer).collect(),
         triangles,

@@ -87,8 +87,8 @@ impl<'a> DiagnosticSink<'a> {
     ///
     /// # Errors
     /// Whatever no value of the configuration is to blame for.
-    pub(super) fn take<T>(&mut self, made: Result<T, Error>) -> Result<Option<T>, Error> {
-        match made.map_err(|error| attribute_error(error, self.config, self.source)) {
+    pub(super) fn take<T>(&mut self, outcome: Result<T, Error>) -> Result<Option<T>, Error> {
+        match outcome.map_err(|error| attribute_error(error, self.config, self.source)) {
             Ok(value) => Ok(Some(value)),
             Err(Error::Config(ConfigError::Invalid(report))) => {
                 for fault in report.diagnostics {

@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::config::{Config, ConfigError, MeshConfig, SourceMap};
-use crate::files::OlderRun;
+use crate::files::OverwritePolicy;
 
 /// Bytes for each tetrahedron of the leanest set-up: mesh, adjacency, and pattern of a linear problem without motion.
 ///
@@ -62,9 +62,9 @@ pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), Conf
 ///
 /// # Errors
 /// A fault at the mesh.
-pub(crate) fn check_problem(estimate: usize, source: &SourceMap, older: OlderRun) -> Result<(), ConfigError> {
+pub(crate) fn check_problem(estimate: usize, source: &SourceMap, overwrite: OverwritePolicy) -> Result<(), ConfigError> {
     match room() {
-        Some(room) if older == OlderRun::Keep => {
+        Some(room) if overwrite == OverwritePolicy::Keep => {
             refuse_beyond(room, source, ("mesh", "solving the problem"), estimate as u64)
         }
         _ => Ok(()),
@@ -235,9 +235,9 @@ mod tests {
             error.to_string().contains("about 2 MiB of memory, and there are 1 MiB (by the test)"),
             "{error}"
         );
-        assert!(check_problem(usize::MAX, &source, OlderRun::Replace).is_ok());
+        assert!(check_problem(usize::MAX, &source, OverwritePolicy::Replace).is_ok());
         if room().is_some() {
-            assert!(check_problem(usize::MAX, &source, OlderRun::Keep).is_err());
+            assert!(check_problem(usize::MAX, &source, OverwritePolicy::Keep).is_err());
         }
     }
 }

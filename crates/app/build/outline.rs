@@ -106,7 +106,7 @@ fn outlined(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::{Purpose, set_up};
+    use crate::build::{Mode, set_up};
 
     fn shield(name: &str) -> (Config, SourceMap) {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
@@ -118,7 +118,7 @@ mod tests {
         for name in ["shield.toml", "shield_impedance.toml"] {
             let (config, source) = shield(name);
             let outline = outline(&config, &source).expect("an outline");
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a problem");
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a problem");
             assert_eq!(outline.mesh.points(), setup.problem.original().points());
             let shape = setup.problem.shape().expect("a shape");
             let design = outline.design.as_ref().expect("a design");

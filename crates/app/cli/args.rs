@@ -12,7 +12,7 @@ use crate::build::memory_limit;
 use crate::build::with_names;
 use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
 use crate::error::Error;
-use crate::files::OlderRun;
+use crate::files::OverwritePolicy;
 
 pub use sweep::{Scheduler, SweepArgs};
 
@@ -314,15 +314,15 @@ impl CommonArgs {
     }
 
     /// What `--force` says about an earlier run.
-    pub fn older_run(&self) -> OlderRun {
-        self.work.older_run()
+    pub fn overwrite_policy(&self) -> OverwritePolicy {
+        self.work.overwrite_policy()
     }
 }
 
 impl WorkArgs {
     /// What `--force` says about an earlier run.
-    pub fn older_run(&self) -> OlderRun {
-        if self.force { OlderRun::Replace } else { OlderRun::Keep }
+    pub fn overwrite_policy(&self) -> OverwritePolicy {
+        if self.force { OverwritePolicy::Replace } else { OverwritePolicy::Keep }
     }
 
     /// How progress is shown; `--quiet` wins.
@@ -398,7 +398,7 @@ mod tests {
         assert_eq!((run.limits.max_evaluations, run.limits.max_time), (Some(5), Some(90.0)));
         assert_eq!(run.common.overrides, ["a.b=1", "c=d"]);
         assert_eq!(run.common.work.threads, Some(2));
-        assert_eq!(run.common.older_run(), OlderRun::Replace);
+        assert_eq!(run.common.overwrite_policy(), OverwritePolicy::Replace);
         // Whoever wants quiet has it.
         assert_eq!((run.common.work.progress, run.common.work.progress()), (Progress::Bar, Progress::None));
         assert_eq!(duration("10 min"), Ok(600.0));

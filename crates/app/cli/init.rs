@@ -40,7 +40,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
     }
     if !args.quiet {
         let written: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-        let _ = writeln!(std::io::stderr(), "{}", told(&written, place.template));
+        let _ = writeln!(std::io::stderr(), "{}", next_commands(&written, place.template));
     }
     Ok(ExitCode::Success)
 }
@@ -83,7 +83,7 @@ impl Place {
 }
 
 /// What was written, and the next commands.
-fn told(files: &[&Path], template: Template) -> String {
+fn next_commands(files: &[&Path], template: Template) -> String {
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let config = shell_word(files[0]);
     let command = template.command();

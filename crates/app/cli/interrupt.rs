@@ -46,7 +46,7 @@ impl Signal {
     }
 
     /// How a command ended: one that a signal has ended, before it could have a result, says so and has that signal's code.
-    pub(super) fn ended(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
+    pub(super) fn exit_code_of(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
         match (outcome, self.received()) {
             (
                 Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)),

@@ -12,7 +12,7 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
-use crate::build::Purpose;
+use crate::build::Mode;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
@@ -93,10 +93,10 @@ impl Ranks {
         &self,
         config: &Config,
         source: &SourceMap,
-        purpose: Purpose,
+        mode: Mode,
     ) -> Option<ExitCode> {
         let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
-        run::serve(group, config, source, purpose);
+        run::serve(group, config, source, mode);
         Some(ExitCode::Success)
     }
 }

@@ -226,11 +226,11 @@ mod tests {
     use std::fs;
 
     use super::super::disk::system_disk;
-    use super::super::run_directory::OlderRun;
+    use super::super::run_directory::OverwritePolicy;
     use super::*;
 
     fn fresh(folder: &tempfile::TempDir) -> RunDirectory {
-        RunDirectory::create(&system_disk(), &folder.path().join("run"), OlderRun::Keep).expect("new")
+        RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep).expect("new")
     }
 
     /// Three pieces and their header.

@@ -268,13 +268,13 @@ pub fn blake3_hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{OlderRun, system_disk};
+    use crate::files::{OverwritePolicy, system_disk};
 
     #[test]
     fn a_manifest_is_written_first_and_completed_last() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run =
-            RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("a run directory");
+            RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep).expect("a run directory");
         let mut manifest = Manifest::started("run", 2);
         manifest.config = Some(FileHash { path: "a.toml".into(), blake3: blake3_hex(b"") });
         manifest.write(&run).expect("written");

@@ -34,7 +34,7 @@ pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, TermResult, Verification,
 };
-pub use run_directory::{OlderRun, RunDirectory};
+pub use run_directory::{OverwritePolicy, RunDirectory};
 pub use synced::SyncedLog;
 pub(crate) use synced::write_whole;
 

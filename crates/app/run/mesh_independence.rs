@@ -11,7 +11,7 @@
 use fluxmorph_geometry::tet4::Point;
 
 use crate::build::memory_limit;
-use crate::build::{Purpose, Setup, design_triangulation, set_up};
+use crate::build::{Mode, Setup, design_triangulation, set_up};
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
@@ -174,7 +174,7 @@ impl Gain<'_> {
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
         let config = fresh_configuration(self.config, mesh);
-        let setup = set_up(&config, self.source, Purpose::Optimisation)?;
+        let setup = set_up(&config, self.source, Mode::Optimisation)?;
         if interrupted() {
             return Ok(None);
         }
@@ -317,7 +317,7 @@ mod tests {
         for on_nodes in [false, true] {
             let (mut config, source) = quick(on_nodes);
             config.output.verify_refinement = 1.0;
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
             let best = dished(&setup);
             let value = |p: &[f64]| {
                 let analysis = setup
@@ -345,7 +345,7 @@ mod tests {
             let (mut config, source) = quick(on_nodes);
             // Over the plate the cells are halved.
             config.output.verify_refinement = 3.0;
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
             let shapes = Shapes::of(&config, &setup, &dished(&setup)).expect("a design surface");
             let (objective, told) =
                 verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
@@ -398,7 +398,7 @@ mod tests {
     #[test]
     fn the_initial_design_as_the_best_is_the_ratio_one() {
         let (config, source) = quick(false);
-        let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+        let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
         let shapes = Shapes::of(&config, &setup, &[0.0; 91]).expect("a design");
         assert_eq!(shapes, Shapes::Unchanged);
         let (objective, told) = verified(&config, &source, &shapes, StopReason::MeshLimit, false);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Algorithm, Config, Optimizer};
 use fluxmorph::files::StopReason;
 use fluxmorph::show::{Evaluation, Observer, Silent};
@@ -15,7 +15,7 @@ use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 fn quick() -> (Problem, Optimizer) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let (config, source) = Config::from_file(&path, &[]).unwrap();
-    (set_up(&config, &source, Purpose::Optimisation).unwrap().problem, config.optimizer)
+    (set_up(&config, &source, Mode::Optimisation).unwrap().problem, config.optimizer)
 }
 
 #[derive(Default)]
@@ -206,5 +206,5 @@ fn a_first_design_far_away_is_approached_in_steps() {
     let mut told = Told::default();
     let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut told);
     check_rows(&optimised, &rows, 0.0);
-    assert!(told.0.len() > 1 && told.0.iter().all(|event| event.kind == RoundKind::Approach), "{:?}", told.0);
+    assert!(told.0.len() > 1 && told.0.iter().all(|event| event.kind == RoundKind::Continuation), "{:?}", told.0);
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxmorph::build::{Purpose, Setup, set_up};
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::Config;
 use fluxmorph_optimizer::geometric::{Bound, MARGIN, ThicknessBound, Volume};
 use fluxmorph_optimizer::problem::Problem;
@@ -11,7 +11,7 @@ fn shield(overrides: &[&str]) -> Setup {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let (config, source) = Config::from_file(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A design inside the bounds that is flat nowhere.

@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph::build::Purpose;
-use fluxmorph::files::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::build::Mode;
+use fluxmorph::files::{OverwritePolicy, RunResult, StopReason, system_disk};
+use fluxmorph::run::{self, RunLimits, Options, SavedRun};
 use fluxmorph::show::Silent;
 use fluxmorph::show::report::ReportedRun;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
@@ -39,7 +39,7 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
         let (mut config, source) = support::config(CONFIG, &SETTINGS);
         config.output.directory = directory.to_owned();
         if let Some(team) = team.filter(|team| team.role() == Role::Worker) {
-            run::serve(team, &config, &source, Purpose::Optimisation);
+            run::serve(team, &config, &source, Mode::Optimisation);
             return None;
         }
         let asked = Cell::new(0);
@@ -48,11 +48,11 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
             matches!(task, Task::BreakOff(most) if asked.get() > most)
         };
         let options =
-            Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team, interrupted: &interrupted };
+            Options { disk: &disk, overwrite_policy: OverwritePolicy::Keep, threads: 1, team, interrupted: &interrupted };
         let result = match task {
             Task::Resume => {
                 let saved = SavedRun::open(&disk, directory).expect("there is a run");
-                run::resume(saved, Limits::default(), options, &mut Silent)
+                run::resume(saved, RunLimits::default(), options, &mut Silent)
             }
             _ => run::run(&config, &source, options, &mut Silent),
         };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fluxmorph::build::{Purpose, Setup, set_up_watched};
+use fluxmorph::build::{Mode, Setup, set_up_watched};
 use fluxmorph::run;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
 
@@ -19,10 +19,10 @@ pub(crate) fn led<T: Send>(
         let team = RankGroup::new(ranks, Arc::default());
         let (config, source) = support::config(name, overrides);
         if team.role() == Role::Worker {
-            run::serve(&team, &config, &source, Purpose::Optimisation);
+            run::serve(&team, &config, &source, Mode::Optimisation);
             return None;
         }
-        let setup = set_up_watched(&config, &source, Purpose::Optimisation, Some(&team), &mut |_| ());
+        let setup = set_up_watched(&config, &source, Mode::Optimisation, Some(&team), &mut |_| ());
         let result = lead(setup.unwrap_or_else(|error| panic!("{error}")));
         team.shut_down();
         Some(result)

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{LimitArgs, key_value, threads, whole_number};
-use crate::files::OlderRun;
-use crate::run::Limits;
+use crate::files::OverwritePolicy;
+use crate::run::RunLimits;
 use crate::run::sweep::{Outside, Request};
 
 /// Options of `sweep`.
@@ -86,9 +86,9 @@ impl SweepArgs {
             config: &self.config,
             set: &self.set,
             out: self.out.as_deref(),
-            limits: Limits { max_evaluations: self.limits.max_evaluations, max_time: self.limits.max_time },
+            limits: RunLimits { max_evaluations: self.limits.max_evaluations, max_time: self.limits.max_time },
             outside: if self.allow_outside { Outside::Allowed } else { Outside::Refused },
-            older: if self.force { OlderRun::Replace } else { OlderRun::Keep },
+            overwrite: if self.force { OverwritePolicy::Replace } else { OverwritePolicy::Keep },
         }
     }
 }

@@ -75,13 +75,13 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::build::{Purpose, set_up};
+    use crate::build::{Mode, set_up};
 
     fn of(configuration: &str, overrides: &[&str]) -> Vec<String> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(configuration);
         let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
         let (config, source) = Config::from_file(&path, &overrides).expect("shipped");
-        let setup = set_up(&config, &source, Purpose::Inspection).expect("sound");
+        let setup = set_up(&config, &source, Mode::Inspection).expect("sound");
         advice(&config, &setup)
     }
 

@@ -33,7 +33,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
             None => Box::new(Silent),
         };
         let told = &mut |stage| observer.stage(stage);
-        let summary = summary::summary(&config, &source, work.older_run(), told)?;
+        let summary = summary::summary(&config, &source, work.overwrite_policy(), told)?;
         drop(observer);
         if work.json {
             stdout::print_json(&summary)?;

@@ -6,7 +6,7 @@ use crate::files::csv_text;
 
 /// The columns of the first table.
 const ROW: [&str; 9] =
-    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "increments", "rescues"];
+    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "increments", "fallbacks"];
 /// The columns of the table of shares.
 const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
 /// The columns of the table of places.
@@ -70,7 +70,7 @@ fn row(case: &CaseReport) -> Vec<String> {
         result.inverted.to_string(),
         format!("{:.1}", result.reached * 100.0),
         result.increments.to_string(),
-        result.rescues.to_string(),
+        result.fallbacks.to_string(),
     ]
 }
 
@@ -217,7 +217,7 @@ fn result_cells(result: &CaseResult) -> Vec<String> {
         inversion.element.map_or_else(String::new, |e| e.to_string()),
         number(Some(result.reached)),
         result.increments.to_string(),
-        result.rescues.to_string(),
+        result.fallbacks.to_string(),
     ]
 }
 

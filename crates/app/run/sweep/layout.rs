@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
-use crate::files::{Disk, FileHash, OlderRun, OutputError, shell_word, to_json, write_whole};
+use crate::files::{Disk, FileHash, OverwritePolicy, OutputError, shell_word, to_json, write_whole};
 
 /// The mark by which a directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -54,7 +54,7 @@ struct Described {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// It is begun; what is in its directory is kept or replaced.
-    Begin(OlderRun),
+    Begin(OverwritePolicy),
     /// It is gone on with.
     Resume,
 }
@@ -67,7 +67,7 @@ impl Layout {
     pub fn create(disk: &Arc<dyn Disk>, sweep: &Sweep) -> Result<Self, Error> {
         let layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone() };
         match layout.description() {
-            Ok(earlier) if sweep.older == OlderRun::Keep => layout.goes_on(&earlier, sweep)?,
+            Ok(earlier) if sweep.overwrite == OverwritePolicy::Keep => layout.goes_on(&earlier, sweep)?,
             Ok(_) => {}
             Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
                 layout.is_free()?;
@@ -179,7 +179,7 @@ impl Description {
                 index,
                 directory: planned.combination.name.clone(),
                 values: values.map(|(setting, value)| (setting.key.clone(), value.clone().into())).collect(),
-                command: command_text(&sweep.arguments(planned, Task::Begin(OlderRun::Keep))),
+                command: command_text(&sweep.arguments(planned, Task::Begin(OverwritePolicy::Keep))),
             }
         };
         Self {
@@ -220,7 +220,7 @@ impl Sweep {
         if self.outside == super::Outside::Allowed {
             add(&["--allow-outside"]);
         }
-        if self.older == OlderRun::Replace || task == Task::Begin(OlderRun::Replace) {
+        if self.overwrite == OverwritePolicy::Replace || task == Task::Begin(OverwritePolicy::Replace) {
             add(&["--force"]);
         }
         arguments

@@ -9,8 +9,8 @@ use crate::build::memory_limit;
 use crate::build::with_names;
 use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
 use crate::error::Error;
-use crate::files::{FileHash, LimitsInForce, OlderRun, blake3_hex};
-use crate::run::Limits;
+use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
+use crate::run::RunLimits;
 
 /// Combinations whose faults are told; the rest are counted.
 const MOST_REPORTS: usize = 5;
@@ -34,11 +34,11 @@ pub struct Request<'a> {
     /// The directory, in place of the one that the configuration implies.
     pub out: Option<&'a Path>,
     /// Limits in place of those of the configuration.
-    pub limits: Limits,
+    pub limits: RunLimits,
     /// Files elsewhere.
     pub outside: Outside,
-    /// What becomes of runs that are no combination; [`OlderRun::Replace`] also goes on where the memory seems too small.
-    pub older: OlderRun,
+    /// What becomes of runs that are no combination; [`OverwritePolicy::Replace`] also goes on where the memory seems too small.
+    pub overwrite: OverwritePolicy,
 }
 
 /// A sweep whose configurations are sound.
@@ -53,11 +53,11 @@ pub struct Sweep {
     /// The keys and their values.
     pub settings: Vec<Setting>,
     /// Limits of the command line.
-    pub limits: Limits,
+    pub limits: RunLimits,
     /// Files elsewhere.
     pub outside: Outside,
     /// What becomes of runs that are no combination.
-    pub older: OlderRun,
+    pub overwrite: OverwritePolicy,
     /// The combinations; the first key changes slowest.
     pub combinations: Vec<Planned>,
 }
@@ -129,7 +129,7 @@ impl Sweep {
             settings,
             limits: request.limits,
             outside: request.outside,
-            older: request.older,
+            overwrite: request.overwrite,
             combinations: planned,
         })
     }
@@ -165,7 +165,7 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMa
         source.confined(by)?;
     }
     config.optimisation(&source)?;
-    if request.older == OlderRun::Keep {
+    if request.overwrite == OverwritePolicy::Keep {
         memory_limit::check_mesh(&config, &source)?;
     }
     Ok((config, source))

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::layout::command_text;
 use super::{Outside, Sweep, SweepError};
 use crate::error::Error;
-use crate::files::{Disk, OlderRun, OutputError, shell_word, write_whole};
+use crate::files::{Disk, OverwritePolicy, OutputError, shell_word, write_whole};
 
 /// The line by which a script is known as ours.
 const MARK: &str = "# A sweep of fluxmorph, written by `fluxmorph sweep --script`:";
@@ -42,7 +42,7 @@ impl ScriptFile<'_> {
             Ok(bytes) => String::from_utf8_lossy(&bytes).lines().any(|line| line == MARK),
             Err(_) => false,
         };
-        if !is_ours && sweep.older == OlderRun::Keep {
+        if !is_ours && sweep.overwrite == OverwritePolicy::Keep {
             return Err(SweepError::ScriptExists { path: self.path.to_owned() }.into());
         }
         let absolute =
@@ -103,7 +103,7 @@ fn arguments(sweep: &Sweep, config: &Path, directory: &Path) -> Vec<String> {
     if sweep.outside == Outside::Allowed {
         arguments.push("--allow-outside".to_owned());
     }
-    if sweep.older == OlderRun::Replace {
+    if sweep.overwrite == OverwritePolicy::Replace {
         arguments.push("--force".to_owned());
     }
     arguments

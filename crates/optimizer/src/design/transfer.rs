@@ -1,9 +1,9 @@
-//! Displacements of one triangulation of a design surface, taken over by another one of the same surface.
+//! Displacements of one triangulation of a design surface, transferred to another one of the same surface.
 //!
 //! A node takes the displacement of the nearest point of the undeformed old surface, linear on its triangle: constant and
 //! linear displacements are reproduced, and a planar surface keeps its shape but for the corners between nodes. A node on
-//! the rim takes that of the nearest point of the old rim: it stays in the planes that the rim slides in, and a held rim
-//! stays. Does not live here: what a displacement does to the mesh.
+//! a boundary edge takes that of the nearest point of the old boundary edges: it stays in the planes that these slide in, and
+//! a held boundary stays. Does not live here: what a displacement does to the mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -45,7 +45,7 @@ impl Triangulation {
     }
 
     /// Edges of one triangle only, ascending.
-    fn rim(&self) -> Vec<[usize; 2]> {
+    fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let mut count: BTreeMap<[usize; 2], usize> = BTreeMap::new();
         for &[a, b, c] in &self.triangles {
             for [i, j] in [[a, b], [b, c], [c, a]] {
@@ -65,10 +65,10 @@ impl Triangulation {
     pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
         assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
         let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
-        let rim = Pieces::new(&self.places, self.rim().iter().map(|e| e.to_vec()).collect());
-        let on_rim: BTreeSet<usize> = fresh.rim().into_iter().flatten().collect();
+        let boundary = Pieces::new(&self.places, self.boundary_edges().iter().map(|e| e.to_vec()).collect());
+        let on_boundary: BTreeSet<usize> = fresh.boundary_edges().into_iter().flatten().collect();
         let of = |(i, &place): (usize, &Point)| {
-            let pieces = if on_rim.contains(&i) { &rim } else { &inner };
+            let pieces = if on_boundary.contains(&i) { &boundary } else { &inner };
             let weights = pieces.nearest(place).ok_or(SurfaceMismatch { point: place })?;
             Ok(weights.iter().fold([0.0; 3], |sum: Point, &(node, weight)| {
                 std::array::from_fn(|d| sum[d] + weight * displacement[node][d])
@@ -206,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_held_rim_stays_and_a_rim_in_a_plane_keeps_to_it() {
-        // On a bent surface the nearest point to a node of the rim may lie inside, where nodes leave the rim's plane.
+        // On a bent surface the nearest point to a node of the boundary may lie inside, where nodes leave its plane.
         let bent = |x: f64, y: f64| 0.3 * (x * x + x * y);
         let (old, fresh) = (plate([4, 5], bent), plate([7, 6], bent));
         let law = |x: &Point| if x[0] == 0.0 { [0.0, 0.0, 0.01] } else { [0.01, 0.0, 0.01] };

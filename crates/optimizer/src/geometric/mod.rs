@@ -13,7 +13,7 @@ pub use wall_thickness::WallThickness;
 
 use fluxmorph_geometry::MeshError;
 
-/// Why a geometric function cannot be made.
+/// Why a geometric function cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GeometricError {

@@ -5,8 +5,8 @@
 //! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
 //! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
 //! thrown away. A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
-//! NLopt's that is no number, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
-//! caught here and goes on after NLopt has returned.
+//! NLopt's that is not finite, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
+//! caught here and resumed after NLopt has returned.
 
 use std::cell::RefCell;
 
@@ -67,7 +67,7 @@ impl Sample {
         derivatives("the relative objective", &self.gradient)?;
         if self.constraints.len() != constraints {
             return Err(Error::Optimisation {
-                cause: "an evaluation gives another number of constraints than the method was told",
+                cause: "an evaluation gives another number of constraints than was announced to the method",
             });
         }
         for (number, (value, gradient)) in self.constraints.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Symmetry pairs: variables that are mirror images of each other become one.
+//! Symmetry constraints: variables that are mirror images of each other are constrained to be equal, and become one.
 //!
 //! Mirrors are normal to coordinate axes, one an axis at most; so they commute, and the images of a point are at most
 //! eight. A point on a mirror is its own partner.
@@ -75,7 +75,7 @@ pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror],
     }
 }
 
-/// Which old variable goes into which new one.
+/// The linear constraints of the variables: which old variable goes into which new one.
 pub(super) struct Groups {
     new_of: Vec<usize>,
     /// The first old variable of each new one.
@@ -104,10 +104,10 @@ impl Groups {
             return;
         }
         for row in rows {
-            let mut tied: Row = row.iter().map(|&(k, weight)| (self.new_of[k], weight)).collect();
-            tied.sort_by_key(|&(k, _)| k);
+            let mut merged: Row = row.iter().map(|&(k, weight)| (self.new_of[k], weight)).collect();
+            merged.sort_by_key(|&(k, _)| k);
             row.clear();
-            for (k, weight) in tied {
+            for (k, weight) in merged {
                 match row.last_mut() {
                     Some((last, sum)) if *last == k => *sum += weight,
                     _ => row.push((k, weight)),
