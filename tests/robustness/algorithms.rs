@@ -88,7 +88,8 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
         xtol_rel: 0.0,
     };
     let disk = SimulatedDisk::default();
-    let directory = RunDirectory::create(&disk.shared(), Path::new("/run"), OverwritePolicy::Keep).expect("made");
+    let directory =
+        RunDirectory::create(&disk.shared(), Path::new("/run"), OverwritePolicy::Keep).expect("made");
     let (mut journal, replayed) = match journal {
         None => (Journal::create(&directory, identity).expect("created"), Vec::new()),
         Some(bytes) => {

@@ -87,13 +87,10 @@ impl Trial<'_> {
         } else if tally.failed == 1 {
             match resume(&disk.shared(), self.limits) {
                 Ok(_) => tally.resumed = 1,
-                // So early that there is nothing to go on with.
+                // So early that there is nothing to resume.
                 Err(Error::NotResumable { .. } | Error::Output(OutputError::NoRun { .. })) => {
                     let journal = disk.files(FOLDER.as_ref()).remove(Path::new("journal.jsonl"));
-                    assert!(
-                        journal.is_none(),
-                        "{context}: evaluations are there, and cannot be gone on with"
-                    );
+                    assert!(journal.is_none(), "{context}: evaluations are there, and cannot be resumed");
                     run(&disk.shared(), self.device).unwrap_or_else(|e| panic!("{context}: {e}"));
                     tally.started_again = 1;
                 }
@@ -150,5 +147,5 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
     let total = tallies.into_iter().fold(Tally::default(), |sum, tally| sum + tally);
     println!("together: {total:?}");
     assert!(total.faults >= 1500, "{total:?}");
-    assert!(total.resumed > 5 * total.started_again, "most states can be gone on with: {total:?}");
+    assert!(total.resumed > 5 * total.started_again, "most states can be resumed: {total:?}");
 }

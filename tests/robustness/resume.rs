@@ -73,7 +73,8 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         assert!(count >= 5, "{name}: {count}");
         for cut in 0..=count {
             let disk = cut_behind(&files, cut);
-            resume(&disk.shared(), RunLimits::default()).unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
+            resume(&disk.shared(), RunLimits::default())
+                .unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
             assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, &format!("{name}, cut at {cut}"));
         }
     }

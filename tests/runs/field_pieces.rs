@@ -24,7 +24,13 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
         .map(str::to_owned);
     let (mut config, source) = Config::from_file(&path, &overrides).unwrap();
     config.output.directory = directory.to_owned();
-    let options = Options { disk, overwrite_policy: OverwritePolicy::Keep, threads: 2, ranks: None, interrupted: &|| false };
+    let options = Options {
+        disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 2,
+        ranks: None,
+        interrupted: &|| false,
+    };
     run::run(&config, &source, options, &mut Silent).unwrap();
     let problem = set_up(&config, &source, Mode::Optimisation).unwrap().problem;
     let initial = problem.shape().unwrap().initial().to_vec();

@@ -169,7 +169,7 @@ fn fault(source: &SourceMap, design: &config::Design, error: DesignError) -> Err
         DesignError::Empty => source.diagnostic("design.surface", format!("the surface `{names}` has no triangles")),
         DesignError::NoExtent { .. } => source
             .diagnostic("design.direction", format!("a control grid cannot be laid across `design.direction` on `{names}`"))
-            .expected("the direction that stands most upright on the surface, or no design.grid"),
+            .expected("the direction nearest to the normal of the surface, or no design.grid"),
         DesignError::Folded { point, axis } => source
             .diagnostic(
                 "design.grid",

@@ -196,7 +196,7 @@ pub(super) fn constraints(
                 add(written.name.clone(), Quantity::Volume(body), upper(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
-                // Both bounds of one entry are two constraints, told apart by their names.
+                // Both bounds of one entry are two constraints with different names.
                 let name = |suffix: &str| match (minimum, maximum) {
                     (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
                     _ => written.name.clone(),

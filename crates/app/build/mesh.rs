@@ -42,7 +42,10 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
         MeshConfig::File { path, unit } => read_msh_file(path, unit.metres())
             .map(|read| {
                 let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
-                Built { mesh: read.mesh, notices: read.notices.messages().into_iter().map(with_file).collect() }
+                Built {
+                    mesh: read.mesh,
+                    notices: read.notices.messages().into_iter().map(with_file).collect(),
+                }
             })
             .map_err(|error| file_fault(error, source)),
     }?;

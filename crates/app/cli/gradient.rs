@@ -29,8 +29,8 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let mut observer = observer(&args.common.work);
         observer.phase("setting up mesh and matrices");
-        let told = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, ranks.group(), told)?;
+        let progress = &mut |stage| observer.stage(stage);
+        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, ranks.group(), progress)?;
         memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.overwrite_policy())?;
         for warning in &setup.warnings {
             observer.warning(warning);

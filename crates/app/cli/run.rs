@@ -14,7 +14,7 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::{self, RunLimits, Options, SavedRun};
+use crate::run::{self, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
 
@@ -72,7 +72,8 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         let options =
             Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
         let report = config.output.report.then_some(&disk);
-        let limits = RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
+        let limits =
+            RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);
         let result = run::resume(saved, limits, options, &mut *observer);
         let ended = Ended { directory: &args.directory, report, json: args.work.json };

@@ -9,15 +9,14 @@ use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{OverwritePolicy, OutputError, shell_word, system_disk};
+use crate::files::{OutputError, OverwritePolicy, shell_word, system_disk};
 use crate::run::sweep::{
     Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
 };
 use crate::show::{Console, Observer};
 
 /// What is shown at the first signal.
-const FINISHES_RUNS: &str =
-    "no further run begins; those at work finish the evaluation in hand and save; once more to leave at once";
+const FINISHES_RUNS: &str = "no further run is started; running ones finish their evaluation and save; interrupt again to exit at once";
 
 /// How many times as long as writing the comparison the work before must have taken: it is written for a reader, and at the
 /// end in any case.
@@ -79,7 +78,9 @@ fn left_to_do(states: &mut States<'_>, sweep: &Sweep, index: usize) -> Result<Le
         State::Broken => Left::Task(Task::Resume),
         State::Finished(reason) => Left::Finished(reason.into()),
         State::InUse => Left::InUse,
-        State::Other(_) if sweep.overwrite == OverwritePolicy::Replace => Left::Task(Task::Begin(OverwritePolicy::Replace)),
+        State::Other(_) if sweep.overwrite == OverwritePolicy::Replace => {
+            Left::Task(Task::Begin(OverwritePolicy::Replace))
+        }
         State::Other(cause) => {
             return Err(SweepError::OtherRun { path: sweep.run_directory(planned), cause }.into());
         }

@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn rows_have_the_documented_columns_and_exact_numbers() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run =
-            RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep).expect("a run directory");
+        let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
+            .expect("a run directory");
         History::create(&run, &["volume"], &[&evaluation()])
             .and_then(|mut history| history.append(&evaluation()))
             .expect("written");

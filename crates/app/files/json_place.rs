@@ -1,4 +1,4 @@
-//! Where something stands in a JSON text, for messages; a reader of JSON does not tell.
+//! The position of a value in a JSON text, for messages; the JSON reader does not give it.
 
 use std::ops::Range;
 

@@ -66,7 +66,11 @@ impl RunDirectory {
     ///
     /// # Errors
     /// When the folder holds something else, or the operating system refuses.
-    pub fn create(disk: &Arc<dyn Disk>, path: &Path, overwrite: OverwritePolicy) -> Result<Self, OutputError> {
+    pub fn create(
+        disk: &Arc<dyn Disk>,
+        path: &Path,
+        overwrite: OverwritePolicy,
+    ) -> Result<Self, OutputError> {
         Self { disk: Arc::clone(disk), path: path.to_owned() }.refuse_link()?;
         let directory = Self::create_flat(disk, path, overwrite)?;
         directory.make_fields()?;
@@ -106,7 +110,11 @@ impl RunDirectory {
     ///
     /// # Errors
     /// As [`RunDirectory::create`].
-    pub fn create_flat(disk: &Arc<dyn Disk>, path: &Path, overwrite: OverwritePolicy) -> Result<Self, OutputError> {
+    pub fn create_flat(
+        disk: &Arc<dyn Disk>,
+        path: &Path,
+        overwrite: OverwritePolicy,
+    ) -> Result<Self, OutputError> {
         let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
         match disk.names(path) {
             Ok(names) if names.is_empty() => {}
@@ -171,7 +179,7 @@ impl RunDirectory {
 
     fn clear(&self, overwrite: OverwritePolicy) -> Result<(), OutputError> {
         if !self.holds_run() {
-            // What is left of a start that was broken off before its manifest was complete is ours as well.
+            // What is left of a start that was interrupted before its manifest was complete is ours as well.
             return if self.holds_only_leftovers()? {
                 self.remove_unfinished(&self.path)
             } else {
@@ -273,11 +281,11 @@ impl RunDirectory {
         SyncedLog::create(&*self.disk, path, start)
     }
 
-    /// A log of the run, to go on behind its first `length` bytes.
+    /// A log of the run, to be continued after its first `length` bytes.
     ///
     /// # Errors
     /// As [`SyncedLog::append`], and [`OutputError::InUse`].
-    pub fn reopened(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
+    pub fn reopen(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
         SyncedLog::reopen(&*self.disk, path, length)
     }
 
@@ -375,7 +383,8 @@ mod tests {
     use super::*;
 
     fn started(path: &Path) -> RunDirectory {
-        let run = RunDirectory::create(&system_disk(), path, OverwritePolicy::Keep).expect("a new run directory");
+        let run =
+            RunDirectory::create(&system_disk(), path, OverwritePolicy::Keep).expect("a new run directory");
         Manifest::started("run", 2).write(&run).expect("a manifest");
         run
     }
@@ -384,8 +393,8 @@ mod tests {
     fn an_absent_or_empty_folder_is_taken() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         assert!(RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep).is_ok());
-        let run =
-            RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OverwritePolicy::Keep).expect("made");
+        let run = RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OverwritePolicy::Keep)
+            .expect("made");
         assert!(run.fields().is_dir());
         // Broken off before the manifest: still nothing of anybody.
         std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
@@ -400,13 +409,15 @@ mod tests {
         fs::write(&note, "years of work").expect("written");
         for manifest in ["", "{}", r#"{"program": "other"}"#, "[]"] {
             for overwrite in [OverwritePolicy::Keep, OverwritePolicy::Replace] {
-                let error = RunDirectory::create(&system_disk(), folder.path(), overwrite).expect_err("foreign");
+                let error =
+                    RunDirectory::create(&system_disk(), folder.path(), overwrite).expect_err("foreign");
                 assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
             }
             fs::write(folder.path().join("manifest.json"), manifest).expect("written");
         }
         assert!(note.exists());
-        let error = RunDirectory::create(&system_disk(), &note, OverwritePolicy::Replace).expect_err("a file");
+        let error =
+            RunDirectory::create(&system_disk(), &note, OverwritePolicy::Replace).expect_err("a file");
         assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
         assert!(RunDirectory::open(&system_disk(), folder.path()).is_err());
     }
@@ -445,8 +456,8 @@ mod tests {
     #[test]
     fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run =
-            RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep).expect("new");
+        let run = RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep)
+            .expect("new");
         let mut manifest = Manifest::started("run", 1);
         manifest.surfaces =
             ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
@@ -469,7 +480,8 @@ mod tests {
         let run = started(&folder.path().join("run"));
         fs::remove_dir(run.fields()).expect("removed");
         std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
-        let error = RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect_err("a link");
+        let error =
+            RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect_err("a link");
         assert!(matches!(error, OutputError::Linked { .. }), "{error}");
         RunDirectory::create_flat(&system_disk(), run.path(), OverwritePolicy::Replace).expect("replaced");
         assert!(other.field(0).exists());

@@ -30,14 +30,14 @@ use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::exports;
 use crate::files::{
-    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus, check_finite,
-    peak_memory_bytes, resume_command,
+    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
+    check_finite, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 use fluxmorph_optimizer::problem::RoundEvent;
 use fluxmorph_optimizer::{Error as OptimizerError, driver};
 use journal::{Identity, Journal};
-use mesh_independence::{Check, Gain, Shapes};
+use mesh_independence::{Check, MeshIndependence, ShapePair};
 use pieces::SharedPieces;
 use prepared::Prepared;
 use recorder::DirectoryRecorder;
@@ -187,7 +187,7 @@ impl Session<'_> {
                 observer,
             )?
         };
-        let shapes = Shapes::of(config, &self.setup, &best.values)?;
+        let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
@@ -246,7 +246,7 @@ impl Session<'_> {
     fn verify_on_fresh_mesh(
         &mut self,
         mut result: RunResult,
-        shapes: &Shapes,
+        shapes: &ShapePair,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
@@ -256,9 +256,9 @@ impl Session<'_> {
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
-        let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
+        let check = MeshIndependence { config, source, stop_reason: result.stop_reason, shapes, memory };
         if let Some(objective) = &mut result.objective
-            && gain.verify(objective, self.interrupted, observer) == Check::CutShort
+            && check.verify(objective, self.interrupted, observer) == Check::CutShort
         {
             // `resume` can do it later: the search is complete, the run is not.
             result.status = RunStatus::Interrupted;

@@ -66,7 +66,8 @@ impl<'a> Prepared<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<Session<'a>, Error> {
         let Self { config, source, options, .. } = self;
-        let directory = RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
+        let directory =
+            RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
         let mut manifest = Manifest::started(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &self.setup.full_mesh));
         manifest.ranks = options.ranks.map(RankGroup::size);

@@ -115,7 +115,11 @@ impl Session<'_> {
     fn note_resumption(&mut self, evaluations: usize, options: Options<'_>) {
         let Self { manifest, config, .. } = self;
         manifest.ranks = manifest.ranks.max(options.ranks.map(RankGroup::size));
-        manifest.resumed(Resumption::now(evaluations, LimitsInForce::of(&config.optimizer), options.threads));
+        manifest.add_resumption(Resumption::now(
+            evaluations,
+            LimitsInForce::of(&config.optimizer),
+            options.threads,
+        ));
         for file in surface_files(&config.output.stl) {
             if !manifest.surfaces.contains(&file) {
                 manifest.surfaces.push(file);
@@ -160,7 +164,11 @@ pub(crate) fn configuration(
 }
 
 /// The result of a run that has ended and would end in the same way again.
-fn finished_result(directory: &RunDirectory, manifest: &Manifest, max_evaluations: usize) -> Option<RunResult> {
+fn finished_result(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+    max_evaluations: usize,
+) -> Option<RunResult> {
     let bytes = directory.disk().read(&directory.result(), LARGEST[1]).ok()?;
     let result: RunResult = serde_json::from_slice(&bytes).ok()?;
     let may_continue = match result.stop_reason {

@@ -27,7 +27,7 @@ const RUN: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapse
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Takes the bar off the terminal, for good. Whoever shows it goes on in plain lines.
+/// Removes the bar from the terminal for good; its owner continues in plain lines.
 pub fn clear() {
     // Never waits: the thread that holds it may be the one that panics.
     let Ok(mut shown) = SHOWN.try_lock() else { return };

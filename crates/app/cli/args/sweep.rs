@@ -63,11 +63,11 @@ pub struct SweepArgs {
     #[arg(long, conflicts_with = "script")]
     pub json: bool,
 
-    /// Let the files that the configuration names lie outside of its folder
+    /// Allow the configuration to name files outside its folder
     #[arg(long)]
     pub allow_outside: bool,
 
-    /// Replace runs in the directory that are none of this sweep; go on where the memory seems too small
+    /// Replace runs in the directory that do not belong to this sweep, and skip the check that the memory is sufficient
     #[arg(long)]
     pub force: bool,
 }
@@ -86,7 +86,10 @@ impl SweepArgs {
             config: &self.config,
             set: &self.set,
             out: self.out.as_deref(),
-            limits: RunLimits { max_evaluations: self.limits.max_evaluations, max_time: self.limits.max_time },
+            limits: RunLimits {
+                max_evaluations: self.limits.max_evaluations,
+                max_time: self.limits.max_time,
+            },
             outside: if self.allow_outside { Outside::Allowed } else { Outside::Refused },
             overwrite: if self.force { OverwritePolicy::Replace } else { OverwritePolicy::Keep },
         }

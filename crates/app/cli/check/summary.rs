@@ -1,6 +1,6 @@
 //! What `check` finds: the configuration as it is understood, and what the mesh and the problem are.
 //!
-//! Serialised as it stands by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
+//! Serialised as it is by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
@@ -127,7 +127,7 @@ fn model_name(model: RegionModel) -> &'static str {
     }
 }
 
-/// Looks at a configuration; `told` hears of every stage as it begins.
+/// Inspects a configuration; every stage is reported to `progress` as it begins.
 ///
 /// # Errors
 /// When the configuration or the mesh is wrong.

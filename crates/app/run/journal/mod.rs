@@ -134,7 +134,7 @@ impl Journal {
     pub fn read_records(directory: &RunDirectory) -> Result<Vec<Record>, OutputError> {
         let Some(contents) = Self::read(directory)? else { return Ok(Vec::new()) };
         let Rest::Damaged(bytes) = contents.rest else { return Ok(contents.records) };
-        let message = format!("{bytes} bytes behind {} evaluations are no records", contents.records.len());
+        let message = format!("{bytes} bytes after {} evaluations are not records", contents.records.len());
         Err(OutputError::Damaged { path: directory.journal(), message })
     }
 
@@ -153,7 +153,7 @@ impl Journal {
     /// # Errors
     /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.
     pub fn reopen(directory: &RunDirectory, contents: &Contents) -> Result<Self, OutputError> {
-        let log = directory.reopened(&directory.journal(), contents.length)?;
+        let log = directory.reopen(&directory.journal(), contents.length)?;
         Ok(Self { log, identity: contents.identity.clone(), sum: contents.sum.clone() })
     }
 

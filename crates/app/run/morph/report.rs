@@ -6,7 +6,7 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, centroid};
 use serde::Serialize;
 
-use super::{TuneReport, LoadStepping};
+use super::{LoadStepping, TuneReport};
 use crate::build::MotionSetup;
 use crate::config::Paper;
 use crate::error::Error;

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::report::verdict;
 use super::tune::{Found, nothing_to_search, tune};
-use super::{CaseReport, MorphReport, Parameters, LoadStepping, csv, step_along};
+use super::{CaseReport, LoadStepping, MorphReport, Parameters, csv, step_along};
 use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Morph, Paper, SourceMap, resolved_toml};
 use crate::error::Error;
@@ -54,7 +54,8 @@ pub fn morph(
     // An earlier run is replaced only by one that can begin.
     jobs.iter().try_for_each(|job| check_body(&job.setup))?;
     warn(config, parameters, &jobs, observer);
-    let directory = RunDirectory::create_flat(options.disk, &config.output.directory, options.overwrite_policy)?;
+    let directory =
+        RunDirectory::create_flat(options.disk, &config.output.directory, options.overwrite_policy)?;
     let mut manifest = Manifest::started("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;

@@ -5,8 +5,17 @@ use crate::config::Paper;
 use crate::files::csv_text;
 
 /// The columns of the first table.
-const ROW: [&str; 9] =
-    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "increments", "fallbacks"];
+const ROW: [&str; 9] = [
+    "case",
+    "equations",
+    "elements",
+    "q worst",
+    "q <= 0.3",
+    "inverted",
+    "motion %",
+    "increments",
+    "fallbacks",
+];
 /// The columns of the table of shares.
 const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
 /// The columns of the table of places.

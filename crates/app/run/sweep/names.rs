@@ -8,7 +8,7 @@ use crate::files::blake3_hex;
 /// Longest name [bytes]; the limit of file systems is 255, and some tools put something before or behind.
 const LONGEST: usize = 120;
 
-/// Digits of the hash behind a name that does not tell all.
+/// Digits of the hash after a name that is shortened.
 const DIGITS: usize = 8;
 
 /// A name for each choice of one value for each setting: the swept keys with their values.

@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
 use crate::run::RunLimits;
 
-/// Combinations whose faults are told; the rest are counted.
+/// Combinations whose faults are shown; the rest are counted.
 const MOST_REPORTS: usize = 5;
 
 /// Whether the files that a configuration names may lie outside of its folder.
@@ -37,7 +37,7 @@ pub struct Request<'a> {
     pub limits: RunLimits,
     /// Files elsewhere.
     pub outside: Outside,
-    /// What becomes of runs that are no combination; [`OverwritePolicy::Replace`] also goes on where the memory seems too small.
+    /// What becomes of runs that are no combination; [`OverwritePolicy::Replace`] also overrides the memory check.
     pub overwrite: OverwritePolicy,
 }
 
@@ -67,7 +67,7 @@ pub struct Sweep {
 pub struct Planned {
     /// Name and values.
     pub combination: Combination,
-    /// What tells its configuration from others, but for the place of its mesh file.
+    /// Identifies its configuration, except for the path of its mesh file.
     pub fingerprint: [u8; 32],
     /// The mesh file, where the mesh is read.
     pub mesh: Option<PathBuf>,
@@ -195,9 +195,9 @@ impl Subject {
         if self.count == 0 {
             return Ok(());
         }
-        // Looking up names takes the mesh: only for what is told.
-        let told = |(name, report)| (name, with_names(ConfigError::Invalid(report)));
-        let reports = self.reports.into_iter().map(told).collect();
+        // Looking up names takes the mesh: only for what is shown.
+        let with_mesh_names = |(name, report)| (name, with_names(ConfigError::Invalid(report)));
+        let reports = self.reports.into_iter().map(with_mesh_names).collect();
         Err(SweepError::Faults { faulty: self.count, of: self.count + sound, reports })
     }
 }

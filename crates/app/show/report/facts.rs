@@ -82,7 +82,7 @@ pub(super) fn provenance(data: &RunData) -> Markup {
     for resumption in &manifest.resumed {
         let place = format!("{} on {}", resumption.at, resumption.host.name);
         let work = format!("{} evaluations, {} threads", resumption.evaluations, resumption.threads);
-        facts.add("resumed", format!("{place}, behind {work}"));
+        facts.add("resumed", format!("{place}, after {work}"));
     }
     if let Some(finished) = &manifest.finished {
         facts.add("finished", finished.clone());
@@ -92,7 +92,7 @@ pub(super) fn provenance(data: &RunData) -> Markup {
         let parts =
             parts.map(|(part, seconds)| format!("{} {} s", part.replace('_', " "), number(*seconds, 2)));
         facts.add("time by parts", parts.collect::<Vec<_>>().join(", "));
-        facts.add("most memory held", format!("{} MiB", result.peak_memory_bytes.div_ceil(1 << 20)));
+        facts.add("peak memory", format!("{} MiB", result.peak_memory_bytes.div_ceil(1 << 20)));
     }
     facts.list()
 }

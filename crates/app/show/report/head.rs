@@ -40,7 +40,7 @@ pub(super) fn head(data: &RunData) -> Markup {
 fn status(data: &RunData) -> (&'static str, String) {
     let Some(result) = &data.result else {
         let (class, text) = match data.manifest.status {
-            RunStatus::Running => ("fair", "Still running, or broken off: there is no result yet"),
+            RunStatus::Running => ("fair", "Still running or interrupted: there is no result yet"),
             RunStatus::Interrupted => ("fair", "Interrupted before there was a result"),
             RunStatus::Failed => ("bad", "Failed before there was a result"),
             _ => ("bad", "There is no result.json, though the run has ended"),

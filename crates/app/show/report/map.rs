@@ -182,7 +182,7 @@ impl Drawing {
             let to_edge = [p[0] - x.low, x.high - p[0], p[1] - y.low, y.high - p[1]];
             to_other.chain(to_edge).fold(f64::INFINITY, f64::min)
         };
-        // A thousand candidates tell where there is room.
+        // A thousand candidates are enough to find where there is room.
         let step = whole.len().div_ceil(1000).max(1);
         let candidates = whole.iter().step_by(step).map(|(place, _)| (apart(place), place));
         candidates.max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, place)| self.frame.at(*place))

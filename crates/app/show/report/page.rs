@@ -1,4 +1,4 @@
-//! The page: its sections in their order, and what stands in the place of a figure that cannot be made.
+//! The page: its sections in their order, and what replaces a figure that cannot be drawn.
 
 use maud::{Markup, html};
 
@@ -48,7 +48,7 @@ fn body(data: &RunData, links: &str, detail: Detail) -> Markup {
         (section("results", "Results", &results(data)))
         @if !data.history.is_empty() { (section("evaluations", "Evaluations", &tables::evaluations(data))) }
         (section("mesh", "Mesh and equations", &mesh(data)))
-        (section("files", "Files, and how to go on", &files(data, links)))
+        (section("files", "Files, and how to continue", &files(data, links)))
         (section("provenance", "Provenance", &provenance(data)))
         (footer("the run"))
     }

@@ -227,12 +227,12 @@ pub(super) fn skin(outline: &Outline) -> Markup {
     }
 }
 
-/// Rounds and remedies of the mesh motion; nothing where there were none.
+/// Rounds and fallbacks of the mesh motion; nothing where there were none.
 pub(super) fn rounds(result: &RunResult) -> Markup {
     let listed = result.rounds.len().min(MOST_EVENTS);
     html! {
         @if listed > 0 {
-            h3 { "Rounds and remedies of the mesh motion" }
+            h3 { "Rounds and fallbacks of the mesh motion" }
             ul {
                 @for event in &result.rounds[..listed] { li { (event.describe()) } }
                 @if listed < result.rounds.len() { li { "and " (result.rounds.len() - listed) " more" } }

@@ -63,7 +63,7 @@ pub(crate) fn labels(ticks: &[f64]) -> Vec<String> {
         return ticks.iter().map(|t| number(*t, 3)).collect();
     }
     if !(1e-3..1e6).contains(&step) || largest >= 1e6 {
-        // As many digits as tell neighbours apart.
+        // As many digits as distinguish neighbours.
         let digits = (largest.log10().floor() - step.log10().floor()).clamp(0.0, 12.0) as usize + 1;
         return ticks.iter().map(|t| number(*t, digits)).collect();
     }

@@ -29,7 +29,8 @@ impl BoundaryEdges {
         }
         let boundary: BTreeSet<Edge> =
             count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect();
-        let cut: BTreeSet<Edge> = cuts.iter().flat_map(edges).filter(|edge| boundary.contains(edge)).collect();
+        let cut: BTreeSet<Edge> =
+            cuts.iter().flat_map(edges).filter(|edge| boundary.contains(edge)).collect();
         let free = boundary.difference(&cut).flatten().copied().collect();
         Self { free, cut }
     }

@@ -206,7 +206,8 @@ impl DesignSurface {
         let on_nodes = !matches!(setup.control, Control::Grid(_));
         // Where neither normals nor variables sit on nodes, a mirror need not map nodes onto nodes.
         let mirrors_nodes = on_nodes || setup.direction == Direction::Normal;
-        let pairs = if mirrors_nodes { symmetry::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
+        let pairs =
+            if mirrors_nodes { symmetry::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
         match setup.direction {
             Direction::Along(direction) => symmetry::check_direction(direction, &setup.mirrors)?,
             Direction::Normal => symmetry::mirror_directions(&mut directions, &setup.mirrors, &pairs),

@@ -327,7 +327,8 @@ fn a_node_without_partner_is_named() {
 fn a_fixed_boundary_stays_except_on_symmetry_planes() {
     let mesh = moved_block(8, |x| x);
     for (control, count) in [(Control::Nodes, 64), (Control::Filter(0.2), 81), (Control::Grid([3, 3]), 9)] {
-        let surface = build(&mesh, &DesignSetup { boundary: BoundaryMotion::Fixed, ..quarter(&mesh, UP, control) });
+        let surface =
+            build(&mesh, &DesignSetup { boundary: BoundaryMotion::Fixed, ..quarter(&mesh, UP, control) });
         assert_eq!(surface.variable_count(), count, "{control:?}");
         let normal_displacements = surface.normal_displacements(&vec![1.0; count]);
         for (&node, h) in surface.nodes().iter().zip(normal_displacements) {

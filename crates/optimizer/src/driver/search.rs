@@ -197,7 +197,7 @@ impl<'a> Search<'a> {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
         run.warn(&format!(
-            "the method's first step changed the objective by less than ftol_rel: continuing with {:.0e}",
+            "the method's first step changed the objective by less than its relative tolerance: continuing with {:.0e}",
             self.ftol_rel
         ));
     }

@@ -101,7 +101,7 @@ impl RoundEvent {
                 percent(up)
             ),
             RoundKind::SmallerSteps => format!(
-                "{cause}; gained less than ftol_rel since the search was restarted; smaller trust region: \
+                "{cause}; gained less than the relative tolerance since the search was restarted; smaller trust region: \
                  {:.2} % of the bound range downwards, {:.2} % upwards",
                 percent(down),
                 percent(up)
