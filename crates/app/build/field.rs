@@ -126,7 +126,7 @@ fn field_model(
         coils,
         boundaries,
         linear_solver,
-        ownership: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
+        ownership: share.map(|share| (share.clone(), distributed_settings(&config.analysis.petsc))),
     };
     Ok(FieldModel::new(mesh, setup)?)
 }
@@ -156,7 +156,7 @@ fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
 }
 
 /// How they are solved on several ranks.
-fn distributed(options: &config::Petsc) -> DistributedSettings {
+fn distributed_settings(options: &config::Petsc) -> DistributedSettings {
     DistributedSettings {
         method: match options.solver {
             PetscSolver::Automatic => None,

@@ -110,7 +110,7 @@ impl<'a> DiagnosticSink<'a> {
     }
 }
 
-/// The same fault with what its message says to do, behind the last semicolon, as its help.
+/// The same fault with what its message says to do, after the last semicolon, as its help.
 pub(super) fn with_advice(mut fault: Diagnostic) -> Diagnostic {
     if let Some((message, advice)) = fault.message.rsplit_once("; ") {
         fault.help = Some(advice.to_owned());
@@ -142,7 +142,7 @@ impl Blame<'_> {
         Some(format!("coils[{index}]"))
     }
 
-    /// The key that says where a coil lies.
+    /// The key of the position of a coil.
     fn coil_place(&self, name: &str) -> Option<String> {
         let index = self.config.coils.iter().position(|coil| coil.name == name)?;
         let key =

@@ -125,7 +125,7 @@ fn room() -> Option<Room> {
     known.min_by_key(|room| room.bytes)
 }
 
-/// The number behind a label of a file of `/proc`, given there in kB [bytes].
+/// The number after a label of a file of `/proc`, given there in kB [bytes].
 fn kibibytes(text: &str, label: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(label))?;
     rest.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)

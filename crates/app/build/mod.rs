@@ -185,7 +185,7 @@ fn build_problem(
     let objective = functional::objective(config, &mesh, &states)?;
     let (mut shape, mut constraints) = (None, Vec::new());
     if let (Some(inputs), Some(body)) = (&design, body) {
-        let observed = functional::observed(config, &mesh, &states)?;
+        let observed = functional::fixed_elements(config, &mesh, &states)?;
         progress.stage(Stage::Elasticity);
         let built = shape::shape(inputs, config, body, &states[0], &observed)?;
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &built)?;

@@ -23,7 +23,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
         .iter()
         .map(|file| {
             let name = format!("{}.{}", place.name, file.extension);
-            (place.folder.join(name), file.named(&place.name).into_owned())
+            (place.folder.join(name), file.content_for(&place.name).into_owned())
         })
         .collect();
     let taken = |(path, _): &&(PathBuf, Vec<u8>)| path.symlink_metadata().is_ok();
@@ -77,7 +77,7 @@ impl Place {
         Ok(Self {
             folder,
             name: name.to_owned(),
-            template: args.template.or_else(|| Template::named(name)).unwrap_or(Template::Shield),
+            template: args.template.or_else(|| Template::by_name(name)).unwrap_or(Template::Shield),
         })
     }
 }

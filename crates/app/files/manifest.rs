@@ -179,7 +179,7 @@ impl Host {
 
 impl Manifest {
     /// The manifest of a run that starts now, without what it reads.
-    pub fn started(command: &str, threads: usize) -> Self {
+    pub fn new(command: &str, threads: usize) -> Self {
         Self {
             program: PROGRAM.to_owned(),
             schema_version: 1,
@@ -275,7 +275,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
             .expect("a run directory");
-        let mut manifest = Manifest::started("run", 2);
+        let mut manifest = Manifest::new("run", 2);
         manifest.config = Some(FileHash { path: "a.toml".into(), blake3: blake3_hex(b"") });
         manifest.write(&run).expect("written");
         let read = Manifest::read(&run).expect("read");

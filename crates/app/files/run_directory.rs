@@ -385,7 +385,7 @@ mod tests {
     fn started(path: &Path) -> RunDirectory {
         let run =
             RunDirectory::create(&system_disk(), path, OverwritePolicy::Keep).expect("a new run directory");
-        Manifest::started("run", 2).write(&run).expect("a manifest");
+        Manifest::new("run", 2).write(&run).expect("a manifest");
         run
     }
 
@@ -458,7 +458,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep)
             .expect("new");
-        let mut manifest = Manifest::started("run", 1);
+        let mut manifest = Manifest::new("run", 1);
         manifest.surfaces =
             ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
         manifest.write(&run).expect("written");

@@ -4,7 +4,7 @@
 //! gains from that error is lost where all nodes are elsewhere. So the run's mesh is generated anew with another refinement,
 //! brought to both shapes, and the ratio of the two values is the *verified ratio*. Variables of a control grid mean the
 //! same on any mesh; where the nodes are the variables, the displacement of the old surface is interpolated on the fresh one
-//! ([`Triangulation::transferred`]). A check that cannot be done is reported, and costs a run nothing else.
+//! ([`Triangulation::transfer`]). A check that cannot be done is reported, and costs a run nothing else.
 //!
 //! Does not live here: whether the gradient is the objective's, which is `verify`.
 
@@ -75,7 +75,7 @@ impl ShapePair {
             Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
             Self::Displacements { surface, pair: [initial, best] } => {
                 let fresh = design_triangulation(design, &setup.full_mesh)?;
-                let transferred = [initial, best].map(|values| surface.transferred(values, &fresh));
+                let transferred = [initial, best].map(|values| surface.transfer(values, &fresh));
                 let [initial, best] = transferred.map(|values| values.map_err(OptimizerError::from));
                 Ok([initial?, best?])
             }

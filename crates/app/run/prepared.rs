@@ -68,7 +68,7 @@ impl<'a> Prepared<'a> {
         let Self { config, source, options, .. } = self;
         let directory =
             RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
-        let mut manifest = Manifest::started(command, options.threads).reading(source);
+        let mut manifest = Manifest::new(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &self.setup.full_mesh));
         manifest.ranks = options.ranks.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);

@@ -1,4 +1,4 @@
-//! A bar on a terminal: the last line shows where the work is, finished evaluations stand above it.
+//! A bar on a terminal: the last line shows where the work is, finished evaluations are above it.
 //!
 //! The only module that names indicatif. There is one terminal, so there is one bar: [`clear`] removes it from any thread,
 //! for messages of signals and panics.
@@ -21,7 +21,7 @@ const TICK: Duration = Duration::from_millis(200);
 /// A part of the work and its time.
 const WORK: &str = "{spinner} {wide_msg} {elapsed}";
 
-/// The same within a run, behind what is known from its last evaluation.
+/// The same within a run, after what is known from its last evaluation.
 const RUN: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapsed}";
 
 /// The bar on the terminal.

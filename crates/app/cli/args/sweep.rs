@@ -23,7 +23,7 @@ pub struct SweepArgs {
     #[arg(long = "set", value_name = "KEY=VALUE,…", value_parser = key_value)]
     pub set: Vec<String>,
 
-    /// Directory of the sweep [default: the configuration's output.directory with _sweep behind it]
+    /// Directory of the sweep [default: the configuration's output.directory with _sweep appended]
     #[arg(long, value_name = "DIR", alias = "output")]
     pub out: Option<PathBuf>,
 

@@ -30,13 +30,13 @@ pub struct Contents {
     pub records: Vec<Record>,
     /// Bytes of header and whole records.
     pub length: u64,
-    /// What is behind them.
+    /// What is after them.
     pub rest: Rest,
     /// Checksum that the next record carries on.
     sum: String,
 }
 
-/// What is behind the whole records of a journal.
+/// What is after the whole records of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rest {
     /// Nothing.
@@ -138,7 +138,7 @@ impl Journal {
         Err(OutputError::Damaged { path: directory.journal(), message })
     }
 
-    /// Keeps a copy of a damaged journal beside it, before it is cut behind its whole records.
+    /// Keeps a copy of a damaged journal beside it, before it is cut after its whole records.
     ///
     /// # Errors
     /// When the operating system refuses.
@@ -148,7 +148,7 @@ impl Journal {
         directory.write(&directory.damaged_journal(), &bytes)
     }
 
-    /// A journal to append to behind what was read of it.
+    /// A journal to append to after what was read of it.
     ///
     /// # Errors
     /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.

@@ -84,7 +84,7 @@ impl Written {
         self.ends.iter().filter(|&&end| end <= at).count().checked_sub(1)
     }
 
-    /// Bytes that agree with these before `at` have the whole records before it; returns what is behind them.
+    /// Bytes that agree with these before `at` have the whole records before it; returns what is after them.
     #[track_caller]
     pub(super) fn assert_prefix(&self, bytes: &[u8], at: usize) -> Option<Rest> {
         // Decimal digits are those of one number alone.

@@ -56,7 +56,7 @@ pub fn morph(
     warn(config, parameters, &jobs, observer);
     let directory =
         RunDirectory::create_flat(options.disk, &config.output.directory, options.overwrite_policy)?;
-    let mut manifest = Manifest::started("morph", options.threads).reading(source);
+    let mut manifest = Manifest::new("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;
     let session = Session { config, source, parameters, jobs, directory, options, clock };

@@ -22,7 +22,7 @@ const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
 const PLACES: [&str; 8] =
     ["case", "worst element", "region", "at mm", "first inverts", "at motion x", "region", "at mm"];
 
-/// The report as text: tables with a row for each case, published values in brackets behind the own ones: counts, shares
+/// The report as text: tables with a row for each case, published values in brackets after the own ones: counts, shares
 /// and places; each fits a terminal of 120 columns.
 pub fn text(report: &MorphReport) -> String {
     let mut text = report.tuned.as_ref().map_or_else(String::new, TuneReport::text);
@@ -33,13 +33,13 @@ pub fn text(report: &MorphReport) -> String {
     }
     text += "\n\n";
     let rows: Vec<Vec<String>> = report.cases.iter().map(row).collect();
-    text += &aligned(&ROW, &rows);
+    text += &align(&ROW, &rows);
     text.push('\n');
     let rows: Vec<Vec<String>> = report.cases.iter().map(shares).collect();
-    text += &aligned(&SHARES, &rows);
+    text += &align(&SHARES, &rows);
     text.push('\n');
     let rows: Vec<Vec<String>> = report.cases.iter().map(places).collect();
-    text += &aligned(&PLACES, &rows);
+    text += &align(&PLACES, &rows);
     for case in report.cases.iter().filter(|case| !case.valid) {
         text += &format!("\n{}: {}", case.name, trouble(case));
     }
@@ -137,7 +137,7 @@ fn places(case: &CaseReport) -> Vec<String> {
 }
 
 /// Columns of equal width, the first to the left.
-pub(super) fn aligned(header: &[&str], rows: &[Vec<String>]) -> String {
+pub(super) fn align(header: &[&str], rows: &[Vec<String>]) -> String {
     let width = |column: usize| {
         let cells = rows.iter().map(|row| row[column].chars().count());
         cells.chain([header[column].chars().count()]).max().unwrap_or(0)

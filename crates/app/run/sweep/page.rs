@@ -114,7 +114,7 @@ impl Row {
     }
 }
 
-/// Columns behind those of the keys.
+/// Columns after those of the keys.
 const HEAD: [&str; 10] = [
     "run",
     "status",

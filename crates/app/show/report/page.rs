@@ -7,7 +7,7 @@ use super::files::files;
 use super::head::head;
 use super::markup::{document, footer, json, missing, section};
 use super::surface::Surface;
-use super::ticks::{grouped, trimmed};
+use super::ticks::{group_digits, trim_zeros};
 use super::words::capital;
 use super::{convergence, facts, field, histogram, map, tables};
 use crate::build::{Outline, OutlinedDesign};
@@ -156,10 +156,10 @@ fn caption(data: &RunData, surface: &Surface) -> String {
         "{} at evaluation {}, {} triangles. ",
         capital(&surface.what),
         data.best.map_or("–".to_owned(), |best| best.to_string()),
-        grouped(surface.triangles)
+        group_digits(surface.triangles)
     );
     if surface.exaggeration > 1.0 {
-        text += &format!("The motion is drawn {} times as large. ", trimmed(surface.exaggeration, 0));
+        text += &format!("The motion is drawn {} times as large. ", trim_zeros(surface.exaggeration, 0));
     }
     text += "Drag to turn, wheel or two fingers to zoom, arrow keys when selected; the slider goes from the initial shape \
              to the best one.";

@@ -63,7 +63,7 @@ impl Mirror {
     }
 
     /// The mirror image of a vector.
-    pub fn turned(&self, mut vector: Point) -> Point {
+    pub fn reflect(&self, mut vector: Point) -> Point {
         vector[self.axis] = -vector[self.axis];
         vector
     }

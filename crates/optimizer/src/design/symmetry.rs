@@ -46,7 +46,7 @@ pub(super) fn pairs(
     mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
 }
 
-/// Whether one direction for all nodes lies in every mirror.
+/// Checks that one direction for all nodes is in every mirror plane.
 ///
 /// # Errors
 /// [`DesignError::Oblique`] for the first that it leaves.
@@ -65,7 +65,7 @@ pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror],
             .iter()
             .zip(partner)
             .map(|(&own, &other)| {
-                let image = mirror.turned(directions[other]);
+                let image = mirror.reflect(directions[other]);
                 let sum: Point = std::array::from_fn(|d| own[d] + image[d]);
                 let length = norm(sum);
                 // Unit vectors that all but cancel, or a node that cannot move: neither has a symmetric direction.

@@ -295,7 +295,7 @@ fn mirrored_nodes_share_a_variable_and_move_alike() {
                     let image = mirror.image(mesh.point(node));
                     let at = |n: &NodeId| norm(sub(mesh.point(*n), image)) < 1e-12;
                     let partner = surface.nodes().iter().position(at).expect("a symmetric mesh");
-                    let off = sub(displacement[i], mirror.turned(displacement[partner]));
+                    let off = sub(displacement[i], mirror.reflect(displacement[partner]));
                     // Sums in another order, of weights and variables of order 1.
                     assert!(norm(off) < 1e-14, "{control:?} at {:?}: {off:?}", mesh.point(node));
                 }

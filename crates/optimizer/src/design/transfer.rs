@@ -62,7 +62,7 @@ impl Triangulation {
     ///
     /// # Panics
     /// If there is not one displacement per node.
-    pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
+    pub fn transfer(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
         assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
         let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
         let boundary = Pieces::new(&self.places, self.boundary_edges().iter().map(|e| e.to_vec()).collect());
@@ -185,7 +185,7 @@ mod tests {
             |x: &Point| [0.2 * x[1], -0.1 * x[0], 0.01],
         ] {
             let displacement: Vec<Point> = old.places.iter().map(law).collect();
-            let found = old.transferred(&displacement, &fresh).expect("the same plane");
+            let found = old.transfer(&displacement, &fresh).expect("the same plane");
             for (place, found) in fresh.places.iter().zip(found) {
                 // Rounding of places of half a metre, times slopes below one.
                 assert!(norm(sub(found, law(place))) < 1e-15, "{place:?}: {found:?}");
@@ -197,7 +197,7 @@ mod tests {
     fn a_surface_takes_its_own_displacements_over_exactly() {
         let old = plate([5, 6], |x, y| 0.1 * (3.0 * x * x - y * y));
         let displacement: Vec<Point> = (0..old.places.len()).map(|i| [0.0, 1e-3 * i as f64, 1.0]).collect();
-        let found = old.transferred(&displacement, &old).expect("the same surface");
+        let found = old.transfer(&displacement, &old).expect("the same surface");
         for (found, expected) in found.iter().zip(&displacement) {
             // Rounding of displacements of a metre.
             assert!(norm(sub(*found, *expected)) < 1e-14, "{found:?}: {expected:?}");
@@ -211,7 +211,7 @@ mod tests {
         let (old, fresh) = (plate([4, 5], bent), plate([7, 6], bent));
         let law = |x: &Point| if x[0] == 0.0 { [0.0, 0.0, 0.01] } else { [0.01, 0.0, 0.01] };
         let displacement: Vec<Point> = old.places.iter().map(law).collect();
-        let found = old.transferred(&displacement, &fresh).expect("the same surface");
+        let found = old.transfer(&displacement, &fresh).expect("the same surface");
         assert!(fresh.places.iter().zip(&found).all(|(x, u)| x[0] > 0.0 || u[0] == 0.0));
     }
 
@@ -219,7 +219,7 @@ mod tests {
     fn another_surface_is_refused_with_the_place() {
         let (old, other) = (plate([4, 4], |_, _| 0.0), plate([4, 4], |_, _| 0.1));
         let displacement = vec![[0.0; 3]; old.places.len()];
-        let refused = old.transferred(&displacement, &other).expect_err("a tenth of a metre apart");
+        let refused = old.transfer(&displacement, &other).expect_err("a tenth of a metre apart");
         assert_eq!(refused, SurfaceMismatch { point: [0.0, 0.0, 0.1] });
     }
 }

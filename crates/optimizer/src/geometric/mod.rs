@@ -7,7 +7,7 @@ mod thickness_bound;
 mod volume;
 mod wall_thickness;
 
-pub use thickness_bound::{Bound, MARGIN, ThicknessBound};
+pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit};
 pub use volume::Volume;
 pub use wall_thickness::WallThickness;
 

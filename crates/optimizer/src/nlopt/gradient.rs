@@ -198,7 +198,7 @@ pub fn minimise<E: From<Error>>(
         evaluate,
         settings,
         scaling: &scaling,
-        start: (start, scaling.scaled(start)),
+        start: (start, scaling.scale(start)),
         last: None,
         asked: 0,
         guard: PanicGuard::default(),
@@ -212,7 +212,7 @@ pub fn minimise<E: From<Error>>(
     };
     let mut library =
         ::nlopt::Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
-    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scaled(bounds));
+    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
     let mut accepted = library
         .set_lower_bounds(&lower)
         .and_then(|_| library.set_upper_bounds(&upper))
@@ -228,7 +228,7 @@ pub fn minimise<E: From<Error>>(
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
     }
-    let mut x = scaling.scaled(start);
+    let mut x = scaling.scale(start);
     for (k, x) in x.iter_mut().enumerate() {
         *x = x.clamp(lower[k], upper[k]);
     }
@@ -279,7 +279,7 @@ impl Scaling {
         })
     }
 
-    fn scaled(&self, values: &[f64]) -> Vec<f64> {
+    fn scale(&self, values: &[f64]) -> Vec<f64> {
         values.iter().zip(&self.unit).map(|(v, unit)| v / unit).collect()
     }
 
