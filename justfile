@@ -66,7 +66,7 @@ demo:
 
 # The picture of a run on a terminal, docs/images/terminal.svg; needs `script` of util-linux
 screenshot-terminal:
-    cargo test --release --test cli -- --ignored draw_the_terminal
+    cargo test --release --test runs -- --ignored draw_the_terminal
 
 # Fuzz one reader (msh22, msh41_ascii, msh41_binary, config, quantity, journal); needs `cargo install cargo-fuzz`
 fuzz TARGET SECONDS="60":

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use cpu_time::ProcessTime;
-use fluxmorph::build::{Purpose, build_mesh, set_up};
+use fluxmorph::build::{Mode, build_mesh, set_up};
 use fluxmorph::config::Config;
 use fluxmorph::files::fields;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
@@ -50,7 +50,7 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
         .collect();
     let (probes, found) = timed(|| locate(&mesh, &points));
     assert!(found.iter().all(Option::is_some), "all inside");
-    let (all, setup) = timed(|| set_up(&config, &source, Purpose::Optimisation).expect("valid"));
+    let (all, setup) = timed(|| set_up(&config, &source, Mode::Optimisation).expect("valid"));
     let shape = setup.problem.shape().expect("it has a design");
     let plate = mesh.topology().region("plate").expect("it has one");
     let (thickness, _) = timed(|| WallThickness::measure(&mesh, plate, shape.surface()));

@@ -3,14 +3,14 @@
 //! `cargo run --release --example gradient_check`
 
 use fluxmorph::Error;
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Config;
 use fluxmorph_optimizer::verify::{Settings, certify};
 
 pub(crate) fn main() -> Result<(), Error> {
     let (config, source) =
         Config::from_str(include_str!("../configs/shield_quick.toml"), "shield_quick.toml")?;
-    let problem = set_up(&config, &source, Purpose::Optimisation)?.problem;
+    let problem = set_up(&config, &source, Mode::Optimisation)?.problem;
     let variables = problem.shape().expect("the configuration has a design").surface().variable_count();
 
     // At a design that is not flat, in two directions.

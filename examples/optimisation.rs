@@ -3,7 +3,7 @@
 //! `cargo run --release --example optimisation`
 
 use fluxmorph::Error;
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Config, Optimizer};
 use fluxmorph::show::Console;
 use fluxmorph_optimizer::driver::{Unrecorded, optimise};
@@ -11,7 +11,7 @@ use fluxmorph_optimizer::driver::{Unrecorded, optimise};
 pub(crate) fn main() -> Result<(), Error> {
     let (config, source) =
         Config::from_str(include_str!("../configs/shield_quick.toml"), "shield_quick.toml")?;
-    let mut problem = set_up(&config, &source, Purpose::Optimisation)?.problem;
+    let mut problem = set_up(&config, &source, Mode::Optimisation)?.problem;
 
     // Seven evaluations are enough to see the frame; `run::run` would also write a run directory.
     let settings = Optimizer { max_evaluations: 7, ..config.optimizer };

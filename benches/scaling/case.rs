@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Config;
 use fluxmorph::files::fields;
 use fluxmorph::files::peak_memory_bytes;
@@ -109,7 +109,7 @@ impl Case {
             mesh.1.iter().map(|s| (*s).to_owned()).chain(self.settings.iter().cloned()).collect();
         let (config, source) = Config::from_file(&path, &settings).unwrap_or_else(|e| panic!("{e}"));
         let (set_up, setup) =
-            timed(|| set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}")));
+            timed(|| set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}")));
         let mut problem = setup.problem;
         let mut record = Record {
             mesh: self.mesh.clone(),

@@ -28,13 +28,13 @@ pub enum Error {
     /// A file cannot be written or read.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A file stands in its place.
+    /// The file to write exists already.
     #[error("`{}` exists, and nothing was written; choose another NAME or folder, or replace it with --force", path.display())]
     FileExists {
         /// The file.
         path: PathBuf,
     },
-    /// The name cannot be that of a file or cannot stand in a configuration.
+    /// The name cannot be that of a file or cannot be used in a configuration.
     #[error(
         "`{}` cannot be the name of a configuration: expected the name of a file in UTF-8 without quotes, backslashes and \
          control characters, such as plate or devices/plate.toml",
@@ -61,7 +61,7 @@ pub enum Error {
         /// The first difference.
         cause: String,
     },
-    /// A run directory that there is nothing to go on with in.
+    /// A run directory without a run to resume.
     #[error("`{}` cannot be resumed: {cause}", path.display())]
     NotResumable {
         /// The directory.
@@ -69,7 +69,7 @@ pub enum Error {
         /// Why, and what to do.
         cause: String,
     },
-    /// A run directory that there is nothing to report of.
+    /// A run directory without anything to report.
     #[error("there is no report of `{}`: {cause}", path.display())]
     NoReport {
         /// The directory.
@@ -89,7 +89,7 @@ pub enum Error {
         /// Why, and what to do.
         cause: String,
     },
-    /// A pool of threads cannot be made.
+    /// A pool of threads cannot be created.
     #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
     Threads {
         /// How many were asked for.
@@ -100,7 +100,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether a run that ends with this error can be resumed once its cause is mended.
+    /// Whether a run that ends with this error can be resumed once its cause is removed.
     pub fn is_resumable(&self) -> bool {
         match self {
             Self::Output(error) => matches!(error, OutputError::Io { .. }),

@@ -3,7 +3,7 @@
 use crate::repository;
 use crate::support::repository_text;
 
-/// Commands that take a minute or more wherever they stand, and those that go on with what these leave.
+/// Commands that take a minute or more wherever they stand, and those that resume what these leave.
 const LONG: [&str; 2] = ["run configs/shield.toml", "resume configs/runs/shield"];
 
 /// A kind of command that no test runs.

@@ -1,4 +1,4 @@
-//! Ranks that are killed, and signals to one of them: what was computed is kept, and the run goes on.
+//! Ranks that are killed, and signals to one of them: what was computed is kept, and the run can be resumed.
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Runs with constraints, with several frequencies, and with other goals, on the coarse shield.
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Algorithm, Optimizer};
-use fluxmorph::files::{OlderRun, RunResult, system_disk};
+use fluxmorph::files::{OverwritePolicy, RunResult, system_disk};
 use fluxmorph::run::{self, Options};
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
@@ -28,7 +28,7 @@ const SQUARED: &str = "kind = \"flux_density_squared\"\nregion = \"observation\"
 /// The problem of a shipped configuration with changes `(from, to)` in its text, and the settings of its optimiser.
 fn changed(name: &str, changes: &[(&str, &str)]) -> (Problem, Optimizer) {
     let (config, source) = parsed(&support::changed(&repository_text(&format!("configs/{name}")), changes));
-    let setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
+    let setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     (setup.problem, config.optimizer)
 }
 
@@ -163,8 +163,8 @@ fn a_run_at_two_frequencies_writes_both() {
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     let (config, source) = config("shield_two_frequencies.toml", &overrides);
     let disk = system_disk();
-    let older_run = OlderRun::Keep;
-    let options = Options { disk: &disk, older_run, threads: 1, team: None, interrupted: &|| false };
+    let overwrite_policy = OverwritePolicy::Keep;
+    let options = Options { disk: &disk, overwrite_policy, threads: 1, ranks: None, interrupted: &|| false };
     let result: RunResult =
         run::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);

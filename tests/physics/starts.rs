@@ -5,7 +5,7 @@
 //! without a broken mesh, and all best values, over the value of the *flat* plate, have to agree. The measured table is in
 //! docs/results.md; run with `--nocapture` to see it.
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Optimizer;
 use fluxmorph::files::StopReason;
 
@@ -50,7 +50,7 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     if start == Start::FlatNodes {
         config.design.as_mut().expect("a design").grid = None;
     }
-    let mut setup = set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"));
+    let mut setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     let settings = Optimizer { max_evaluations: ENOUGH, ..config.optimizer };
     let (optimised, rows) = optimised(&mut setup.problem, &settings);
     End {

@@ -100,7 +100,7 @@ fn without_its_mesh_file_a_run_is_still_reported() {
     assert!(!report(&out).contains("Not shown"));
     std::fs::remove_file(folder.join("device.msh")).expect("removed");
     let page = report(&out);
-    assert!(page.contains("the mesh cannot be made again") && page.contains("device.msh"));
+    assert!(page.contains("the mesh cannot be rebuilt") && page.contains("device.msh"));
 }
 
 #[test]

@@ -103,7 +103,7 @@ fn constraints_and_rounds_are_drawn() {
     figures_are_described(&elements);
     assert!(elements.iter().any(|e| e.get("data-chart") == Some("constraint")));
     assert!(elements.iter().any(|e| e.get("class") == Some("round")), "a new reference is a dotted line");
-    assert!(page.contains("Constraints at the best design") && page.contains("Rounds and remedies"));
+    assert!(page.contains("Constraints at the best design") && page.contains("Rounds and fallbacks"));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use fluxmorph::config::Algorithm;
-use fluxmorph::files::{OlderRun, RunDirectory};
+use fluxmorph::files::{OverwritePolicy, RunDirectory};
 use fluxmorph::run::journal::{Identity, Journal};
 use fluxmorph::show::Evaluation;
 use fluxmorph_optimizer::Error;
@@ -88,7 +88,8 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
         xtol_rel: 0.0,
     };
     let disk = SimulatedDisk::default();
-    let directory = RunDirectory::create(&disk.shared(), Path::new("/run"), OlderRun::Keep).expect("made");
+    let directory =
+        RunDirectory::create(&disk.shared(), Path::new("/run"), OverwritePolicy::Keep).expect("made");
     let (mut journal, replayed) = match journal {
         None => (Journal::create(&directory, identity).expect("created"), Vec::new()),
         Some(bytes) => {

@@ -7,7 +7,7 @@ use fluxmorph::Error;
 use fluxmorph::ExitCode;
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::files::{OutputError, RunResult};
-use fluxmorph::run::Limits;
+use fluxmorph::run::RunLimits;
 use rayon::prelude::*;
 
 use crate::disk::{Fault, SimulatedDisk};
@@ -42,7 +42,7 @@ struct Trial<'a> {
     device: &'a (Config, SourceMap),
     expected: &'a Essence,
     /// Of the resumption that follows a failure.
-    limits: Limits,
+    limits: RunLimits,
     work: &'a (dyn Fn(&SimulatedDisk) -> Result<RunResult, Error> + Sync),
 }
 
@@ -87,13 +87,10 @@ impl Trial<'_> {
         } else if tally.failed == 1 {
             match resume(&disk.shared(), self.limits) {
                 Ok(_) => tally.resumed = 1,
-                // So early that there is nothing to go on with.
+                // So early that there is nothing to resume.
                 Err(Error::NotResumable { .. } | Error::Output(OutputError::NoRun { .. })) => {
                     let journal = disk.files(FOLDER.as_ref()).remove(Path::new("journal.jsonl"));
-                    assert!(
-                        journal.is_none(),
-                        "{context}: evaluations are there, and cannot be gone on with"
-                    );
+                    assert!(journal.is_none(), "{context}: evaluations are there, and cannot be resumed");
                     run(&disk.shared(), self.device).unwrap_or_else(|e| panic!("{context}: {e}"));
                     tally.started_again = 1;
                 }
@@ -123,7 +120,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
     let start = |device: &(Config, SourceMap)| {
         let expected = reference(device);
         let work = |disk: &SimulatedDisk| run(&disk.shared(), device);
-        let limits = Limits::default();
+        let limits = RunLimits::default();
         Trial { disk: &SimulatedDisk::default(), device, expected: &expected, limits, work: &work }.all()
     };
     let again = |device: &(Config, SourceMap), evaluations: usize| {
@@ -132,7 +129,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
         let mut first = device.clone();
         first.0.optimizer.max_evaluations = evaluations;
         run(&disk.shared(), &first).unwrap_or_else(|e| panic!("{e}"));
-        let limits = Limits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
+        let limits = RunLimits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
         let work = |disk: &SimulatedDisk| resume(&disk.shared(), limits);
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
     };
@@ -141,7 +138,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
         let disk = SimulatedDisk::default();
         run(&disk.shared(), &block(&[])).unwrap_or_else(|e| panic!("{e}"));
         let work = |disk: &SimulatedDisk| run(&disk.shared(), device);
-        let limits = Limits::default();
+        let limits = RunLimits::default();
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
     };
     let tallies =
@@ -150,5 +147,5 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
     let total = tallies.into_iter().fold(Tally::default(), |sum, tally| sum + tally);
     println!("together: {total:?}");
     assert!(total.faults >= 1500, "{total:?}");
-    assert!(total.resumed > 5 * total.started_again, "most states can be gone on with: {total:?}");
+    assert!(total.resumed > 5 * total.started_again, "most states can be resumed: {total:?}");
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use fluxmorph::Error;
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::files::{Disk, OlderRun, RunResult};
-use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::files::{Disk, OverwritePolicy, RunResult};
+use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::Silent;
 
 use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS};
@@ -47,13 +47,24 @@ pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
 
 /// Runs a configuration from its start.
 pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
-    let options =
-        Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
+    let options = Options {
+        disk,
+        overwrite_policy: OverwritePolicy::Replace,
+        threads: 1,
+        ranks: None,
+        interrupted: &|| false,
+    };
     run::run(config, source, options, &mut Silent)
 }
 
 /// Goes on with the run on a disk.
-pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
-    let options = Options { disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
+pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: RunLimits) -> Result<RunResult, Error> {
+    let options = Options {
+        disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 1,
+        ranks: None,
+        interrupted: &|| false,
+    };
     run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
 }

@@ -33,7 +33,7 @@ pub(crate) fn torture(device: &Device, home: &Path, kills: usize, seed: u64) -> 
     let (expected, duration) = device.undisturbed(home);
     let mut random = fastrand::Rng::with_seed(seed);
     let mut tally = Tally::default();
-    // Whatever the machine does meanwhile, some kills find a run that had gone on.
+    // Whatever the machine does meanwhile, some kills hit a resumed run.
     while tally.kills < kills || tally.of_resumes == 0 {
         let out = home.join(format!("run_{}", tally.runs));
         let before = tally.kills;
@@ -41,7 +41,7 @@ pub(crate) fn torture(device: &Device, home: &Path, kills: usize, seed: u64) -> 
             let context = format!("{}, run {}, kill {}", device.name, tally.runs, tally.kills);
             let begun = out.join("config.toml").exists();
             let mut command = if begun { resume(&out) } else { device.command("run", &out) };
-            // Whoever goes on may do so on other threads.
+            // A resumption may use other threads.
             command.args(["--threads", ["1", "2", "4"][random.usize(..3)]]);
             if !begun && out.join("manifest.json").exists() {
                 command.arg("--force");

@@ -46,7 +46,7 @@ fn killed(text: &mut String) {
 }
 
 fn filled(text: &mut String) {
-    *text += "\n| runs on | found no room, exit 5, file named | gone on with `resume` | started again | had room | other bits at the end | torn files |\n";
+    *text += "\n| runs on | found no room, exit 5, file named | resumed | started again | had room | other bits at the end | torn files |\n";
     *text += "|---|---|---|---|---|---|---|\n";
     let home = folder();
     let sizes: Vec<usize> = (1..=14_usize).map(|k| 4096 * k * k.div_ceil(3)).collect();

@@ -1,4 +1,4 @@
-//! Run directories that something happened to before they are gone on with.
+//! Run directories that something happened to before they are resumed.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
@@ -83,10 +83,10 @@ fn a_damaged_journal_goes_on_with_what_is_whole_or_is_refused() {
     let mut random = fastrand::Rng::with_seed(3);
     let garbage: Vec<u8> = (0..5000).map(|_| random.u8(..)).collect();
     let cases: [(&str, Vec<u8>, &str); 4] = [
-        ("the header alone", whole[..header].to_vec(), "going on behind 0 evaluations"),
-        ("cut", whole[..whole.len() - 7].to_vec(), "are no whole record"),
-        ("garbage behind", [&whole[..], &garbage].concat(), "is damaged behind evaluation 2"),
-        ("all records twice", [&whole[..], &whole[header..]].concat(), "is damaged behind evaluation 2"),
+        ("the header alone", whole[..header].to_vec(), "resuming after 0 evaluations"),
+        ("cut", whole[..whole.len() - 7].to_vec(), "are an incomplete record"),
+        ("garbage behind", [&whole[..], &garbage].concat(), "is damaged after evaluation 2"),
+        ("all records twice", [&whole[..], &whole[header..]].concat(), "is damaged after evaluation 2"),
     ];
     for (name, bytes, words) in cases {
         restored(&bytes);
@@ -186,7 +186,7 @@ fn what_is_no_interrupted_run_is_left_alone() {
 
 /// The command that a message offers, given to a shell that finds this program first.
 fn as_told(said: &str, folder: &Path, further: &str) -> Finished {
-    let (_, rest) = said.split_once("fluxmorph resume ").expect("how to go on");
+    let (_, rest) = said.split_once("fluxmorph resume ").expect("how to resume");
     // Up to the end of the message: a newline may be part of a name.
     let command =
         rest.trim_end().trim_end_matches('`').split(" --max-evaluations").next().expect("a command");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::files::Disk;
-use fluxmorph::run::Limits;
+use fluxmorph::run::RunLimits;
 use fluxmorph::run::journal;
 
 use crate::disk::SimulatedDisk;
@@ -73,7 +73,8 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         assert!(count >= 5, "{name}: {count}");
         for cut in 0..=count {
             let disk = cut_behind(&files, cut);
-            resume(&disk.shared(), Limits::default()).unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
+            resume(&disk.shared(), RunLimits::default())
+                .unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
             assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, &format!("{name}, cut at {cut}"));
         }
     }
@@ -102,11 +103,11 @@ fn a_run_may_be_cut_again_and_again() {
         let mut disk = cut_behind(&files, 0);
         for depth in 1..=5 {
             // Each time one evaluation more, then it is cut within the next.
-            let limits = Limits { max_evaluations: Some(depth), max_time: None };
+            let limits = RunLimits { max_evaluations: Some(depth), max_time: None };
             resume(&disk.shared(), limits).unwrap_or_else(|e| panic!("depth {depth}: {e}"));
             disk = cut_behind(&disk.files(FOLDER.as_ref()), depth);
         }
-        let limits = Limits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
+        let limits = RunLimits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
         resume(&disk.shared(), limits).unwrap_or_else(|e| panic!("at last: {e}"));
         assert!(count > 5);
         assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, "at last");

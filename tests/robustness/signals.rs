@@ -77,7 +77,7 @@ impl Timed {
     /// How long the answer to a signal took.
     pub(crate) fn answer(&mut self, signal: &str) -> Duration {
         let pulled = Trigger::new(signal, &self.child).pull();
-        self.wait_for("once more to leave at once").saturating_duration_since(pulled)
+        self.wait_for("interrupt again to exit at once").saturating_duration_since(pulled)
     }
 
     /// How long the end after a signal took, and the exit code.

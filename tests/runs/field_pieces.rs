@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Config;
 use fluxmorph::files::fields::{self, FieldData};
-use fluxmorph::files::{Disk, OlderRun, RunDirectory, system_disk};
+use fluxmorph::files::{Disk, OverwritePolicy, RunDirectory, system_disk};
 use fluxmorph::run::{self, Options};
 use fluxmorph::show::Silent;
 use fluxmorph::show::report::ReportedRun;
@@ -24,9 +24,15 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
         .map(str::to_owned);
     let (mut config, source) = Config::from_file(&path, &overrides).unwrap();
     config.output.directory = directory.to_owned();
-    let options = Options { disk, older_run: OlderRun::Keep, threads: 2, team: None, interrupted: &|| false };
+    let options = Options {
+        disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 2,
+        ranks: None,
+        interrupted: &|| false,
+    };
     run::run(&config, &source, options, &mut Silent).unwrap();
-    let problem = set_up(&config, &source, Purpose::Optimisation).unwrap().problem;
+    let problem = set_up(&config, &source, Mode::Optimisation).unwrap().problem;
     let initial = problem.shape().unwrap().initial().to_vec();
     let analysis =
         problem.evaluate(&initial, Derivatives::First, &mut SolverCache::default(), &mut NoProgress).unwrap();

@@ -14,7 +14,7 @@ pub(crate) mod whole;
 
 use std::path::PathBuf;
 
-use fluxmorph::build::{Purpose, Setup, set_up};
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::{Config, SourceMap};
 
 /// A file of the repository.
@@ -64,7 +64,7 @@ pub(crate) fn config(name: &str, overrides: &[&str]) -> (Config, SourceMap) {
 /// The problem of a shipped configuration with overrides.
 pub(crate) fn setup(name: &str, overrides: &[&str]) -> Setup {
     let (config, source) = config(name, overrides);
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A configuration of this text.
@@ -75,7 +75,7 @@ pub(crate) fn parsed(text: &str) -> (Config, SourceMap) {
 /// The problem of a configuration of this text.
 pub(crate) fn setup_of(text: &str) -> Setup {
     let (config, source) = parsed(text);
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Euclidean norm.

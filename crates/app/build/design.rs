@@ -9,7 +9,7 @@ use super::millimetres;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 use fluxmorph_optimizer::design::{
-    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
+    BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
 };
 
 /// The design surface on the mesh with all regions.
@@ -56,9 +56,9 @@ pub(super) fn surface(
             (None, None) => Control::Nodes,
         },
         mirrors: design.symmetry.iter().map(mirror).collect(),
-        rim: match design.rim {
-            RimMotion::Free => Rim::Free,
-            RimMotion::Fixed => Rim::Fixed,
+        boundary: match design.rim {
+            RimMotion::Free => BoundaryMotion::Free,
+            RimMotion::Fixed => BoundaryMotion::Fixed,
         },
         cuts: kept.iter().copied().filter(outer).collect(),
         triangles,
@@ -169,7 +169,7 @@ fn fault(source: &SourceMap, design: &config::Design, error: DesignError) -> Err
         DesignError::Empty => source.diagnostic("design.surface", format!("the surface `{names}` has no triangles")),
         DesignError::NoExtent { .. } => source
             .diagnostic("design.direction", format!("a control grid cannot be laid across `design.direction` on `{names}`"))
-            .expected("the direction that stands most upright on the surface, or no design.grid"),
+            .expected("the direction nearest to the normal of the surface, or no design.grid"),
         DesignError::Folded { point, axis } => source
             .diagnostic(
                 "design.grid",

@@ -126,7 +126,7 @@ fn field_model(
         coils,
         boundaries,
         linear_solver,
-        ownership: share.map(|share| (share.clone(), distributed(&config.analysis.petsc))),
+        ownership: share.map(|share| (share.clone(), distributed_settings(&config.analysis.petsc))),
     };
     Ok(FieldModel::new(mesh, setup)?)
 }
@@ -156,7 +156,7 @@ fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
 }
 
 /// How they are solved on several ranks.
-fn distributed(options: &config::Petsc) -> DistributedSettings {
+fn distributed_settings(options: &config::Petsc) -> DistributedSettings {
     DistributedSettings {
         method: match options.solver {
             PetscSolver::Automatic => None,
@@ -223,7 +223,7 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
     Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
 }
 
-/// What to tell the user about the current of each coil region.
+/// Notices about the current of each coil region.
 pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     let notice = |coil: &coil::Coil| match &coil.shape {
         CoilShape::Racetrack(_) => None,
@@ -237,13 +237,13 @@ pub(super) fn coils(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
     let mut coils = Vec::new();
     for (i, written) in config.coils.iter().enumerate() {
-        let made = coil(written, mesh).map_err(|error| match error {
+        let built = coil(written, mesh).map_err(|error| match error {
             Error::Optimizer(OptimizerError::Solver(SolverError::Parameter { ref what, .. })) => {
                 source.error(vec![source.diagnostic(&format!("coils[{i}].{what}"), error.to_string())]).into()
             }
             other => other,
         });
-        coils.extend(sink.take(made)?);
+        coils.extend(sink.take(built)?);
     }
     sink.check()?;
     Ok(coils)

@@ -152,7 +152,7 @@ fn term(
 }
 
 /// Elements that must not move, with the key path of the region they observe.
-pub(super) fn observed(
+pub(super) fn fixed_elements(
     config: &Config,
     mesh: &Mesh,
     states: &[FieldModel],
@@ -196,23 +196,23 @@ pub(super) fn constraints(
                 add(written.name.clone(), Quantity::Volume(body), upper(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
-                // Both bounds of one entry are two constraints, told apart by their names.
+                // Both bounds of one entry are two constraints with different names.
                 let name = |suffix: &str| match (minimum, maximum) {
                     (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
                     _ => written.name.clone(),
                 };
-                let measure = |bound: geometric::Bound| {
+                let measure = |bound: geometric::ThicknessLimit| {
                     geometric::ThicknessBound::new(shape, bound).map_err(|error| {
                         let fault = source.diagnostic(&format!("constraints[{k}].kind"), error.to_string());
                         source.error(vec![fault.help("limit design.lower and design.upper instead")])
                     })
                 };
                 if let Some(bound) = *minimum {
-                    let measure = measure(geometric::Bound::Minimum(bound))?;
+                    let measure = measure(geometric::ThicknessLimit::Minimum(bound))?;
                     add(name("minimum"), Quantity::Thickness { measure, bound }, Limit::AtLeast(bound));
                 }
                 if let Some(bound) = *maximum {
-                    let measure = measure(geometric::Bound::Maximum(bound))?;
+                    let measure = measure(geometric::ThicknessLimit::Maximum(bound))?;
                     add(name("maximum"), Quantity::Thickness { measure, bound }, Limit::AtMost(bound));
                 }
             }

@@ -87,8 +87,8 @@ impl<'a> DiagnosticSink<'a> {
     ///
     /// # Errors
     /// Whatever no value of the configuration is to blame for.
-    pub(super) fn take<T>(&mut self, made: Result<T, Error>) -> Result<Option<T>, Error> {
-        match made.map_err(|error| attribute_error(error, self.config, self.source)) {
+    pub(super) fn take<T>(&mut self, outcome: Result<T, Error>) -> Result<Option<T>, Error> {
+        match outcome.map_err(|error| attribute_error(error, self.config, self.source)) {
             Ok(value) => Ok(Some(value)),
             Err(Error::Config(ConfigError::Invalid(report))) => {
                 for fault in report.diagnostics {
@@ -110,7 +110,7 @@ impl<'a> DiagnosticSink<'a> {
     }
 }
 
-/// The same fault with what its message says to do, behind the last semicolon, as its help.
+/// The same fault with what its message says to do, after the last semicolon, as its help.
 pub(super) fn with_advice(mut fault: Diagnostic) -> Diagnostic {
     if let Some((message, advice)) = fault.message.rsplit_once("; ") {
         fault.help = Some(advice.to_owned());
@@ -142,7 +142,7 @@ impl Blame<'_> {
         Some(format!("coils[{index}]"))
     }
 
-    /// The key that says where a coil lies.
+    /// The key of the position of a coil.
     fn coil_place(&self, name: &str) -> Option<String> {
         let index = self.config.coils.iter().position(|coil| coil.name == name)?;
         let key =

@@ -1,16 +1,16 @@
-//! What cannot fit into memory is refused before it is begun.
+//! What cannot fit into memory is refused before work starts.
 //!
 //! Twice: the mesh before it is generated or read ([`check_mesh`]), by the number of its tetrahedra or the length of its
 //! file, and the problem once its matrices are known but not yet filled ([`check_problem`]). The room is the least of what
 //! the machine has left, what the control groups of the process allow, and the limits set on the process itself. Where the
-//! system tells none of these nothing is refused. Swap is not counted: factors that are swapped take days.
+//! system gives none of these nothing is refused. Swap is not counted: factors that are swapped take days.
 //!
 //! Does not live here: limits that hold whatever the machine (`generate::grid`, `io::msh` of `fluxmorph-geometry`).
 
 use std::path::{Path, PathBuf};
 
 use crate::config::{Config, ConfigError, MeshConfig, SourceMap};
-use crate::files::OlderRun;
+use crate::files::OverwritePolicy;
 
 /// Bytes for each tetrahedron of the leanest set-up: mesh, adjacency, and pattern of a linear problem without motion.
 ///
@@ -46,7 +46,7 @@ pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), Conf
                 ("mesh.file", what, length.saturating_mul(READING_BYTES_PER_BYTE))
             }
             generated => {
-                // A parameter that the generator refuses is told by it.
+                // The generator reports the parameters that it refuses.
                 let tets = generated.tet_count().unwrap_or(0);
                 let what = format!("setting up a mesh of {tets} tetrahedra");
                 ("mesh", what, tets.saturating_mul(SETUP_BYTES_PER_TET))
@@ -57,14 +57,18 @@ pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), Conf
     Ok(())
 }
 
-/// Refuses a problem whose solution needs about `estimate` bytes and cannot fit, unless an earlier run is replaced by force:
-/// `--force` stands for both.
+/// Refuses a problem whose solution needs about `estimate` bytes and cannot fit, unless an earlier run is to be replaced:
+/// `--force` means both.
 ///
 /// # Errors
 /// A fault at the mesh.
-pub(crate) fn check_problem(estimate: usize, source: &SourceMap, older: OlderRun) -> Result<(), ConfigError> {
+pub(crate) fn check_problem(
+    estimate: usize,
+    source: &SourceMap,
+    overwrite: OverwritePolicy,
+) -> Result<(), ConfigError> {
     match room() {
-        Some(room) if older == OlderRun::Keep => {
+        Some(room) if overwrite == OverwritePolicy::Keep => {
             refuse_beyond(room, source, ("mesh", "solving the problem"), estimate as u64)
         }
         _ => Ok(()),
@@ -93,7 +97,7 @@ fn refuse_beyond(
     let fault = source
         .diagnostic(key, message)
         .expected("a mesh that fits into memory")
-        .help("take a coarser mesh or a larger machine, or go on with --force");
+        .help("take a coarser mesh or a larger machine, or override the check with --force");
     Err(source.error(vec![fault]))
 }
 
@@ -101,7 +105,7 @@ fn mebibytes(bytes: u64) -> String {
     format!("{} MiB", bytes.div_ceil(1 << 20))
 }
 
-/// The room of this process; `None` where the system does not tell.
+/// The memory that this process may have; `None` where the system does not say.
 fn room() -> Option<Room> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let [status, limits] = ["/proc/self/status", "/proc/self/limits"].map(read);
@@ -121,7 +125,7 @@ fn room() -> Option<Room> {
     known.min_by_key(|room| room.bytes)
 }
 
-/// The number behind a label of a file of `/proc`, given there in kB [bytes].
+/// The number after a label of a file of `/proc`, given there in kB [bytes].
 fn kibibytes(text: &str, label: &str) -> Option<u64> {
     let rest = text.lines().find_map(|line| line.strip_prefix(label))?;
     rest.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
@@ -235,9 +239,9 @@ mod tests {
             error.to_string().contains("about 2 MiB of memory, and there are 1 MiB (by the test)"),
             "{error}"
         );
-        assert!(check_problem(usize::MAX, &source, OlderRun::Replace).is_ok());
+        assert!(check_problem(usize::MAX, &source, OverwritePolicy::Replace).is_ok());
         if room().is_some() {
-            assert!(check_problem(usize::MAX, &source, OlderRun::Keep).is_err());
+            assert!(check_problem(usize::MAX, &source, OverwritePolicy::Keep).is_err());
         }
     }
 }

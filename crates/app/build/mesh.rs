@@ -41,8 +41,11 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
         MeshConfig::Sphere(parameters) => generated(sphere(&parameters.parameters())),
         MeshConfig::File { path, unit } => read_msh_file(path, unit.metres())
             .map(|read| {
-                let told = |message: String| format!("mesh file `{}`: {message}", path.display());
-                Built { mesh: read.mesh, notices: read.notices.messages().into_iter().map(told).collect() }
+                let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
+                Built {
+                    mesh: read.mesh,
+                    notices: read.notices.messages().into_iter().map(with_file).collect(),
+                }
             })
             .map_err(|error| file_fault(error, source)),
     }?;

@@ -55,7 +55,7 @@ pub struct Audited {
 }
 
 impl Audited {
-    /// What to tell the user.
+    /// The warning for the user, if there is one.
     pub fn warning(&self) -> Option<String> {
         match self.model {
             RegionModel::Volume => self.audit.volume_warning(),
@@ -66,7 +66,7 @@ impl Audited {
 
 /// Which parts of the configuration a command needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum Mode {
     /// A field analysis: objective and design take part where they are given.
     Analysis,
     /// A look at everything, without solving: with [morph] a field problem need not be complete.
@@ -88,34 +88,34 @@ pub fn build_mesh(config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
 ///
 /// # Errors
 /// All faults of names and of their use at once; then whatever the mesh, the solver or the elastic map refuses.
-pub fn set_up(config: &Config, source: &SourceMap, purpose: Purpose) -> Result<Setup, Error> {
-    set_up_watched(config, source, purpose, None, &mut |_| ())
+pub fn set_up(config: &Config, source: &SourceMap, mode: Mode) -> Result<Setup, Error> {
+    set_up_watched(config, source, mode, None, &mut |_| ())
 }
 
-/// As [`set_up`], shared out among the ranks of a team if there is one: every rank sets the same up, and none but the first
-/// gives orders. `progress` hears of every stage as it begins.
+/// As [`set_up`], shared out among the ranks of a group if there is one: every rank sets up the same problem, and only the
+/// first one gives commands. Every stage is reported to `progress` as it begins.
 ///
 /// # Errors
 /// As [`set_up`].
 pub fn set_up_watched(
     config: &Config,
     source: &SourceMap,
-    purpose: Purpose,
-    team: Option<&RankGroup>,
+    mode: Mode,
+    group: Option<&RankGroup>,
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
-    if purpose == Purpose::Optimisation {
+    if mode == Mode::Optimisation {
         config.optimisation(source)?;
     }
-    made(config, source, purpose, team, progress)
+    build_problem(config, source, mode, group, progress)
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
-fn made(
+fn build_problem(
     config: &Config,
     source: &SourceMap,
-    purpose: Purpose,
-    team: Option<&RankGroup>,
+    mode: Mode,
+    group: Option<&RankGroup>,
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
     progress.stage(Stage::Mesh);
@@ -140,7 +140,7 @@ fn made(
     let free = conditions.flux_parallel.is_empty()
         && conditions.flux_normal.is_empty()
         && conditions.uniform_field.is_none();
-    let motion_alone = purpose == Purpose::Inspection && config.morph.is_some();
+    let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     if free && conductors.is_empty() && !motion_alone {
         let fault = source
             .diagnostic(
@@ -151,7 +151,7 @@ fn made(
         sink.take::<()>(Err(source.error(vec![fault]).into()))?;
     }
     progress.stage(Stage::Unknowns);
-    let share = team.map(|team| share::of_mesh(config, &mesh, team)).transpose()?;
+    let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
     let design = match (&config.design, &config.remesh) {
         (Some(design), Some(remesh)) => Some(shape::Inputs {
@@ -168,7 +168,7 @@ fn made(
         Some(inputs) => sink.take(shape::body(inputs, config, &mut warnings))?,
         None => None,
     };
-    // Neither needs the other: what is wrong with them is told together.
+    // Neither needs the other: faults in both are reported together.
     let states = match coils {
         Some(coils) => sink.take(field::field_models(config, &mesh, &conductors, &coils, share.as_ref()))?,
         None => None,
@@ -185,11 +185,11 @@ fn made(
     let objective = functional::objective(config, &mesh, &states)?;
     let (mut shape, mut constraints) = (None, Vec::new());
     if let (Some(inputs), Some(body)) = (&design, body) {
-        let observed = functional::observed(config, &mesh, &states)?;
+        let observed = functional::fixed_elements(config, &mesh, &states)?;
         progress.stage(Stage::Elasticity);
-        let made = shape::shape(inputs, config, body, &states[0], &observed)?;
-        constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &made)?;
-        shape = Some(made);
+        let built = shape::shape(inputs, config, body, &states[0], &observed)?;
+        constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &built)?;
+        shape = Some(built);
     }
     progress.stage(Stage::Other);
     if shape.is_none() && !config.constraints.is_empty() {
@@ -244,8 +244,8 @@ fn phasor(coil: &config::Coil) -> c64 {
     c64::from_polar(coil.ampere_turns, coil.phase)
 }
 
-/// Faults of a text from which on its names are not looked at as well.
-const MOST_BESIDE: usize = 100;
+/// With more faults in the text of a configuration its names are not checked against the mesh as well.
+const MOST_TEXT_FAULTS: usize = 100;
 
 /// A report of what is wrong with the text of a configuration, with what is wrong with its names in the mesh as well.
 ///
@@ -264,12 +264,12 @@ fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
         let path = fault.path.as_str();
         path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
     };
-    let is_short = faults.len() <= MOST_BESIDE;
+    let is_short = faults.len() <= MOST_TEXT_FAULTS;
     let Some(config) = unfinished.filter(|_| is_short && !faults.iter().any(of_mesh)) else {
         return DiagnosticReport { source, diagnostics: faults, of, unfinished: None };
     };
-    let confined = source.confined(config::OutputNamedBy::User).is_ok();
-    if confined && crate::build::memory_limit::check_mesh(&config, &source).is_ok() {
+    let stays_in_folder = source.confined(config::OutputNamedBy::User).is_ok();
+    if stays_in_folder && crate::build::memory_limit::check_mesh(&config, &source).is_ok() {
         match mesh::build(&config, &source) {
             Ok(built) => {
                 let found = names(&config, &source, built.mesh.topology());

@@ -38,10 +38,10 @@ pub struct MotionSetup {
 /// # Errors
 /// All faults of names and places at once; then whatever the mesh refuses.
 pub fn set_up_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
-    made(config, source).map_err(|error| super::locate_error::attribute_error(error, config, source))
+    build_motion(config, source).map_err(|error| super::locate_error::attribute_error(error, config, source))
 }
 
-fn made(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
+fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
     let Morphing { morph, remesh } = config.morphing(source)?;
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;

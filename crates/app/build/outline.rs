@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::KinematicConstraint;
 
-use super::shape::{regions_at, remesh_setup, thickened};
+use super::shape::{regions_at, remesh_setup, thickened_region};
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
@@ -54,7 +54,7 @@ pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
     let (mesh, _) = field::without_impedance_regions(config, &full_mesh)?;
     let node_of = same_nodes(&full_mesh, &mesh);
     let design = match &config.design {
-        Some(_) => Some(outlined(config, source, &full_mesh, &mesh, &node_of)?),
+        Some(_) => Some(outline_design(config, source, &full_mesh, &mesh, &node_of)?),
         None => None,
     };
     let audits = audits(config, &full_mesh);
@@ -71,7 +71,7 @@ fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
     full_mesh.points().iter().map(|&point| kept.get(&key(point)).copied()).collect()
 }
 
-fn outlined(
+fn outline_design(
     config: &Config,
     source: &SourceMap,
     full_mesh: &Mesh,
@@ -82,7 +82,7 @@ fn outlined(
     let surface = design::surface(config, source, design, full_mesh)?;
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
-    let body = thickened(full_mesh, &surface, config);
+    let body = thickened_region(full_mesh, &surface, config);
     let thickness = body.and_then(|region| WallThickness::measure(full_mesh, region, &surface));
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     let bodies = match body {
@@ -106,7 +106,7 @@ fn outlined(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::{Purpose, set_up};
+    use crate::build::{Mode, set_up};
 
     fn shield(name: &str) -> (Config, SourceMap) {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
@@ -118,7 +118,7 @@ mod tests {
         for name in ["shield.toml", "shield_impedance.toml"] {
             let (config, source) = shield(name);
             let outline = outline(&config, &source).expect("an outline");
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a problem");
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a problem");
             assert_eq!(outline.mesh.points(), setup.problem.original().points());
             let shape = setup.problem.shape().expect("a shape");
             let design = outline.design.as_ref().expect("a design");

@@ -95,7 +95,7 @@ pub(super) fn shape(
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
     }
-    let thickness = thickened(full_mesh, &full_surface, config)
+    let thickness = thickened_region(full_mesh, &full_surface, config)
         .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
@@ -265,7 +265,7 @@ pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<Regio
 }
 
 /// The region that a positive design thickens: behind the design surface, and not air.
-pub(super) fn thickened(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+pub(super) fn thickened_region(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
     let topology = mesh.topology();
     let direction_at = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok()?;
@@ -327,7 +327,7 @@ fn overlap_faults(
     faults
 }
 
-/// The key path that says where the coil in an element lies; all coils where several may be it.
+/// The key path of the position of the coil in an element; all coils where several may be it.
 fn coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> String {
     let topology = mesh.topology();
     let name = &topology.region_names()[topology.region_of()[element.index()].index()];

@@ -33,7 +33,7 @@ pub(super) fn of_mesh(config: &Config, mesh: &Mesh, group: &RankGroup) -> Result
     Ok(Ownership { group: group.clone(), partition: Arc::new(partition) })
 }
 
-/// A number that tells problems apart: configuration, mesh and owners.
+/// A number that identifies a problem: configuration, mesh and owners.
 fn identity(config: &Config, mesh: &Mesh, partition: &Partition) -> u64 {
     let mut hasher = blake3::Hasher::new();
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());

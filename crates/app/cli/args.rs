@@ -12,7 +12,7 @@ use crate::build::memory_limit;
 use crate::build::with_names;
 use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
 use crate::error::Error;
-use crate::files::OlderRun;
+use crate::files::OverwritePolicy;
 
 pub use sweep::{Scheduler, SweepArgs};
 
@@ -35,7 +35,7 @@ pub enum Command {
     /// Optimise, and write everything into the run directory
     #[command(after_help = examples::RUN)]
     Run(RunArgs),
-    /// Go on with a run that was interrupted or broken off, as if it had not been
+    /// Resume an interrupted run
     #[command(after_help = examples::RESUME)]
     Resume(ResumeArgs),
     /// Optimise once for every combination of some values, and compare the results
@@ -97,11 +97,11 @@ pub struct WorkArgs {
     #[arg(long)]
     pub json: bool,
 
-    /// Let the files that the configuration names lie outside of its folder
+    /// Allow the configuration to name files outside its folder
     #[arg(long)]
     pub allow_outside: bool,
 
-    /// Replace an earlier run in the output directory; go on where the memory seems too small
+    /// Replace an earlier run in the output directory, and skip the check that the memory is sufficient
     #[arg(long)]
     pub force: bool,
 }
@@ -123,7 +123,7 @@ pub struct CommonArgs {
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = key_value)]
     pub overrides: Vec<String>,
 
-    /// What it has in common with `resume`.
+    /// Options shared with `resume`.
     #[command(flatten)]
     pub work: WorkArgs,
 }
@@ -131,7 +131,7 @@ pub struct CommonArgs {
 /// Limits of an optimisation.
 #[derive(Debug, Args)]
 pub struct LimitArgs {
-    /// Most evaluations of the objective; `resume` counts those of before
+    /// Most evaluations of the objective; with `resume`, earlier ones count too
     #[arg(long, value_name = "N", value_parser = evaluations)]
     pub max_evaluations: Option<usize>,
 
@@ -163,7 +163,7 @@ pub struct ResumeArgs {
     #[command(flatten)]
     pub limits: LimitArgs,
 
-    /// What it has in common with `run`.
+    /// Options shared with `run`.
     #[command(flatten)]
     pub work: WorkArgs,
 }
@@ -227,11 +227,11 @@ pub struct ReportArgs {
     #[arg(long, short)]
     pub quiet: bool,
 
-    /// Let the mesh of the run lie outside of the folder of its configuration
+    /// Allow a mesh file outside the folder of the configuration
     #[arg(long)]
     pub allow_outside: bool,
 
-    /// Go on where the memory seems too small
+    /// Skip the check that the memory is sufficient
     #[arg(long)]
     pub force: bool,
 }
@@ -247,11 +247,11 @@ pub struct InitArgs {
     #[arg(long, value_name = "TEMPLATE", value_enum)]
     pub template: Option<Template>,
 
-    /// Folder to write into; made if it is not there
+    /// Folder to write into; created if missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
-    /// Replace files that are there
+    /// Replace existing files
     #[arg(long)]
     pub force: bool,
 
@@ -276,7 +276,7 @@ pub enum Generated {
     /// The man pages: all in one on standard output, or one for each command into a folder
     #[command(after_help = examples::MAN)]
     Man {
-        /// Folder to write one page for each command into; made if it is not there
+        /// Folder to write one page for each command into; created if missing
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -314,15 +314,15 @@ impl CommonArgs {
     }
 
     /// What `--force` says about an earlier run.
-    pub fn older_run(&self) -> OlderRun {
-        self.work.older_run()
+    pub fn overwrite_policy(&self) -> OverwritePolicy {
+        self.work.overwrite_policy()
     }
 }
 
 impl WorkArgs {
     /// What `--force` says about an earlier run.
-    pub fn older_run(&self) -> OlderRun {
-        if self.force { OlderRun::Replace } else { OlderRun::Keep }
+    pub fn overwrite_policy(&self) -> OverwritePolicy {
+        if self.force { OverwritePolicy::Replace } else { OverwritePolicy::Keep }
     }
 
     /// How progress is shown; `--quiet` wins.
@@ -398,7 +398,7 @@ mod tests {
         assert_eq!((run.limits.max_evaluations, run.limits.max_time), (Some(5), Some(90.0)));
         assert_eq!(run.common.overrides, ["a.b=1", "c=d"]);
         assert_eq!(run.common.work.threads, Some(2));
-        assert_eq!(run.common.older_run(), OlderRun::Replace);
+        assert_eq!(run.common.overwrite_policy(), OverwritePolicy::Replace);
         // Whoever wants quiet has it.
         assert_eq!((run.common.work.progress, run.common.work.progress()), (Progress::Bar, Progress::None));
         assert_eq!(duration("10 min"), Ok(600.0));

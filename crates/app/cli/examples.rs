@@ -16,7 +16,7 @@ Examples:
   fluxmorph run shield.toml --set analysis.frequency='50 Hz' --set optimizer.algorithm=ccsaq --force
   fluxmorph run shield.toml --json --quiet | jq .objective.ratio
 
-A run that stops at a limit of evaluations or time ends with code 1, and `fluxmorph resume` goes on with it.";
+A run that stops at a limit of evaluations or time ends with code 1, and `fluxmorph resume` continues it.";
 
 pub(super) const RESUME: &str = "\
 Examples:
@@ -24,7 +24,7 @@ Examples:
   fluxmorph resume runs/shield --max-evaluations 60
   fluxmorph resume runs/shield --max-time '1 h'
 
-Without limits those hold that the run was started or last resumed with.";
+Without limits, those of the start or of the last resumption apply.";
 
 pub(super) const SWEEP: &str = "\
 Examples:
@@ -34,7 +34,7 @@ Examples:
   fluxmorph sweep shield.toml --set design.upper='10 mm,20 mm' --script sweep.sh && sbatch sweep.sh
   fluxmorph sweep shield.toml --set design.upper='10 mm,20 mm' --compare
 
-The same command again goes on: finished runs are skipped, broken ones resumed, further values begun.
+The same command again continues: finished runs are skipped, interrupted ones resumed, new values run.
 The exit code is the worst of all runs, in this order: 4, 5, 3, 143, 130, 1, 0.";
 
 pub(super) const SOLVE: &str = "\

@@ -4,7 +4,7 @@ use super::args::GradientArgs;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::build::memory_limit;
-use crate::build::{Purpose, set_up_watched};
+use crate::build::{Mode, set_up_watched};
 use crate::config::FactorReuse;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
@@ -23,15 +23,15 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
     let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |_| {
-        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(&config, &source, Mode::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let mut observer = observer(&args.common.work);
         observer.phase("setting up mesh and matrices");
-        let told = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Purpose::Optimisation, ranks.group(), told)?;
-        memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.older_run())?;
+        let progress = &mut |stage| observer.stage(stage);
+        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, ranks.group(), progress)?;
+        memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.overwrite_policy())?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
@@ -80,7 +80,7 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             ),
         })
     });
-    signal.ended(outcome)
+    signal.exit_code_of(outcome)
 }
 
 /// The certificate as a table.

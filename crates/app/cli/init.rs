@@ -23,7 +23,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
         .iter()
         .map(|file| {
             let name = format!("{}.{}", place.name, file.extension);
-            (place.folder.join(name), file.named(&place.name).into_owned())
+            (place.folder.join(name), file.content_for(&place.name).into_owned())
         })
         .collect();
     let taken = |(path, _): &&(PathBuf, Vec<u8>)| path.symlink_metadata().is_ok();
@@ -40,7 +40,7 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
     }
     if !args.quiet {
         let written: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-        let _ = writeln!(std::io::stderr(), "{}", told(&written, place.template));
+        let _ = writeln!(std::io::stderr(), "{}", next_commands(&written, place.template));
     }
     Ok(ExitCode::Success)
 }
@@ -77,13 +77,13 @@ impl Place {
         Ok(Self {
             folder,
             name: name.to_owned(),
-            template: args.template.or_else(|| Template::named(name)).unwrap_or(Template::Shield),
+            template: args.template.or_else(|| Template::by_name(name)).unwrap_or(Template::Shield),
         })
     }
 }
 
 /// What was written, and the next commands.
-fn told(files: &[&Path], template: Template) -> String {
+fn next_commands(files: &[&Path], template: Template) -> String {
     let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let config = shell_word(files[0]);
     let command = template.command();

@@ -1,4 +1,4 @@
-//! Signals: the first asks the command to end after the work in hand, the second ends the process at once.
+//! Signals: the first asks the command to end after the current work, the second ends the process at once.
 //!
 //! The second needs no help of a thread that may be busy: the handler itself ends the process. The files of a run bear
 //! that at any moment.
@@ -20,10 +20,10 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 /// What is shown at the first signal of a run.
 pub(super) const FINISHES_EVALUATION: &str =
-    "finishing the evaluation in hand, then saving; once more to leave at once";
+    "finishing the current evaluation, then saving; interrupt again to exit at once";
 
 /// What is shown at the first signal of other commands.
-pub(super) const FINISHES_WORK: &str = "finishing the work in hand; once more to leave at once";
+pub(super) const FINISHES_WORK: &str = "finishing the current work; interrupt again to exit at once";
 
 /// Whether and which signal has come.
 pub(super) struct Signal {
@@ -45,8 +45,9 @@ impl Signal {
         }
     }
 
-    /// How a command ended: one that a signal has ended, before it could have a result, says so and has that signal's code.
-    pub(super) fn ended(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
+    /// The exit code of an outcome: where a signal ended the command before it had a result, that of the signal, with a
+    /// message.
+    pub(super) fn exit_code_of(&self, outcome: Result<ExitCode, Error>) -> Result<ExitCode, Error> {
         match (outcome, self.received()) {
             (
                 Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)),

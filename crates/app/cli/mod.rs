@@ -48,11 +48,11 @@ pub fn main() -> std::process::ExitCode {
             return code.into();
         }
     };
-    panic::reported(|| done(&cli)).into()
+    panic::report_panics(|| run_command(&cli)).into()
 }
 
-/// The outcome of a command.
-fn done(cli: &Cli) -> ExitCode {
+/// Runs a command; its exit code.
+fn run_command(cli: &Cli) -> ExitCode {
     let shared_out = matches!(
         cli.command,
         Command::Run(_) | Command::Resume(_) | Command::Solve(_) | Command::Gradient(_)
@@ -73,7 +73,7 @@ fn done(cli: &Cli) -> ExitCode {
         Command::Generate(args) => generate::generate(args),
     };
     outcome.unwrap_or_else(|error| {
-        // Of several ranks that fail alike one says so; what befalls one alone is said by that one.
+        // An error of all ranks is reported by the first, an error of one rank by that one.
         if ranks::is_worker() {
             if matches!(error, Error::Ranks { .. } | Error::Threads { .. }) {
                 let _ = writeln!(std::io::stderr(), "rank {}: {}", launcher::rank(), message(&error));
@@ -110,7 +110,7 @@ fn observer(args: &WorkArgs) -> Box<dyn RunObserver> {
     }
 }
 
-/// Works on as many threads as asked for, or as the machine has; `work` is told how many.
+/// Works on as many threads as asked for, or as the machine has; `work` gets their number.
 fn with_threads<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce(usize) -> Result<T, Error> + Send,

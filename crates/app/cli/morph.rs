@@ -20,8 +20,9 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
     with_threads(args.common.work.threads, |threads| {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
-        let older_run = args.common.older_run();
-        let options = Options { disk: &disk, older_run, threads, team: None, interrupted: &interrupted };
+        let overwrite_policy = args.common.overwrite_policy();
+        let options =
+            Options { disk: &disk, overwrite_policy, threads, ranks: None, interrupted: &interrupted };
         let report = morph::morph(&config, &source, parameters, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {
             stdout::print_json(&report)?;

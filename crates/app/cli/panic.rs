@@ -12,12 +12,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::exit_code::ExitCode;
 use crate::show;
 
-/// Does the work; a panic is told once, and ends as a numerical failure.
-pub(super) fn reported(work: impl FnOnce() -> ExitCode) -> ExitCode {
-    // Of threads that panic because another did, no more is said.
-    let told = AtomicBool::new(false);
+/// Does the work; a panic is reported once, and ends as a numerical failure.
+pub(super) fn report_panics(work: impl FnOnce() -> ExitCode) -> ExitCode {
+    // Threads that panic because another did are not reported.
+    let reported = AtomicBool::new(false);
     set_hook(Box::new(move |info| {
-        if told.swap(true, Ordering::SeqCst) {
+        if reported.swap(true, Ordering::SeqCst) {
             return;
         }
         show::clear();
@@ -51,10 +51,10 @@ mod tests {
 
     /// The hook is the process': the test runs itself again as another one.
     #[test]
-    fn a_panic_is_told_once_and_ends_with_the_code_of_a_numerical_failure() {
+    fn a_panic_is_reported_once_and_ends_with_the_code_of_a_numerical_failure() {
         const INNER: &str = "FLUXMORPH_TEST_PANIC";
         if std::env::var_os(INNER).is_some() {
-            let code = reported(|| {
+            let code = report_panics(|| {
                 // On a worker thread, as most would be.
                 rayon::join(|| (), || panic!("the {} was lost", "pivot"));
                 ExitCode::Success

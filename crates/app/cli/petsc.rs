@@ -82,7 +82,7 @@ impl Communicator for PetscRank {
 
     fn abort(&self, cause: Option<&str>) -> ! {
         if let Some(cause) = cause {
-            let line = format!("rank {} of {} cannot go on: {cause}\n", self.rank(), self.size());
+            let line = format!("rank {} of {} cannot continue: {cause}\n", self.rank(), self.size());
             let _ = std::io::Write::write_all(&mut std::io::stderr(), line.as_bytes());
         }
         self.petsc.abort(ExitCode::Numerical as i32)

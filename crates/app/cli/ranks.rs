@@ -12,7 +12,7 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use super::launcher;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
-use crate::build::Purpose;
+use crate::build::Mode;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
@@ -39,7 +39,7 @@ impl Ranks {
                 0 | 1 => Ok(Self { group: None, threads: None }),
                 size => Err(Error::Ranks {
                     cause: format!(
-                        "{size} processes were started without an MPI that tells them their numbers: start them with mpirun, or \
+                        "{size} processes were started without an MPI that numbers them: start them with mpirun, or \
                          with srun --mpi=pmix"
                     ),
                 }),
@@ -89,14 +89,9 @@ impl Ranks {
 
     /// Where this rank is a worker: sets the problem up, executes commands until the first rank ends, and says how this one
     /// ended.
-    pub(super) fn run_worker(
-        &self,
-        config: &Config,
-        source: &SourceMap,
-        purpose: Purpose,
-    ) -> Option<ExitCode> {
+    pub(super) fn run_worker(&self, config: &Config, source: &SourceMap, mode: Mode) -> Option<ExitCode> {
         let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
-        run::serve(group, config, source, purpose);
+        run::serve(group, config, source, mode);
         Some(ExitCode::Success)
     }
 }

@@ -8,13 +8,13 @@ use super::args::{ResumeArgs, RunArgs};
 use super::interrupt::{self, Signal};
 use super::ranks::Ranks;
 use super::{observer, stdout, with_threads};
-use crate::build::Purpose;
+use crate::build::Mode;
 use crate::build::memory_limit;
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::{self, Limits, Options, SavedRun};
+use crate::run::{self, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
 
@@ -27,22 +27,23 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.load()?;
     let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
-        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(&config, &source, Mode::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let disk = system_disk();
-        let older_run = args.common.older_run();
-        let team = ranks.group();
-        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let overwrite_policy = args.common.overwrite_policy();
+        let group = ranks.group();
+        let options =
+            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
         let result = run::run(&config, &source, options, &mut *observer);
         let report = config.output.report.then_some(&disk);
         let json = args.common.work.json;
         let ended = Ended { directory: &config.output.directory, report, json };
-        concluded(result, &ended, &signal, &mut *observer)
+        conclude(result, &ended, &signal, &mut *observer)
     });
-    signal.ended(outcome)
+    signal.exit_code_of(outcome)
 }
 
 /// Do what the command line says.
@@ -56,7 +57,7 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let ranks = Ranks::join(saved.config().0, signal.number())?;
     let outcome = with_threads(ranks.threads(args.work.threads), |threads| {
         let (config, source) = saved.config();
-        if let Some(code) = ranks.run_worker(config, source, Purpose::Optimisation) {
+        if let Some(code) = ranks.run_worker(config, source, Mode::Optimisation) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
@@ -66,20 +67,22 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         if !args.work.force {
             memory_limit::check_mesh(config, source)?;
         }
-        let older_run = args.work.older_run();
-        let team = ranks.group();
-        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let overwrite_policy = args.work.overwrite_policy();
+        let group = ranks.group();
+        let options =
+            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
         let report = config.output.report.then_some(&disk);
-        let limits = Limits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
+        let limits =
+            RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);
         let result = run::resume(saved, limits, options, &mut *observer);
         let ended = Ended { directory: &args.directory, report, json: args.work.json };
-        concluded(result, &ended, &signal, &mut *observer)
+        conclude(result, &ended, &signal, &mut *observer)
     });
-    signal.ended(outcome)
+    signal.exit_code_of(outcome)
 }
 
-/// What is done when a run has ended.
+/// What to do when a run has ended.
 struct Ended<'a> {
     directory: &'a Path,
     /// Where the report is written to; `None` where there is to be none.
@@ -87,8 +90,8 @@ struct Ended<'a> {
     json: bool,
 }
 
-/// Prints the result, writes the report, and tells how to go on.
-fn concluded(
+/// Prints the result, writes the report, and says how to continue.
+fn conclude(
     result: Result<RunResult, Error>,
     ended: &Ended<'_>,
     signal: &Signal,
@@ -100,11 +103,11 @@ fn concluded(
         stdout::print_json(&result)?;
     }
     if let Some(disk) = ended.report {
-        // The result is worth more than a page about it: not even a mistake of the program in it ends the run otherwise.
+        // The result is worth more than a page about it: not even a bug in the page changes how the run ends.
         match catch_unwind(AssertUnwindSafe(|| ReportedRun::open(disk, directory)?.write(None))) {
             Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
             Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
-            Err(_) => observer.warning("the report is not written: a mistake of the program, told above"),
+            Err(_) => observer.warning("the report is not written: a bug in the program, shown above"),
         }
     }
     // The search may have ended by itself, and the check of its result not.
@@ -112,10 +115,10 @@ fn concluded(
     match result.stop_reason {
         reason if interrupted || reason == StopReason::MaxTime => {
             observer
-                .warning(&format!("all evaluations are saved: go on with `{}`", resume_command(directory)));
+                .warning(&format!("all evaluations are saved: resume with `{}`", resume_command(directory)));
         }
         StopReason::MaxEvaluations => {
-            observer.note(&format!("to go on from here: {}", extend_command(directory, result.evaluations)))
+            observer.note(&format!("to continue: {}", extend_command(directory, result.evaluations)))
         }
         _ => {}
     }

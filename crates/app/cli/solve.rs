@@ -3,7 +3,7 @@
 use super::args::SolveArgs;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
-use crate::build::{Purpose, variable_count};
+use crate::build::{Mode, variable_count};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{read_design, system_disk};
@@ -18,7 +18,7 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
-        if let Some(code) = ranks.run_worker(&config, &source, Purpose::Analysis) {
+        if let Some(code) = ranks.run_worker(&config, &source, Mode::Analysis) {
             return Ok(code);
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
@@ -27,9 +27,10 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
             None => None,
         };
         let disk = system_disk();
-        let older_run = args.common.older_run();
-        let team = ranks.group();
-        let options = Options { disk: &disk, older_run, threads, team, interrupted: &interrupted };
+        let overwrite_policy = args.common.overwrite_policy();
+        let group = ranks.group();
+        let options =
+            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
         let result = run::solve(&config, &source, design, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {
             stdout::print_json(&result)?;
@@ -37,5 +38,5 @@ pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
         // An analysis that has begun is finished and saved; then the signal decides the exit code.
         Ok(signal.received().unwrap_or_else(|| result.stop_reason.into()))
     });
-    signal.ended(outcome)
+    signal.exit_code_of(outcome)
 }

@@ -1,4 +1,4 @@
-//! `fluxmorph sweep`: what is run, what is told about it, and how it ends.
+//! `fluxmorph sweep`: what is run, what is reported about it, and how it ends.
 
 use std::io::Write;
 use std::time::{Duration, Instant};
@@ -9,15 +9,14 @@ use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{OlderRun, OutputError, shell_word, system_disk};
+use crate::files::{OutputError, OverwritePolicy, shell_word, system_disk};
 use crate::run::sweep::{
     Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
 };
 use crate::show::{Console, Observer};
 
 /// What is shown at the first signal.
-const FINISHES_RUNS: &str =
-    "no further run begins; those at work finish the evaluation in hand and save; once more to leave at once";
+const FINISHES_RUNS: &str = "no further run is started; running ones finish their evaluation and save; interrupt again to exit at once";
 
 /// How many times as long as writing the comparison the work before must have taken: it is written for a reader, and at the
 /// end in any case.
@@ -32,11 +31,11 @@ const LONGEST_LOG: u64 = 1 << 24;
 /// When the values, a configuration or the directory are wrong, before anything is run; or when the files of the sweep fail.
 pub(super) fn sweep(args: &SweepArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(FINISHES_RUNS);
-    let sweep = Sweep::plan(&args.request()).inspect_err(tell_faults)?;
+    let sweep = Sweep::plan(&args.request()).inspect_err(report_faults)?;
     let disk = system_disk();
     if args.compare {
         let layout = Layout::open(&disk, &sweep)?;
-        return compared(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
+        return write_comparison(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
     }
     let count = sweep.combinations.len();
     let chosen = match args.only {
@@ -57,12 +56,12 @@ pub(super) fn sweep(args: &SweepArgs) -> Result<ExitCode, Error> {
         if !args.quiet {
             Console::stderr().note(&format!("script of {count} combinations: sbatch {}", shell_word(path)));
         }
-        return compared(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
+        return write_comparison(args, &sweep, &layout, &Comparison::read(&sweep, &layout)?);
     }
     Session::new(args, &sweep, &layout)?.run(&left, &|| signal.received())
 }
 
-/// What is left to do of a combination: a task, or how it stands.
+/// What is left to do of a combination: a task, or its state.
 enum Left {
     Task(Task),
     Finished(ExitCode),
@@ -74,12 +73,14 @@ enum Left {
 fn left_to_do(states: &mut States<'_>, sweep: &Sweep, index: usize) -> Result<Left, Error> {
     let planned = &sweep.combinations[index];
     Ok(match states.of(planned)? {
-        State::Missing => Left::Task(Task::Begin(OlderRun::Keep)),
-        State::Unborn => Left::Task(Task::Begin(OlderRun::Replace)),
+        State::Missing => Left::Task(Task::Begin(OverwritePolicy::Keep)),
+        State::Unborn => Left::Task(Task::Begin(OverwritePolicy::Replace)),
         State::Broken => Left::Task(Task::Resume),
         State::Finished(reason) => Left::Finished(reason.into()),
         State::InUse => Left::InUse,
-        State::Other(_) if sweep.older == OlderRun::Replace => Left::Task(Task::Begin(OlderRun::Replace)),
+        State::Other(_) if sweep.overwrite == OverwritePolicy::Replace => {
+            Left::Task(Task::Begin(OverwritePolicy::Replace))
+        }
         State::Other(cause) => {
             return Err(SweepError::OtherRun { path: sweep.run_directory(planned), cause }.into());
         }
@@ -92,15 +93,15 @@ fn program() -> Result<std::path::PathBuf, SweepError> {
 }
 
 /// Shows the faults of configurations with their places; the error counts them.
-fn tell_faults(error: &Error) {
+fn report_faults(error: &Error) {
     let Error::Sweep(SweepError::Faults { reports, .. }) = error else { return };
     let mut stderr = std::io::stderr();
     for (name, fault) in reports {
-        let _ = writeln!(stderr, "combination `{name}`:\n{}\n", rendered(fault));
+        let _ = writeln!(stderr, "combination `{name}`:\n{}\n", render(fault));
     }
 }
 
-fn rendered(fault: &ConfigError) -> String {
+fn render(fault: &ConfigError) -> String {
     match fault {
         ConfigError::Invalid(report) => diagnostics::render(report, Style::for_stderr()),
         other => other.to_string(),
@@ -108,7 +109,7 @@ fn rendered(fault: &ConfigError) -> String {
 }
 
 /// Writes the comparison and prints it where that is asked for.
-fn compared(
+fn write_comparison(
     args: &SweepArgs,
     sweep: &Sweep,
     layout: &Layout,
@@ -174,7 +175,7 @@ impl<'a> Session<'a> {
                 }
                 Left::InUse => {
                     self.codes.push(ExitCode::Files);
-                    self.warning(*index, "another process works on it");
+                    self.warning(*index, "another process is working on it");
                 }
             }
         }
@@ -184,7 +185,7 @@ impl<'a> Session<'a> {
             || self.codes.iter().any(|code| matches!(code, ExitCode::Interrupted | ExitCode::Terminated));
         let code = self.codes.iter().copied().max_by_key(|code| severity(*code));
         if let Some(comparison) = &self.comparison {
-            compared(self.args, sweep, layout, comparison)?;
+            write_comparison(self.args, sweep, layout, comparison)?;
         } else if self.args.json {
             let rows = left.iter().map(|(index, _)| self.row(*index)).collect::<Result<Vec<_>, _>>()?;
             stdout::print_json(&rows)?;
@@ -192,7 +193,7 @@ impl<'a> Session<'a> {
         // A signal that came too late to stop anything does not change how the sweep ended.
         let signal = interrupted().filter(|_| is_cut_short);
         if signal.is_some() {
-            Console::stderr().warning("the sweep is not finished: go on with the same command");
+            Console::stderr().warning("the sweep is not finished: resume with the same command");
         }
         Ok(signal.or(code).unwrap_or(ExitCode::Success))
     }
@@ -208,7 +209,7 @@ impl<'a> Session<'a> {
                 if let Some(comparison) = &mut self.comparison {
                     comparison.update(self.sweep, self.layout, index)?;
                 }
-                self.tell_end(index, &ending)?;
+                self.report_end(index, &ending)?;
                 let (at, cost) = self.written;
                 if let Some(comparison) = &self.comparison
                     && at.elapsed() >= SHARE * cost
@@ -222,7 +223,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    fn tell_end(&self, index: usize, ending: &Ending) -> Result<(), Error> {
+    fn report_end(&self, index: usize, ending: &Ending) -> Result<(), Error> {
         let seconds = self.begun[index].map_or(0.0, |begun| begun.elapsed().as_secs_f64());
         let log = self.layout.log(&self.sweep.combinations[index]);
         let broken = |how: &str| {
@@ -232,25 +233,25 @@ impl<'a> Session<'a> {
         match ending {
             Ending::Broken(how) => broken(&format!("failed: {how}")),
             Ending::Code(ExitCode::Interrupted | ExitCode::Terminated) => {
-                let told = match self.row(index)?.evaluations {
+                let outcome = match self.row(index)?.evaluations {
                     Some(count) => format!("interrupted, {count} evaluations are saved, {seconds:.1} s"),
                     None => "interrupted before there was anything to keep".to_owned(),
                 };
-                self.note(index, &told);
+                self.note(index, &outcome);
             }
             Ending::Code(ExitCode::Success | ExitCode::Stopped) => {
                 let row = self.row(index)?;
                 let ratio = row.ratio.map_or(String::new(), |ratio| format!(", F/F0 {ratio:.5}"));
                 let evaluations = row.evaluations.unwrap_or(0);
-                let told = row.describe();
-                self.note(index, &format!("{told}{ratio}, {evaluations} evaluations, {seconds:.1} s"));
+                let outcome = row.describe();
+                self.note(index, &format!("{outcome}{ratio}, {evaluations} evaluations, {seconds:.1} s"));
             }
             Ending::Code(code) => broken(&format!("failed with exit code {}", *code as u8)),
         }
         Ok(())
     }
 
-    /// The last error that a run has told.
+    /// The last error in the log of a run.
     fn last_error(&self, log: &std::path::Path) -> Option<String> {
         let bytes = self.layout.disk().read(log, LONGEST_LOG).ok()?;
         let text = String::from_utf8_lossy(&bytes);

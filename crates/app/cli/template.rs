@@ -1,6 +1,6 @@
 //! The starting configurations that `fluxmorph init` writes, with the files that belong to them.
 //!
-//! Their text lies in `templates/`. In it `NAME.toml`, `NAME.geo`, `NAME.msh` and `runs/NAME` stand for the name that the
+//! Their text is in `templates/`. In it `NAME.toml`, `NAME.geo`, `NAME.msh` and `runs/NAME` are replaced by the name that the
 //! user chooses; `NAME` alone is text as any other. The mesh is that of the `.geo` beside it, made by Gmsh.
 
 use std::borrow::Cow;
@@ -40,7 +40,7 @@ impl Template {
     }
 
     /// The template of a name.
-    pub(super) fn named(name: &str) -> Option<Self> {
+    pub(super) fn by_name(name: &str) -> Option<Self> {
         Self::value_variants().iter().copied().find(|template| template.name() == name)
     }
 
@@ -70,7 +70,7 @@ impl Template {
 
 impl TemplateFile {
     /// The content for a configuration called `name`.
-    pub(super) fn named(&self, name: &str) -> Cow<'static, [u8]> {
+    pub(super) fn content_for(&self, name: &str) -> Cow<'static, [u8]> {
         // A mesh holds no such words, and need not be copied.
         match std::str::from_utf8(self.content) {
             Ok(text) if self.extension != "msh" => {
@@ -95,7 +95,7 @@ mod tests {
             for file in template.files() {
                 assert!(file.content.len() <= 150_000, "{template:?} {}", file.extension);
             }
-            let text = template.files()[0].named("plate");
+            let text = template.files()[0].content_for("plate");
             let text = std::str::from_utf8(&text).expect("text");
             assert!(text.starts_with("# fluxmorph generate schema > "), "{template:?}");
             assert_eq!(text.lines().nth(1), Some("#:schema ./fluxmorph.schema.json"), "{template:?}");
@@ -107,8 +107,8 @@ mod tests {
     #[test]
     fn a_template_is_found_by_its_name() {
         for template in Template::value_variants() {
-            assert_eq!(Template::named(template.name()), Some(*template));
+            assert_eq!(Template::by_name(template.name()), Some(*template));
         }
-        assert_eq!(Template::named("Shield"), None);
+        assert_eq!(Template::by_name("Shield"), None);
     }
 }

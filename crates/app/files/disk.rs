@@ -25,7 +25,7 @@ pub trait Disk: Debug + Send + Sync {
     /// When there is one already, be it a link, or the operating system refuses.
     fn create(&self, path: &Path) -> io::Result<Box<dyn DiskFile>>;
 
-    /// Opens a file, and not a link to one, to write behind its first `length` bytes; what follows them is cut off.
+    /// Opens a file, and not a link to one, to write after its first `length` bytes; what follows them is cut off.
     ///
     /// # Errors
     /// [`io::ErrorKind::ResourceBusy`] when another process holds it, or when the operating system refuses.
@@ -73,7 +73,7 @@ pub trait Disk: Debug + Send + Sync {
     /// When the operating system refuses.
     fn names(&self, path: &Path) -> io::Result<Vec<String>>;
 
-    /// Whether a link stands there, wherever it leads.
+    /// Whether a link is there, wherever it leads.
     fn is_link(&self, path: &Path) -> bool;
 }
 

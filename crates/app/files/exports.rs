@@ -1,4 +1,4 @@
-//! The mesh of the best design in the forms that users go on with: a Gmsh file, and STL files of surfaces.
+//! The mesh of the best design in the forms that other programs read: a Gmsh file, and STL files of surfaces.
 //!
 //! It is the mesh that was solved on: a region that its impedance surface replaces is not in it. Coordinates are in the unit
 //! of the mesh file, and in millimetres where the mesh was generated.

@@ -2,7 +2,7 @@
 //!
 //! `fields/eval_0004.vtu`, or `fields/eval_0004.pvtu` beside `fields/eval_0004/rank_000.vtu` …: the header names the pieces,
 //! comes after the last of them and goes before the first, so that a header always stands for whole pieces. Where a
-//! run that was gone on with has left both forms, the VTU file counts. Does not live here: what is in the files.
+//! resumed run has left both forms, the VTU file counts. Does not live here: what is in the files.
 
 use std::io;
 use std::path::PathBuf;
@@ -226,11 +226,11 @@ mod tests {
     use std::fs;
 
     use super::super::disk::system_disk;
-    use super::super::run_directory::OlderRun;
+    use super::super::run_directory::OverwritePolicy;
     use super::*;
 
     fn fresh(folder: &tempfile::TempDir) -> RunDirectory {
-        RunDirectory::create(&system_disk(), &folder.path().join("run"), OlderRun::Keep).expect("new")
+        RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep).expect("new")
     }
 
     /// Three pieces and their header.

@@ -1,4 +1,4 @@
-//! No number that is not finite is published.
+//! Checks that every number of a result is finite before it is published.
 
 use fluxmorph_optimizer::Error;
 
@@ -7,10 +7,10 @@ use super::result::{ProbeResult, RunResult};
 /// What to do about a number that is not finite.
 const SUM: &str = "expected a finite number; check weights, currents and units";
 
-/// Every number of a result that is to be published.
+/// Checks every number of a result that is to be published.
 ///
 /// # Errors
-/// [`Error::NotFinite`] names the first that is none.
+/// [`Error::NotFinite`] names the first that is not finite.
 pub(crate) fn check_finite(result: &RunResult) -> Result<(), Error> {
     let RunResult { objective, constraints, design, mesh, probes, losses_w, states, .. } = result;
     let mut numbers: Vec<(String, f64)> = vec![

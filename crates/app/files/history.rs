@@ -58,7 +58,7 @@ fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{OlderRun, system_disk};
+    use crate::files::{OverwritePolicy, system_disk};
 
     fn evaluation() -> Evaluation {
         Evaluation {
@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn rows_have_the_documented_columns_and_exact_numbers() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run =
-            RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("a run directory");
+        let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
+            .expect("a run directory");
         History::create(&run, &["volume"], &[&evaluation()])
             .and_then(|mut history| history.append(&evaluation()))
             .expect("written");

@@ -13,7 +13,7 @@ pub fn hostname() -> String {
         .unwrap_or_else(|| "unknown".to_owned())
 }
 
-/// Most memory this process has held so far [bytes]; 0 where the system does not tell.
+/// Most memory this process has held so far [bytes]; 0 where the system does not say.
 pub fn peak_memory_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let kilobytes = status

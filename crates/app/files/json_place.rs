@@ -1,4 +1,4 @@
-//! Where something stands in a JSON text, for messages; a reader of JSON does not tell.
+//! The position of a value in a JSON text, for messages; the JSON reader does not give it.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ pub(super) fn at_line(text: &str, line: usize, column: usize) -> Range<usize> {
     start + at..start + at + word.max(least)
 }
 
-/// The bytes of the item with a number of the first list behind a byte.
+/// The bytes of the item with a number of the first list after a byte.
 pub(super) fn item(text: &str, from: usize, number: usize) -> Option<Range<usize>> {
     let open = from + text[from..].find('[')?;
     let (mut depth, mut count, mut quoted, mut escaped) = (0_usize, 0, false, false);

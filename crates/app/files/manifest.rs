@@ -39,7 +39,7 @@ pub struct Manifest {
     /// Limits in force, of the configuration or the command line; `None` where nothing is optimised.
     #[serde(default)]
     pub limits: Option<LimitsInForce>,
-    /// When the run was gone on with.
+    /// When the run was resumed.
     #[serde(default)]
     pub resumed: Vec<Resumption>,
     /// The mesh.
@@ -130,7 +130,7 @@ impl LimitsInForce {
     }
 }
 
-/// How a run was gone on with.
+/// How a run was resumed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Resumption {
     /// When, UTC.
@@ -179,7 +179,7 @@ impl Host {
 
 impl Manifest {
     /// The manifest of a run that starts now, without what it reads.
-    pub fn started(command: &str, threads: usize) -> Self {
+    pub fn new(command: &str, threads: usize) -> Self {
         Self {
             program: PROGRAM.to_owned(),
             schema_version: 1,
@@ -214,8 +214,8 @@ impl Manifest {
         self
     }
 
-    /// The run goes on.
-    pub fn resumed(&mut self, resumption: Resumption) {
+    /// Adds a resumption; the run is running again.
+    pub fn add_resumption(&mut self, resumption: Resumption) {
         (self.status, self.finished, self.seconds) = (RunStatus::Running, None, None);
         self.limits = Some(resumption.limits);
         self.resumed.push(resumption);
@@ -268,14 +268,14 @@ pub fn blake3_hex(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::{OlderRun, system_disk};
+    use crate::files::{OverwritePolicy, system_disk};
 
     #[test]
     fn a_manifest_is_written_first_and_completed_last() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run =
-            RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("a run directory");
-        let mut manifest = Manifest::started("run", 2);
+        let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
+            .expect("a run directory");
+        let mut manifest = Manifest::new("run", 2);
         manifest.config = Some(FileHash { path: "a.toml".into(), blake3: blake3_hex(b"") });
         manifest.write(&run).expect("written");
         let read = Manifest::read(&run).expect("read");

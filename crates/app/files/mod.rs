@@ -34,7 +34,7 @@ pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, TermResult, Verification,
 };
-pub use run_directory::{OlderRun, RunDirectory};
+pub use run_directory::{OverwritePolicy, RunDirectory};
 pub use synced::SyncedLog;
 pub(crate) use synced::write_whole;
 
@@ -100,8 +100,8 @@ pub enum OutputError {
     },
     /// The run is one of an earlier version.
     #[error(
-        "`{path}` is the journal of version {version:?} of fluxmorph in a form that this version does not read: go on with the \
-         program that wrote it, or start the run again with --force"
+        "`{path}` is the journal of version {version:?} of fluxmorph in a form that this version does not read: resume with \
+         the program that wrote it, or start the run again with --force"
     )]
     OlderJournal {
         /// The journal.

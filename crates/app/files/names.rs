@@ -46,12 +46,12 @@ pub(super) fn is_case(name: &str) -> bool {
         .any(|digits| digits.len() >= 2 && digits.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
-/// The command that goes on with a run, as a shell takes it.
+/// The command that resumes a run, as a shell takes it.
 pub fn resume_command(directory: &Path) -> String {
     format!("fluxmorph resume {}", shell_word(directory))
 }
 
-/// The command that goes on with a run that has used up so many evaluations.
+/// The command that resumes a run that has used up so many evaluations.
 pub fn extend_command(directory: &Path, evaluations: usize) -> String {
     let more = evaluations.saturating_mul(2).clamp(1, MOST_EVALUATIONS);
     format!("{} --max-evaluations {more}", resume_command(directory))

@@ -34,7 +34,7 @@ pub struct RunResult {
     pub design: Option<DesignResult>,
     /// The mesh.
     pub mesh: MeshResult,
-    /// Rounds of the mesh motion and remedies, as they came; empty where one reference mesh was enough.
+    /// Rounds and fallbacks of the mesh motion, in their order; empty where one reference mesh was enough.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<RoundEvent>,
     /// The frequencies [Hz] in the order of the configuration.
@@ -254,7 +254,7 @@ pub(crate) mod tests {
                 admitted: None,
                 stiffness: "inverse_size".to_owned(),
                 reach: [0.5, 0.75],
-                cause: "the search reached the edge of its box".to_owned(),
+                cause: "the search stopped at the trust-region boundary".to_owned(),
             }],
             design: Some(DesignResult {
                 values_m: vec![0.02],

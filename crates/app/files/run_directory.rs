@@ -14,7 +14,7 @@ use super::synced::{SyncedLog, UNFINISHED, folder_of, write_whole};
 
 /// What to do with an earlier run in the same folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OlderRun {
+pub enum OverwritePolicy {
     /// Leave it, and fail.
     Keep,
     /// Remove its files, and no others.
@@ -66,9 +66,13 @@ impl RunDirectory {
     ///
     /// # Errors
     /// When the folder holds something else, or the operating system refuses.
-    pub fn create(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+    pub fn create(
+        disk: &Arc<dyn Disk>,
+        path: &Path,
+        overwrite: OverwritePolicy,
+    ) -> Result<Self, OutputError> {
         Self { disk: Arc::clone(disk), path: path.to_owned() }.refuse_link()?;
-        let directory = Self::create_flat(disk, path, older)?;
+        let directory = Self::create_flat(disk, path, overwrite)?;
         directory.make_fields()?;
         Ok(directory)
     }
@@ -106,11 +110,15 @@ impl RunDirectory {
     ///
     /// # Errors
     /// As [`RunDirectory::create`].
-    pub fn create_flat(disk: &Arc<dyn Disk>, path: &Path, older: OlderRun) -> Result<Self, OutputError> {
+    pub fn create_flat(
+        disk: &Arc<dyn Disk>,
+        path: &Path,
+        overwrite: OverwritePolicy,
+    ) -> Result<Self, OutputError> {
         let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
         match disk.names(path) {
             Ok(names) if names.is_empty() => {}
-            Ok(_) => directory.clear(older)?,
+            Ok(_) => directory.clear(overwrite)?,
             Err(error) if error.kind() == io::ErrorKind::NotFound => directory.make(path)?,
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
                 return Err(OutputError::NotADirectory { path: path.to_owned() });
@@ -169,16 +177,16 @@ impl RunDirectory {
         Manifest::read(self).is_ok_and(|manifest| manifest.is_ours())
     }
 
-    fn clear(&self, older: OlderRun) -> Result<(), OutputError> {
+    fn clear(&self, overwrite: OverwritePolicy) -> Result<(), OutputError> {
         if !self.holds_run() {
-            // What is left of a start that was broken off before its manifest was complete is ours as well.
+            // What is left of a start that was interrupted before its manifest was complete is ours as well.
             return if self.holds_only_leftovers()? {
                 self.remove_unfinished(&self.path)
             } else {
                 Err(OutputError::NotOurs { path: self.path.clone() })
             };
         }
-        if older == OlderRun::Keep {
+        if overwrite == OverwritePolicy::Keep {
             return Err(OutputError::HoldsRun { path: self.path.clone() });
         }
         self.check_unused()?;
@@ -273,11 +281,11 @@ impl RunDirectory {
         SyncedLog::create(&*self.disk, path, start)
     }
 
-    /// A log of the run, to go on behind its first `length` bytes.
+    /// A log of the run, to be continued after its first `length` bytes.
     ///
     /// # Errors
     /// As [`SyncedLog::append`], and [`OutputError::InUse`].
-    pub fn reopened(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
+    pub fn reopen(&self, path: &Path, length: u64) -> Result<SyncedLog, OutputError> {
         SyncedLog::reopen(&*self.disk, path, length)
     }
 
@@ -375,21 +383,22 @@ mod tests {
     use super::*;
 
     fn started(path: &Path) -> RunDirectory {
-        let run = RunDirectory::create(&system_disk(), path, OlderRun::Keep).expect("a new run directory");
-        Manifest::started("run", 2).write(&run).expect("a manifest");
+        let run =
+            RunDirectory::create(&system_disk(), path, OverwritePolicy::Keep).expect("a new run directory");
+        Manifest::new("run", 2).write(&run).expect("a manifest");
         run
     }
 
     #[test]
     fn an_absent_or_empty_folder_is_taken() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        assert!(RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).is_ok());
-        let run =
-            RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OlderRun::Keep).expect("made");
+        assert!(RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep).is_ok());
+        let run = RunDirectory::create(&system_disk(), &folder.path().join("a/b"), OverwritePolicy::Keep)
+            .expect("made");
         assert!(run.fields().is_dir());
         // Broken off before the manifest: still nothing of anybody.
         std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
-        assert!(RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).is_ok());
+        assert!(RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Keep).is_ok());
         assert!(!run.path().join(".fluxmorph-abc").exists());
     }
 
@@ -399,14 +408,16 @@ mod tests {
         let note = folder.path().join("thesis.txt");
         fs::write(&note, "years of work").expect("written");
         for manifest in ["", "{}", r#"{"program": "other"}"#, "[]"] {
-            for older in [OlderRun::Keep, OlderRun::Replace] {
-                let error = RunDirectory::create(&system_disk(), folder.path(), older).expect_err("foreign");
+            for overwrite in [OverwritePolicy::Keep, OverwritePolicy::Replace] {
+                let error =
+                    RunDirectory::create(&system_disk(), folder.path(), overwrite).expect_err("foreign");
                 assert!(matches!(error, OutputError::NotOurs { .. }), "{error}");
             }
             fs::write(folder.path().join("manifest.json"), manifest).expect("written");
         }
         assert!(note.exists());
-        let error = RunDirectory::create(&system_disk(), &note, OlderRun::Replace).expect_err("a file");
+        let error =
+            RunDirectory::create(&system_disk(), &note, OverwritePolicy::Replace).expect_err("a file");
         assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");
         assert!(RunDirectory::open(&system_disk(), folder.path()).is_err());
     }
@@ -432,11 +443,11 @@ mod tests {
             fs::write(path, b"x").expect("written");
         }
         let error =
-            RunDirectory::create(&system_disk(), run.path(), OlderRun::Keep).expect_err("holds a run");
+            RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Keep).expect_err("holds a run");
         assert!(matches!(error, OutputError::HoldsRun { .. }) && error.to_string().contains("--force"));
         assert!(ours.iter().all(|path| path.exists()));
 
-        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect("replaced");
         assert!(ours.iter().all(|path| !path.exists()));
         assert!(foreign.iter().all(|path| path.exists()));
         assert!(run.manifest().exists(), "the mark stays until the next manifest");
@@ -445,9 +456,9 @@ mod tests {
     #[test]
     fn surfaces_of_an_earlier_run_are_replaced_and_those_of_others_stay() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let run =
-            RunDirectory::create(&system_disk(), &folder.path().join("run"), OlderRun::Keep).expect("new");
-        let mut manifest = Manifest::started("run", 1);
+        let run = RunDirectory::create(&system_disk(), &folder.path().join("run"), OverwritePolicy::Keep)
+            .expect("new");
+        let mut manifest = Manifest::new("run", 1);
         manifest.surfaces =
             ["optimum_a.stl", "../stay.stl", "optimum_/../../stay.stl"].map(str::to_owned).to_vec();
         manifest.write(&run).expect("written");
@@ -455,7 +466,7 @@ mod tests {
         for path in [&ours, &theirs, &folder.path().join("stay.stl"), &run.optimum()] {
             fs::write(path, b"x").expect("written");
         }
-        RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect("replaced");
         assert!(!ours.exists() && !run.optimum().exists());
         assert!(theirs.exists() && folder.path().join("stay.stl").exists());
     }
@@ -469,9 +480,10 @@ mod tests {
         let run = started(&folder.path().join("run"));
         fs::remove_dir(run.fields()).expect("removed");
         std::os::unix::fs::symlink(other.fields(), run.fields()).expect("linked");
-        let error = RunDirectory::create(&system_disk(), run.path(), OlderRun::Replace).expect_err("a link");
+        let error =
+            RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect_err("a link");
         assert!(matches!(error, OutputError::Linked { .. }), "{error}");
-        RunDirectory::create_flat(&system_disk(), run.path(), OlderRun::Replace).expect("replaced");
+        RunDirectory::create_flat(&system_disk(), run.path(), OverwritePolicy::Replace).expect("replaced");
         assert!(other.field(0).exists());
     }
 }

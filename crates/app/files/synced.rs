@@ -70,7 +70,7 @@ impl SyncedLog {
         Self::reopen(disk, path, start.len() as u64)
     }
 
-    /// An existing log, to go on behind its first `length` bytes.
+    /// An existing log, to be continued after its first `length` bytes.
     ///
     /// # Errors
     /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.

@@ -1,17 +1,17 @@
 //! Is the gain of a run the shape's, or the mesh's? Initial and best shape again, on a mesh the optimiser never saw.
 //!
 //! An optimiser sees the discrete objective: the field's, and the error of a mesh that moves along with the design. What it
-//! gains from that error is lost where all nodes lie elsewhere. So the run's mesh is generated anew with another refinement,
+//! gains from that error is lost where all nodes are elsewhere. So the run's mesh is generated anew with another refinement,
 //! brought to both shapes, and the ratio of the two values is the *verified ratio*. Variables of a control grid mean the
 //! same on any mesh; where the nodes are the variables, the displacement of the old surface is interpolated on the fresh one
-//! ([`Triangulation::transferred`]). A check that cannot be made is told, and costs a run nothing else.
+//! ([`Triangulation::transfer`]). A check that cannot be done is reported, and costs a run nothing else.
 //!
 //! Does not live here: whether the gradient is the objective's, which is `verify`.
 
 use fluxmorph_geometry::tet4::Point;
 
 use crate::build::memory_limit;
-use crate::build::{Purpose, Setup, design_triangulation, set_up};
+use crate::build::{Mode, Setup, design_triangulation, set_up};
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
@@ -29,7 +29,7 @@ const LEAST_ROUNDS: usize = 20;
 
 /// Initial and best shape of a run, in a form that another mesh can take.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shapes {
+pub enum ShapePair {
     /// The initial shape is the best.
     Unchanged,
     /// Variables of a control grid [m].
@@ -43,7 +43,7 @@ pub enum Shapes {
     },
 }
 
-impl Shapes {
+impl ShapePair {
     /// The initial shape of a run that has been set up, and its best one.
     ///
     /// # Errors
@@ -75,7 +75,7 @@ impl Shapes {
             Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
             Self::Displacements { surface, pair: [initial, best] } => {
                 let fresh = design_triangulation(design, &setup.full_mesh)?;
-                let transferred = [initial, best].map(|values| surface.transferred(values, &fresh));
+                let transferred = [initial, best].map(|values| surface.transfer(values, &fresh));
                 let [initial, best] = transferred.map(|values| values.map_err(OptimizerError::from));
                 Ok([initial?, best?])
             }
@@ -83,7 +83,7 @@ impl Shapes {
     }
 }
 
-/// Whether a check was brought to its end.
+/// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
     /// It was, or none was wanted, or the run itself had been cut short.
@@ -92,23 +92,23 @@ pub enum Check {
     CutShort,
 }
 
-/// A run whose gain is to be checked.
+/// The mesh-independence check of a run: is its gain that of the shape, or of the mesh?
 #[derive(Clone, Copy, Debug)]
-pub struct Gain<'a> {
+pub struct MeshIndependence<'a> {
     /// Its configuration.
     pub config: &'a Config,
-    /// Where that stands.
+    /// The text of the configuration.
     pub source: &'a SourceMap,
     /// How it ended.
     pub stop_reason: StopReason,
     /// Its initial and its best shape.
-    pub shapes: &'a Shapes,
+    pub shapes: &'a ShapePair,
     /// Bytes that the check needs, about.
     pub memory: usize,
 }
 
-impl Gain<'_> {
-    /// Fills in the verified ratio. Where there is none, the observer is told why.
+impl MeshIndependence<'_> {
+    /// Fills in the verified ratio. Where there is none, the reason is reported to the observer.
     ///
     /// `interrupted` is asked before each part of the work.
     pub fn verify(
@@ -121,7 +121,7 @@ impl Gain<'_> {
         if factor == 0.0 {
             return Check::Finished;
         }
-        if *self.shapes == Shapes::Unchanged {
+        if *self.shapes == ShapePair::Unchanged {
             objective.verified_ratio = Some(1.0);
             return Check::Finished;
         }
@@ -136,7 +136,7 @@ impl Gain<'_> {
             _ if cut_short || interrupted() => Ok(None),
             Some(mesh) => {
                 observer.phase("checking the best shape on a fresh mesh");
-                self.computed(mesh, factor, interrupted)
+                self.compute(mesh, factor, interrupted)
             }
             None => {
                 observer.notice(
@@ -152,9 +152,8 @@ impl Gain<'_> {
                 objective.verification = Some(verification);
             }
             Ok(None) => {
-                observer.notice(
-                    "the best shape is not checked on a fresh mesh: the run was told to end before that",
-                );
+                observer
+                    .notice("the best shape is not checked on a fresh mesh: the run was stopped before that");
                 if !cut_short {
                     return Check::CutShort;
                 }
@@ -167,14 +166,14 @@ impl Gain<'_> {
     }
 
     /// Both values on the fresh mesh; `None` where a signal came first.
-    fn computed(
+    fn compute(
         &self,
         mesh: MeshConfig,
         refinement: f64,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
         let config = fresh_configuration(self.config, mesh);
-        let setup = set_up(&config, self.source, Purpose::Optimisation)?;
+        let setup = set_up(&config, self.source, Mode::Optimisation)?;
         if interrupted() {
             return Ok(None);
         }
@@ -203,7 +202,7 @@ impl Gain<'_> {
     }
 }
 
-/// Bytes that the process holds at the peak of the check, about; `None` where there is none to be made.
+/// Bytes that the process holds at the peak of the check, about; `None` where there is no check to do.
 pub fn memory_estimate(config: &Config, problem: &Problem) -> Option<usize> {
     let factor = config.output.verify_refinement;
     if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
@@ -270,14 +269,14 @@ mod tests {
         points.iter().map(|x| 0.2 * x[0].max(0.5 * x[1]) - 4e-3).collect()
     }
 
-    /// What the observer was told.
+    /// What the observer received.
     #[derive(Default)]
-    struct Told {
+    struct Recorded {
         notices: Vec<String>,
         warnings: Vec<String>,
     }
 
-    impl Observer for Told {
+    impl Observer for Recorded {
         fn notice(&mut self, message: &str) {
             self.notices.push(message.to_owned());
         }
@@ -290,10 +289,10 @@ mod tests {
     fn verified(
         config: &Config,
         source: &SourceMap,
-        shapes: &Shapes,
+        shapes: &ShapePair,
         stop_reason: StopReason,
         interrupted: bool,
-    ) -> (ObjectiveResult, Told) {
+    ) -> (ObjectiveResult, Recorded) {
         let mut objective = ObjectiveResult {
             initial: 1.0,
             best: 0.5,
@@ -303,13 +302,13 @@ mod tests {
             verification: None,
             terms: Vec::new(),
         };
-        let mut told = Told::default();
-        Gain { config, source, stop_reason, shapes, memory: 0 }.verify(
+        let mut recorded = Recorded::default();
+        MeshIndependence { config, source, stop_reason, shapes, memory: 0 }.verify(
             &mut objective,
             &|| interrupted,
-            &mut told,
+            &mut recorded,
         );
-        (objective, told)
+        (objective, recorded)
     }
 
     #[test]
@@ -317,7 +316,7 @@ mod tests {
         for on_nodes in [false, true] {
             let (mut config, source) = quick(on_nodes);
             config.output.verify_refinement = 1.0;
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
             let best = dished(&setup);
             let value = |p: &[f64]| {
                 let analysis = setup
@@ -328,11 +327,11 @@ mod tests {
             };
             let shape = setup.problem.shape().expect("a shape");
             let expected = value(&best) / value(shape.initial());
-            let shapes = Shapes::of(&config, &setup, &best).expect("a design surface");
-            assert_eq!(matches!(shapes, Shapes::Displacements { .. }), on_nodes);
-            let (objective, told) =
+            let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
+            assert_eq!(matches!(shapes, ShapePair::Displacements { .. }), on_nodes);
+            let (objective, recorded) =
                 verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
-            let found = objective.verification.unwrap_or_else(|| panic!("{:?}", told.warnings));
+            let found = objective.verification.unwrap_or_else(|| panic!("{:?}", recorded.warnings));
             assert_eq!(objective.verified_ratio, Some(found.ratio));
             // The residual that every linear solution has to reach, twice.
             assert!((found.ratio - expected).abs() < 2e-9 * expected, "{} {expected}", found.ratio);
@@ -345,11 +344,11 @@ mod tests {
             let (mut config, source) = quick(on_nodes);
             // Over the plate the cells are halved.
             config.output.verify_refinement = 3.0;
-            let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
-            let shapes = Shapes::of(&config, &setup, &dished(&setup)).expect("a design surface");
-            let (objective, told) =
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+            let shapes = ShapePair::of(&config, &setup, &dished(&setup)).expect("a design surface");
+            let (objective, recorded) =
                 verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
-            objective.verified_ratio.unwrap_or_else(|| panic!("{:?}", told.warnings))
+            objective.verified_ratio.unwrap_or_else(|| panic!("{:?}", recorded.warnings))
         };
         let (grid, nodes) = (ratio(false), ratio(true));
         println!("verified ratio of one shape: on a grid {grid:.6}, on nodes {nodes:.6}");
@@ -362,25 +361,34 @@ mod tests {
     fn a_mesh_that_cannot_be_generated_anew_is_told_once() {
         let (mut config, source) = quick(false);
         config.mesh = MeshConfig::Block(BlockMesh::default());
-        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
-        let (objective, told) = verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+        let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let (objective, recorded) =
+            verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
         assert_eq!((objective.verified_ratio, objective.verification), (None, None));
-        assert!(told.notices.len() == 1 && told.notices[0].contains("generators"), "{:?}", told.notices);
-        assert!(told.warnings.is_empty());
+        assert!(
+            recorded.notices.len() == 1 && recorded.notices[0].contains("generators"),
+            "{:?}",
+            recorded.notices
+        );
+        assert!(recorded.warnings.is_empty());
     }
 
     #[test]
-    fn a_run_told_to_end_is_not_checked() {
+    fn a_run_that_was_stopped_is_not_checked() {
         let (config, source) = quick(false);
-        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
         for (reason, interrupted) in [
             (StopReason::Interrupted, false),
             (StopReason::MaxTime, false),
             (StopReason::ObjectiveConverged, true),
         ] {
-            let (objective, told) = verified(&config, &source, &shapes, reason, interrupted);
+            let (objective, recorded) = verified(&config, &source, &shapes, reason, interrupted);
             assert_eq!(objective.verified_ratio, None);
-            assert!(told.notices.len() == 1 && told.notices[0].contains("told to end"), "{:?}", told.notices);
+            assert!(
+                recorded.notices.len() == 1 && recorded.notices[0].contains("was stopped"),
+                "{:?}",
+                recorded.notices
+            );
         }
     }
 
@@ -389,20 +397,25 @@ mod tests {
         let (mut config, source) = quick(false);
         // 50 times the default, where the generator ends at 20.
         config.output.verify_refinement = 100.0;
-        let shapes = Shapes::Variables([vec![0.0; 91], vec![1e-3; 91]]);
-        let (objective, told) = verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+        let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let (objective, recorded) =
+            verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
         assert_eq!(objective.verified_ratio, None);
-        assert!(told.warnings.len() == 1 && told.warnings[0].contains("refinement"), "{:?}", told.warnings);
+        assert!(
+            recorded.warnings.len() == 1 && recorded.warnings[0].contains("refinement"),
+            "{:?}",
+            recorded.warnings
+        );
     }
 
     #[test]
     fn the_initial_design_as_the_best_is_the_ratio_one() {
         let (config, source) = quick(false);
-        let setup = set_up(&config, &source, Purpose::Optimisation).expect("a sound problem");
-        let shapes = Shapes::of(&config, &setup, &[0.0; 91]).expect("a design");
-        assert_eq!(shapes, Shapes::Unchanged);
-        let (objective, told) = verified(&config, &source, &shapes, StopReason::MeshLimit, false);
+        let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+        let shapes = ShapePair::of(&config, &setup, &[0.0; 91]).expect("a design");
+        assert_eq!(shapes, ShapePair::Unchanged);
+        let (objective, recorded) = verified(&config, &source, &shapes, StopReason::MeshLimit, false);
         assert_eq!((objective.verified_ratio, objective.verification), (Some(1.0), None));
-        assert!(told.notices.is_empty() && told.warnings.is_empty());
+        assert!(recorded.notices.is_empty() && recorded.warnings.is_empty());
     }
 }

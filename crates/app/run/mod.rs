@@ -25,38 +25,38 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
 use crate::build::locate_error::attribute_error;
-use crate::build::{Purpose, Setup, set_up_watched};
+use crate::build::{Mode, Setup, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::exports;
 use crate::files::{
-    Disk, Manifest, MeshHash, ObjectiveResult, OlderRun, RunDirectory, RunResult, RunStatus, check_finite,
-    peak_memory_bytes, resume_command,
+    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
+    check_finite, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 use fluxmorph_optimizer::problem::RoundEvent;
 use fluxmorph_optimizer::{Error as OptimizerError, driver};
 use journal::{Identity, Journal};
-use mesh_independence::{Check, Gain, Shapes};
+use mesh_independence::{Check, MeshIndependence, ShapePair};
 use pieces::SharedPieces;
 use prepared::Prepared;
 use recorder::DirectoryRecorder;
 pub(crate) use resume::configuration;
-pub use resume::{Limits, SavedRun, resume};
+pub use resume::{RunLimits, SavedRun, resume};
 pub use solve::solve;
 use summary::{constraints, linear_solver, terms};
 
-/// What a session is told beside the configuration.
+/// What a session needs besides the configuration.
 #[derive(Clone, Copy)]
 pub struct Options<'a> {
     /// Where run directories are.
     pub disk: &'a Arc<dyn Disk>,
     /// What happens to an earlier run in the output directory.
-    pub older_run: OlderRun,
+    pub overwrite_policy: OverwritePolicy,
     /// Threads in use, for the manifest.
     pub threads: usize,
     /// The ranks among which the work is shared out; `None` for one process.
-    pub team: Option<&'a RankGroup>,
+    pub ranks: Option<&'a RankGroup>,
     /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
 }
@@ -71,8 +71,8 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
-    let prepared = Prepared::new(config, source, Purpose::Optimisation, options, observer)?;
-    let session = prepared.approach_initial()?.begin("run", observer)?;
+    let prepared = Prepared::new(config, source, Mode::Optimisation, options, observer)?;
+    let session = prepared.continue_to_initial()?.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
         let journal = Journal::create(&session.directory, session.identity())?;
         let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;
@@ -85,9 +85,9 @@ pub fn run(
 ///
 /// # Panics
 /// At the first rank.
-pub fn serve(group: &RankGroup, config: &Config, source: &SourceMap, purpose: Purpose) {
+pub fn serve(group: &RankGroup, config: &Config, source: &SourceMap, mode: Mode) {
     assert_eq!(group.role(), Role::Worker, "the first rank leads");
-    let setup = set_up_watched(config, source, purpose, Some(group), &mut |_| ());
+    let setup = set_up_watched(config, source, mode, Some(group), &mut |_| ());
     let directory = config.output.directory.clone();
     let _pieces = setup.as_ref().ok().and_then(|setup| SharedPieces::of(&setup.problem, directory));
     group.serve(setup.as_ref().map(|_| ()).map_err(ToString::to_string));
@@ -99,8 +99,8 @@ struct Session<'a> {
     config: &'a Config,
     source: &'a SourceMap,
     setup: Setup,
-    /// Steps that took the mesh near the first design.
-    approach: Vec<RoundEvent>,
+    /// Continuation steps that took the mesh near the first design.
+    continuation: Vec<RoundEvent>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
@@ -148,7 +148,7 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        self.approach.iter().for_each(|event| observer.round(event));
+        self.continuation.iter().for_each(|event| observer.round(event));
         let problem = &mut self.setup.problem;
         let optimised = driver::optimise(
             problem,
@@ -176,7 +176,7 @@ impl Session<'_> {
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            rounds: self.approach.iter().chain(&optimised.rounds).cloned().collect(),
+            rounds: self.continuation.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
             ..self.result(
                 optimised.stop_reason,
@@ -187,11 +187,11 @@ impl Session<'_> {
                 observer,
             )?
         };
-        let shapes = Shapes::of(config, &self.setup, &best.values)?;
+        let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.verified(result, &shapes, observer)
+        self.verify_on_fresh_mesh(result, &shapes, observer)
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
@@ -226,7 +226,7 @@ impl Session<'_> {
             && self.directory.holds_configuration()
         {
             let command = resume_command(self.directory.path());
-            observer.warning(&format!("what was computed is kept: go on with `{command}`"));
+            observer.warning(&format!("what was computed is kept: resume with `{command}`"));
         }
         let result = outcome?;
         completed?;
@@ -243,10 +243,10 @@ impl Session<'_> {
     ///
     /// # Errors
     /// When the result cannot be written.
-    fn verified(
+    fn verify_on_fresh_mesh(
         &mut self,
         mut result: RunResult,
-        shapes: &Shapes,
+        shapes: &ShapePair,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
@@ -256,11 +256,11 @@ impl Session<'_> {
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
-        let gain = Gain { config, source, stop_reason: result.stop_reason, shapes, memory };
+        let check = MeshIndependence { config, source, stop_reason: result.stop_reason, shapes, memory };
         if let Some(objective) = &mut result.objective
-            && gain.verify(objective, self.interrupted, observer) == Check::CutShort
+            && check.verify(objective, self.interrupted, observer) == Check::CutShort
         {
-            // It can be made up for: the search is whole, the run is not.
+            // `resume` can do it later: the search is complete, the run is not.
             result.status = RunStatus::Interrupted;
         }
         let seconds = clock.elapsed().as_secs_f64();

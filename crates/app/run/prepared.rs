@@ -8,7 +8,7 @@ use fluxmorph_geometry::parallel::RankGroup;
 use super::{Options, Session, mesh_hash};
 use crate::build::locate_error::attribute_error;
 use crate::build::memory_limit;
-use crate::build::{Purpose, Setup, set_up_watched};
+use crate::build::{Mode, Setup, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{LimitsInForce, Manifest, RunDirectory, surface_files};
@@ -20,8 +20,8 @@ use fluxmorph_optimizer::problem::RoundEvent;
 /// A problem that is set up, and what its set-up was given.
 pub(super) struct Prepared<'a> {
     pub(super) setup: Setup,
-    /// Steps that took the mesh near the first design.
-    pub(super) approach: Vec<RoundEvent>,
+    /// Continuation steps that took the mesh near the first design.
+    pub(super) continuation: Vec<RoundEvent>,
     config: &'a Config,
     source: &'a SourceMap,
     options: Options<'a>,
@@ -33,26 +33,26 @@ impl<'a> Prepared<'a> {
     pub(super) fn new(
         config: &'a Config,
         source: &'a SourceMap,
-        purpose: Purpose,
+        mode: Mode,
         options: Options<'a>,
         observer: &mut dyn RunObserver,
     ) -> Result<Self, Error> {
         let clock = Instant::now();
         observer.phase("setting up mesh and matrices");
         let stages = &mut |stage| observer.stage(stage);
-        let setup = set_up_watched(config, source, purpose, options.team, stages)?;
-        memory_limit::check_problem(of_evaluation(&setup.problem), source, options.older_run)?;
-        OptimizerError::unless(options.interrupted)?;
-        Ok(Self { setup, approach: Vec::new(), config, source, options, clock })
+        let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
+        memory_limit::check_problem(of_evaluation(&setup.problem), source, options.overwrite_policy)?;
+        OptimizerError::check_interrupted(options.interrupted)?;
+        Ok(Self { setup, continuation: Vec::new(), config, source, options, clock })
     }
 
     /// Takes the mesh near the initial design. One that it cannot reach is a fault of the configuration, and is refused
     /// before an earlier run is replaced.
-    pub(super) fn approach_initial(mut self) -> Result<Self, Error> {
+    pub(super) fn continue_to_initial(mut self) -> Result<Self, Error> {
         let problem = &mut self.setup.problem;
         let initial = problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-        let approach = problem.continue_to(&initial, self.options.interrupted);
-        self.approach = approach.map_err(|error| match error {
+        let continuation = problem.continue_to(&initial, self.options.interrupted);
+        self.continuation = continuation.map_err(|error| match error {
             OptimizerError::DesignUnreached { .. } => attribute_error(error.into(), self.config, self.source),
             other => other.into(),
         })?;
@@ -66,10 +66,11 @@ impl<'a> Prepared<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<Session<'a>, Error> {
         let Self { config, source, options, .. } = self;
-        let directory = RunDirectory::create(options.disk, &config.output.directory, options.older_run)?;
-        let mut manifest = Manifest::started(command, options.threads).reading(source);
+        let directory =
+            RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
+        let mut manifest = Manifest::new(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &self.setup.full_mesh));
-        manifest.ranks = options.team.map(RankGroup::size);
+        manifest.ranks = options.ranks.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));
         manifest.write(&directory)?;
@@ -85,14 +86,14 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, approach, config, source, options, clock } = self;
+        let Self { setup, continuation, config, source, options, clock } = self;
         let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
         Session {
             command,
             config,
             source,
             setup,
-            approach,
+            continuation,
             directory,
             manifest,
             clock,

@@ -8,7 +8,7 @@ use fluxmorph_geometry::parallel::RankGroup;
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
 use super::{Options, Session};
-use crate::build::Purpose;
+use crate::build::Mode;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{
@@ -24,8 +24,8 @@ const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
 
 /// Limits in place of those that the run was started with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Limits {
-    /// Most evaluations, those of before counted in.
+pub struct RunLimits {
+    /// Most evaluations, including those before.
     pub max_evaluations: Option<usize>,
     /// Longest time from now [s].
     pub max_time: Option<f64>,
@@ -74,7 +74,7 @@ impl SavedRun {
 /// Afterwards as [`super::run`].
 pub fn resume(
     saved: SavedRun,
-    limits: Limits,
+    limits: RunLimits,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
@@ -82,12 +82,12 @@ pub fn resume(
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
     config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
     config.optimizer.max_time = limits.max_time.or(in_force.max_time_s);
-    if let Some(result) = ended(&directory, &manifest, config.optimizer.max_evaluations) {
+    if let Some(result) = finished_result(&directory, &manifest, config.optimizer.max_evaluations) {
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(result);
     }
-    let prepared = Prepared::new(&config, &source, Purpose::Optimisation, options, observer)
-        .and_then(Prepared::approach_initial)
+    let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer)
+        .and_then(Prepared::continue_to_initial)
         .map_err(|error| match error {
             Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
             other => other,
@@ -111,11 +111,15 @@ pub fn resume(
 }
 
 impl Session<'_> {
-    /// Adds a resumption behind so many evaluations to the manifest, which is not written yet.
+    /// Adds a resumption after so many evaluations to the manifest, which is not written yet.
     fn note_resumption(&mut self, evaluations: usize, options: Options<'_>) {
         let Self { manifest, config, .. } = self;
-        manifest.ranks = manifest.ranks.max(options.team.map(RankGroup::size));
-        manifest.resumed(Resumption::now(evaluations, LimitsInForce::of(&config.optimizer), options.threads));
+        manifest.ranks = manifest.ranks.max(options.ranks.map(RankGroup::size));
+        manifest.add_resumption(Resumption::now(
+            evaluations,
+            LimitsInForce::of(&config.optimizer),
+            options.threads,
+        ));
         for file in surface_files(&config.output.stl) {
             if !manifest.surfaces.contains(&file) {
                 manifest.surfaces.push(file);
@@ -141,7 +145,7 @@ pub(crate) fn configuration(
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
             let cause = match Journal::read(directory) {
                 Ok(None) => {
-                    "it was broken off before its configuration was saved, and nothing is lost: start it again with --force"
+                    "it was interrupted before its configuration was saved, and nothing is lost: start it again with --force"
                 }
                 _ => {
                     "its config.toml is gone: restore it from the file that manifest.json names, and its evaluations are kept"
@@ -160,16 +164,20 @@ pub(crate) fn configuration(
 }
 
 /// The result of a run that has ended and would end in the same way again.
-fn ended(directory: &RunDirectory, manifest: &Manifest, max_evaluations: usize) -> Option<RunResult> {
+fn finished_result(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+    max_evaluations: usize,
+) -> Option<RunResult> {
     let bytes = directory.disk().read(&directory.result(), LARGEST[1]).ok()?;
     let result: RunResult = serde_json::from_slice(&bytes).ok()?;
-    let may_go_on = match result.stop_reason {
+    let may_continue = match result.stop_reason {
         StopReason::MaxEvaluations => max_evaluations > result.evaluations,
         StopReason::MaxTime => true,
         _ => false,
     };
     let has_ended = matches!(manifest.status, RunStatus::Converged | RunStatus::Stopped);
-    (has_ended && !may_go_on).then_some(result)
+    (has_ended && !may_continue).then_some(result)
 }
 
 /// Why there is nothing to resume, and what can be done.
@@ -177,7 +185,7 @@ fn advice(result: &RunResult) -> String {
     let reason = result.stop_reason.describe();
     match result.stop_reason {
         StopReason::MaxEvaluations => {
-            format!("{reason}; go on with --max-evaluations above {}", result.evaluations)
+            format!("{reason}; resume with --max-evaluations above {}", result.evaluations)
         }
         _ => reason.to_owned(),
     }
@@ -195,24 +203,24 @@ fn journal(
         return Err(Error::OtherRun { path, cause });
     }
     let (count, file) = (contents.records.len(), path.display());
-    let behind = match count.checked_sub(1) {
-        Some(last) => format!("behind evaluation {last}"),
+    let position = match count.checked_sub(1) {
+        Some(last) => format!("after evaluation {last}"),
         None => "before the first evaluation".to_owned(),
     };
     match contents.rest {
         Rest::Nothing => {}
         Rest::Torn(bytes) => observer.warning(&format!(
-            "`{file}`: {bytes} bytes {behind} are no whole record, as after a loss of power; they are dropped"
+            "`{file}`: {bytes} bytes {position} are an incomplete record, as after a loss of power; they are dropped"
         )),
         Rest::Damaged(bytes) => {
             Journal::keep_damaged(directory)?;
             observer.warning(&format!(
-                "`{file}` is damaged {behind}: what follows, {bytes} bytes, cannot be trusted and is computed again; the \
+                "`{file}` is damaged {position}: what follows, {bytes} bytes, cannot be trusted and is computed again; the \
                  file is kept as `{}`",
                 directory.damaged_journal().display()
             ));
         }
     }
-    observer.note(&format!("going on behind {} evaluations of the journal", contents.records.len()));
+    observer.note(&format!("resuming after {} evaluations of the journal", contents.records.len()));
     Ok(Some(contents))
 }

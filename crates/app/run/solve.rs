@@ -4,7 +4,7 @@ use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
 use super::summary::{constraints, terms};
 use super::{Options, Session};
-use crate::build::Purpose;
+use crate::build::Mode;
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
 use crate::files::exports;
@@ -25,17 +25,17 @@ pub fn solve(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
-    let mut prepared = Prepared::new(config, source, Purpose::Analysis, options, observer)?;
+    let mut prepared = Prepared::new(config, source, Mode::Analysis, options, observer)?;
     let values = design_values(&prepared.setup.problem, design, observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
     let problem = &mut prepared.setup.problem;
-    prepared.approach = problem.continue_to(p, options.interrupted)?;
+    prepared.continuation = problem.continue_to(p, options.interrupted)?;
     let moved = problem.moved(p)?;
     let session = prepared.begin("solve", observer)?;
     session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
-        session.approach.iter().for_each(|event| observer.round(event));
+        session.continuation.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut |stage| observer.stage(stage));
         let analysis = problem.analyse(moved, p, Derivatives::First, cache, stages)?;
@@ -53,7 +53,7 @@ fn design_values(
     let values = given.unwrap_or_else(|| shape.initial().to_vec());
     let outside = |k: usize| values[k] < shape.lower()[k] || values[k] > shape.upper()[k];
     if let Some(k) = (0..values.len()).find(|&k| outside(k)) {
-        observer.warning(&format!("design variable {k} = {} mm lies outside its bounds", values[k] * 1e3));
+        observer.warning(&format!("design variable {k} = {} mm is outside its bounds", values[k] * 1e3));
     }
     Some(values)
 }
@@ -91,7 +91,7 @@ impl Session<'_> {
                 terms: terms(problem, analysis),
             }),
             constraints: constraints(problem, analysis, &bounds),
-            rounds: self.approach.clone(),
+            rounds: self.continuation.clone(),
             ..self.result(reason, analysis, values, initial_quality, timings, observer)?
         })
     }

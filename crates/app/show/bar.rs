@@ -1,4 +1,4 @@
-//! A bar on a terminal: the last line shows where the work is, finished evaluations stand above it.
+//! A bar on a terminal: the last line shows where the work is, finished evaluations are above it.
 //!
 //! The only module that names indicatif. There is one terminal, so there is one bar: [`clear`] removes it from any thread,
 //! for messages of signals and panics.
@@ -21,13 +21,13 @@ const TICK: Duration = Duration::from_millis(200);
 /// A part of the work and its time.
 const WORK: &str = "{spinner} {wide_msg} {elapsed}";
 
-/// The same within a run, behind what is known from its last evaluation.
+/// The same within a run, after what is known from its last evaluation.
 const RUN: &str = "{spinner} {pos}/{len} [{bar:10}] {prefix}  {wide_msg} {elapsed}";
 
 /// The bar on the terminal.
 static SHOWN: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Takes the bar off the terminal, for good. Whoever shows it goes on in plain lines.
+/// Removes the bar from the terminal for good; its owner continues in plain lines.
 pub fn clear() {
     // Never waits: the thread that holds it may be the one that panics.
     let Ok(mut shown) = SHOWN.try_lock() else { return };

@@ -44,7 +44,7 @@ type Row = (&'static str, String);
 pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<String> {
     let is_run = result.command != "solve";
     let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
-    rows.extend(result.constraints.iter().map(|constraint| kept(constraint, styles)));
+    rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, styles)));
     for (frequency, losses) in states(result) {
         let at = if result.states.len() > 1 { format!(" at {frequency} Hz") } else { String::new() };
         rows.extend(losses.iter().map(|(region, loss)| ("loss", format!("{loss:.6e} W in {region}{at}"))));
@@ -101,7 +101,7 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows
 }
 
-fn kept(constraint: &ConstraintResult, styles: &Styles) -> Row {
+fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
     let ConstraintResult { name, value, bound, satisfied } = constraint;
     let verdict = if *satisfied { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
     ("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"))

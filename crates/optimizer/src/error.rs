@@ -25,7 +25,7 @@ pub enum Error {
         /// Why.
         cause: Box<SolverError>,
     },
-    /// Something computed that is no number to go on with.
+    /// A computed quantity is not finite, or not what the computation needs.
     #[error("{what} is {value:e}: {expected}")]
     NotFinite {
         /// What, of which state, region, term or variable.
@@ -41,7 +41,7 @@ pub enum Error {
     /// A geometric constraint has no meaning for the shape.
     #[error(transparent)]
     Geometric(#[from] GeometricError),
-    /// A shape cannot be taken over by another mesh.
+    /// A shape cannot be transferred to another mesh.
     #[error(transparent)]
     SurfaceMismatch(#[from] SurfaceMismatch),
     /// The optimisation method refuses or fails.
@@ -78,10 +78,10 @@ pub enum Error {
         /// What is needed, and what to do.
         expected: &'static str,
     },
-    /// The run takes another way than its journal says.
+    /// The run does not repeat what its journal says.
     #[error(
-        "evaluation {evaluation} of the journal does not answer what the optimisation asks for: {cause}; go on with the \
-         program and on the processor that the run was started with, or start it again"
+        "evaluation {evaluation} of the journal does not answer what the optimisation asks for: {cause}; resume with \
+         the program and on the processor that started the run, or start it again"
     )]
     Replay {
         /// The evaluation.
@@ -101,11 +101,11 @@ pub enum Error {
 }
 
 impl Error {
-    /// Nothing, unless `interrupted` says that a signal came.
+    /// Fails once `interrupted` says that a signal came.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub fn unless(interrupted: &dyn Fn() -> bool) -> Result<(), Self> {
+    pub fn check_interrupted(interrupted: &dyn Fn() -> bool) -> Result<(), Self> {
         if interrupted() { Err(Self::Interrupted) } else { Ok(()) }
     }
 

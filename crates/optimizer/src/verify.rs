@@ -130,7 +130,7 @@ pub fn certify(
     interrupted: &dyn Fn() -> bool,
     mut progress: impl FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
-    Error::unless(interrupted)?;
+    Error::check_interrupted(interrupted)?;
     let mut cache = SolverCache::default();
     let base = problem.evaluate(p, Derivatives::First, &mut cache, &mut NoProgress)?;
     let span = span(problem);
@@ -140,7 +140,7 @@ pub fn certify(
         if let Some(values) = known.borrow().get(&key) {
             return Ok(values[index]);
         }
-        Error::unless(interrupted)?;
+        Error::check_interrupted(interrupted)?;
         let cache = &mut cache.without_initial_guess();
         let values = numbers(&problem.evaluate(p, Derivatives::None, cache, &mut NoProgress)?);
         let value = values[index];

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Config;
 use fluxmorph_optimizer::problem::Problem;
 
@@ -20,7 +20,7 @@ fn problem(objective: &str, constraints: &str, frequency: &str, overrides: &[&st
     write!(file, "{start}[objective]\n{objective}\n{constraints}\n[design]{end}").expect("written");
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let (config, source) = Config::from_file(file.path(), &overrides).unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}")).problem
+    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}")).problem
 }
 
 /// The certificates of the objective and of every constraint, on a design that is flat nowhere.

@@ -1,6 +1,6 @@
 //! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
 
-use fluxmorph::build::{Purpose, Setup, set_up};
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph_optimizer::verify::{Settings, certify};
 
 use super::{MESHED, check, wavy};
@@ -197,7 +197,7 @@ fn conditions_on_planes_and_faces_that_cannot_hold_are_refused() {
         (r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#, "share the face"),
     ] {
         let (config, source) = parsed(&changed(APPLIED, &[(from, to)]));
-        let error = set_up(&config, &source, Purpose::Optimisation).err().expect(says).to_string();
+        let error = set_up(&config, &source, Mode::Optimisation).err().expect(says).to_string();
         assert!(error.contains(says), "{error}");
     }
 }

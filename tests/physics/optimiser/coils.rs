@@ -1,6 +1,6 @@
 //! From the tables of sources to the field model, and what is refused on the way.
 
-use fluxmorph::build::{Purpose, Setup, set_up};
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::Config;
 use fluxmorph_solver::coil::CoilShape;
 
@@ -23,7 +23,7 @@ terminals = ["y_min", "y_max"]
 
 fn prepared(text: &str) -> Result<Setup, String> {
     let (config, source) = Config::from_str(text, "coils.toml").unwrap_or_else(|error| panic!("{error}"));
-    set_up(&config, &source, Purpose::Analysis).map_err(|error| error.to_string())
+    set_up(&config, &source, Mode::Analysis).map_err(|error| error.to_string())
 }
 
 fn refused(text: &str) -> String {

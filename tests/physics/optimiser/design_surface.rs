@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxmorph::build::{Purpose, set_up, variable_count};
+use fluxmorph::build::{Mode, set_up, variable_count};
 use fluxmorph::config::{Config, SourceMap};
 
 /// The quick shield with another `[design]` in place of its surface, direction and grid.
@@ -17,7 +17,7 @@ fn designed(design: &str) -> (Config, SourceMap) {
 
 fn refusal(design: &str) -> String {
     let (config, source) = designed(design);
-    set_up(&config, &source, Purpose::Optimisation)
+    set_up(&config, &source, Mode::Optimisation)
         .err()
         .unwrap_or_else(|| panic!("accepted: {design}"))
         .to_string()
@@ -55,7 +55,7 @@ fn what_a_surface_cannot_carry_is_refused_at_its_key() {
 fn motion_along_the_design_needs_one_axis() {
     let (mut config, source) = designed("surface = \"plate_bottom\"\ndirection = \"normal\"");
     config.remesh.as_mut().unwrap().motion = fluxmorph::config::Motion::AlongDesign;
-    let message = set_up(&config, &source, Purpose::Optimisation).unwrap_err().to_string();
+    let message = set_up(&config, &source, Mode::Optimisation).unwrap_err().to_string();
     assert!(message.contains("does not move along a coordinate axis"), "{message}");
 }
 
@@ -63,7 +63,7 @@ fn motion_along_the_design_needs_one_axis() {
 fn a_surface_between_two_airs_has_no_body() {
     let (mut config, source) = designed("surface = \"plate_bottom\"\ndirection = \"normal\"");
     config.regions.clear();
-    let message = set_up(&config, &source, Purpose::Optimisation).unwrap_err().to_string();
+    let message = set_up(&config, &source, Mode::Optimisation).unwrap_err().to_string();
     assert!(message.contains("which side of `plate_bottom` is the body"), "{message}");
 }
 
@@ -79,7 +79,7 @@ fn the_number_of_variables_is_known_before_the_problem_is_made() {
     ] {
         let (config, source) = designed(&design);
         let count = variable_count(&config, &source).unwrap();
-        let problem = set_up(&config, &source, Purpose::Optimisation).unwrap().problem;
+        let problem = set_up(&config, &source, Mode::Optimisation).unwrap().problem;
         assert_eq!(count, problem.shape().unwrap().surface().variable_count(), "{design}");
         assert!(expected.is_none_or(|expected| expected == count), "{design}: {count}");
     }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Algorithm, Config, Optimizer};
 use fluxmorph::files::StopReason;
 use fluxmorph::show::{Evaluation, Observer, Silent};
@@ -15,7 +15,7 @@ use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 fn quick() -> (Problem, Optimizer) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let (config, source) = Config::from_file(&path, &[]).unwrap();
-    (set_up(&config, &source, Purpose::Optimisation).unwrap().problem, config.optimizer)
+    (set_up(&config, &source, Mode::Optimisation).unwrap().problem, config.optimizer)
 }
 
 #[derive(Default)]
@@ -55,11 +55,11 @@ fn every_algorithm_improves_the_shield_within_its_bounds() {
     }
 }
 
-/// Rounds and remedies told.
+/// The round events of a run.
 #[derive(Default)]
-struct Told(Vec<RoundEvent>);
+struct Events(Vec<RoundEvent>);
 
-impl Observer for Told {
+impl Observer for Events {
     fn round(&mut self, event: &RoundEvent) {
         self.0.push(event.clone());
     }
@@ -91,11 +91,11 @@ fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
     // Half of the way that the free run took.
     shape(&mut problem).limits.inversion_share = 0.5 / used;
     let settings = Optimizer { max_evaluations: 60, ..settings };
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &settings, &mut told);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &settings, &mut events);
     check_rows(&optimised, &rows, 0.0);
-    println!("{:?}", told.0.iter().map(RoundEvent::describe).collect::<Vec<_>>());
-    let rounds: Vec<_> = told.0.iter().filter(|event| event.kind == RoundKind::Round).collect();
+    println!("{:?}", events.0.iter().map(RoundEvent::describe).collect::<Vec<_>>());
+    let rounds: Vec<_> = events.0.iter().filter(|event| event.kind == RoundKind::Round).collect();
     assert!(!rounds.is_empty());
     for round in rounds {
         let start = rows.iter().find(|row| row.round == round.round).unwrap();
@@ -125,27 +125,27 @@ fn a_quality_that_stops_the_search_is_never_passed() {
     let (mut problem, settings) = quick();
     // The free run falls to 0.094.
     shape(&mut problem).limits.least_quality = 0.15;
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
-    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), events.0);
     check_rows(&optimised, &rows, 0.15);
-    assert!(!told.0.is_empty() && told.0[0].cause.contains("below the minimum"), "{:?}", told.0);
+    assert!(!events.0.is_empty() && events.0[0].cause.contains("below the minimum"), "{:?}", events.0);
     assert!(rows[optimised.best.evaluation].ratio < 0.9, "what was reached is kept");
 }
 
 #[test]
-fn without_rounds_the_box_shrinks_and_the_reference_stays() {
+fn without_rounds_the_trust_region_shrinks_and_the_reference_stays() {
     let (mut problem, settings) = quick();
     shape(&mut problem).limits.least_quality = 0.15;
     shape(&mut problem).limits.rounds = 0;
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut told);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
     check_rows(&optimised, &rows, 0.15);
-    assert!(!told.0.is_empty());
+    assert!(!events.0.is_empty());
     assert!(
-        told.0.iter().all(|event| event.kind == RoundKind::SmallerSteps && event.round == 0),
+        events.0.iter().all(|event| event.kind == RoundKind::SmallerSteps && event.round == 0),
         "{:?}",
-        told.0
+        events.0
     );
     assert!(rows[optimised.best.evaluation].ratio < 0.9);
 }
@@ -157,14 +157,14 @@ fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
     // A millionth below the initial quality: the first real step is refused, and every smaller one of note too.
     let least = initial * (1.0 - 1e-6);
     shape(&mut problem).limits.least_quality = least;
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut told);
-    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), told.0);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut events);
+    println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), events.0);
     check_rows(&optimised, &rows, least);
     assert_eq!(optimised.stop_reason, StopReason::MeshLimit, "{} rows", rows.len());
-    // The box halves three times, and no remedy makes a step possible.
-    assert!(told.0.iter().all(|event| event.kind == RoundKind::SmallerSteps), "{:?}", told.0);
-    assert_eq!(told.0.len(), 3);
+    // The trust region halves three times, and no fallback makes a step possible.
+    assert!(events.0.iter().all(|event| event.kind == RoundKind::SmallerSteps), "{:?}", events.0);
+    assert_eq!(events.0.len(), 3);
 }
 
 #[test]
@@ -172,11 +172,11 @@ fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are
     let (mut problem, settings) = quick();
     let n = shape(&mut problem).surface().variable_count();
     shape(&mut problem).set_bounds([vec![-9e-3; n], vec![35e-3; n]]);
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 150, ..settings }, &mut told);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 150, ..settings }, &mut events);
     let least = shape(&mut problem).limits.least_quality;
     check_rows(&optimised, &rows, least);
-    for event in &told.0 {
+    for event in &events.0 {
         println!("{}", event.describe());
     }
     println!(
@@ -186,7 +186,7 @@ fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are
         rows[optimised.best.evaluation].ratio
     );
     let other_mesh = [RoundKind::Smoothing, RoundKind::Guided];
-    let changes: Vec<_> = told.0.iter().filter(|event| other_mesh.contains(&event.kind)).collect();
+    let changes: Vec<_> = events.0.iter().filter(|event| other_mesh.contains(&event.kind)).collect();
     assert!(!changes.is_empty());
     for change in changes {
         let [before, after] = change.admitted.unwrap();
@@ -198,13 +198,17 @@ fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are
 }
 
 #[test]
-fn a_first_design_far_away_is_approached_in_steps() {
+fn the_mesh_is_continued_to_a_first_design_far_away() {
     let (mut problem, settings) = quick();
     let far = shape(&mut problem).upper().to_vec();
     shape(&mut problem).set_initial(far);
     shape(&mut problem).limits.inversion_share = 0.1;
-    let mut told = Told::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut told);
+    let mut events = Events::default();
+    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut events);
     check_rows(&optimised, &rows, 0.0);
-    assert!(told.0.len() > 1 && told.0.iter().all(|event| event.kind == RoundKind::Approach), "{:?}", told.0);
+    assert!(
+        events.0.len() > 1 && events.0.iter().all(|event| event.kind == RoundKind::Continuation),
+        "{:?}",
+        events.0
+    );
 }

@@ -1,6 +1,6 @@
 //! What is not finite is refused by name, before an optimiser sees it.
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::problem::finite;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
@@ -15,7 +15,7 @@ fn quick() -> (Problem, Analysis) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let (config, source) =
         fluxmorph::config::Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let problem = set_up(&config, &source, Purpose::Optimisation).expect("a sound case").problem;
+    let problem = set_up(&config, &source, Mode::Optimisation).expect("a sound case").problem;
     let p = problem.shape().expect("a shape").initial().to_vec();
     let analysis = problem
         .evaluate(&p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
@@ -33,7 +33,9 @@ fn an_evaluation_with_a_number_that_is_none_is_refused_by_name() {
     damaged.objective = Some(1.0);
     let gradient = damaged.gradient.as_mut().expect("it was asked for");
     gradient[5] = f64::NAN;
-    assert!(named(finite::analysis(&damaged, &[])).contains("objective by design variable 5 is NaN"));
+    assert!(
+        named(finite::analysis(&damaged, &[])).contains("objective with respect to design variable 5 is NaN")
+    );
     // Finite, but not its square: the norm in the history would be infinite.
     damaged.gradient.as_mut().expect("it was asked for")[5] = 1e200;
     assert!(named(finite::analysis(&damaged, &[])).contains("squared gradient norm of the objective is inf"));
@@ -42,7 +44,10 @@ fn an_evaluation_with_a_number_that_is_none_is_refused_by_name() {
     assert!(named(finite::analysis(&damaged, &[])).contains("quality of element"));
     let mut nodal = vec![[0.0; 3]; 9];
     nodal[7][2] = f64::NEG_INFINITY;
-    assert!(named(finite::sensitivity("the objective", &nodal)).contains("by the place of node 7 is -inf"));
+    assert!(
+        named(finite::sensitivity("the objective", &nodal))
+            .contains("with respect to the position of node 7 is -inf")
+    );
 }
 
 /// The share of an evaluation that the checks take; docs/robustness.md has the number.

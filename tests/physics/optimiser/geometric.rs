@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use fluxmorph::build::{Purpose, Setup, set_up};
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::Config;
-use fluxmorph_optimizer::geometric::{Bound, MARGIN, ThicknessBound, Volume};
+use fluxmorph_optimizer::geometric::{MARGIN, ThicknessBound, ThicknessLimit, Volume};
 use fluxmorph_optimizer::problem::Problem;
 
 fn shield(overrides: &[&str]) -> Setup {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let (config, source) = Config::from_file(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Purpose::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A design inside the bounds that is flat nowhere.
@@ -92,9 +92,10 @@ fn the_bound_is_conservative_by_no_more_than_its_margin() {
     let p = wavy(&setup.problem);
     let (least, most) =
         shape.thickness().expect("a plate has one").range(&shape.surface().normal_displacements(&p));
-    for (bound, excess, limit) in
-        [(Bound::Minimum(0.012), 0.012 - least, 0.012), (Bound::Maximum(0.014), most - 0.014, 0.014)]
-    {
+    for (bound, excess, limit) in [
+        (ThicknessLimit::Minimum(0.012), 0.012 - least, 0.012),
+        (ThicknessLimit::Maximum(0.014), most - 0.014, 0.014),
+    ] {
         let (value, _) = ThicknessBound::new(shape, bound).expect("a thickness").evaluate(shape, &p);
         assert!(excess <= value && value <= excess + MARGIN * limit, "{bound:?}: {excess} {value}");
     }
@@ -104,7 +105,7 @@ fn the_bound_is_conservative_by_no_more_than_its_margin() {
 fn a_uniform_plate_meets_its_limit_by_the_margin() {
     let setup = shield(&[]);
     let shape = setup.problem.shape().expect("a shape");
-    let bound = ThicknessBound::new(shape, Bound::Minimum(0.008)).expect("a thickness");
+    let bound = ThicknessBound::new(shape, ThicknessLimit::Minimum(0.008)).expect("a thickness");
     let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface().variable_count()]);
     // 8 mm − 10 mm, and all nodes count alike: the whole margin of 0.08 mm.
     assert!((value + 0.002 - 0.00008).abs() < 1e-12, "{value}");
@@ -116,7 +117,7 @@ fn a_uniform_plate_meets_its_limit_by_the_margin() {
 fn the_gradient_holds() {
     let setup = shield(&[]);
     let shape = setup.problem.shape().expect("a shape");
-    for bound in [Bound::Minimum(0.012), Bound::Maximum(0.014)] {
+    for bound in [ThicknessLimit::Minimum(0.012), ThicknessLimit::Maximum(0.014)] {
         let bound = ThicknessBound::new(shape, bound).expect("a thickness");
         // Well below 1/ρ, about 0.03 mm, where the function is smooth.
         taylor(|p| bound.evaluate(shape, p), &wavy(&setup.problem), 2e-6);

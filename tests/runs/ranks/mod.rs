@@ -1,13 +1,13 @@
 //! Work that is shared out among ranks has the results of one process. The ranks are threads here; `tests/mpi` has them as
 //! processes of MPI with PETSc.
 
+mod group;
 mod runs;
-mod team;
 
 use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_remesh::StiffnessPolicy;
 use fluxmorph_solver::Order;
-use team::led;
+use group::led;
 
 use crate::support::{self, relative_difference};
 

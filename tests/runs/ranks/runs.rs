@@ -4,9 +4,9 @@ use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph::build::Purpose;
-use fluxmorph::files::{OlderRun, RunResult, StopReason, system_disk};
-use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::build::Mode;
+use fluxmorph::files::{OverwritePolicy, RunResult, StopReason, system_disk};
+use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::Silent;
 use fluxmorph::show::report::ReportedRun;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
@@ -32,14 +32,14 @@ enum Task {
     Resume,
 }
 
-/// A run into a directory on so many ranks; 0 for one process without a team.
+/// A run into a directory on so many ranks; 0 for one process without ranks.
 fn run(directory: &Path, size: usize, task: Task) -> RunResult {
     let disk = system_disk();
-    let lead = |team: Option<&RankGroup>| {
+    let lead = |group: Option<&RankGroup>| {
         let (mut config, source) = support::config(CONFIG, &SETTINGS);
         config.output.directory = directory.to_owned();
-        if let Some(team) = team.filter(|team| team.role() == Role::Worker) {
-            run::serve(team, &config, &source, Purpose::Optimisation);
+        if let Some(group) = group.filter(|group| group.role() == Role::Worker) {
+            run::serve(group, &config, &source, Mode::Optimisation);
             return None;
         }
         let asked = Cell::new(0);
@@ -47,17 +47,22 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
             asked.set(asked.get() + 1);
             matches!(task, Task::BreakOff(most) if asked.get() > most)
         };
-        let options =
-            Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team, interrupted: &interrupted };
+        let options = Options {
+            disk: &disk,
+            overwrite_policy: OverwritePolicy::Keep,
+            threads: 1,
+            ranks: group,
+            interrupted: &interrupted,
+        };
         let result = match task {
             Task::Resume => {
                 let saved = SavedRun::open(&disk, directory).expect("there is a run");
-                run::resume(saved, Limits::default(), options, &mut Silent)
+                run::resume(saved, RunLimits::default(), options, &mut Silent)
             }
             _ => run::run(&config, &source, options, &mut Silent),
         };
-        if let Some(team) = team {
-            team.shut_down();
+        if let Some(group) = group {
+            group.shut_down();
         }
         Some(result.unwrap_or_else(|error| panic!("{error}")))
     };

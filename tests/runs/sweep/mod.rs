@@ -4,7 +4,7 @@
 //! begins, after kills and signals; `array` the script for a scheduler; `outcome` the table, the page and the exit codes.
 
 mod array;
-mod going_on;
 mod home;
 mod order;
 mod outcome;
+mod resuming;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::{LimitArgs, key_value, threads, whole_number};
-use crate::files::OlderRun;
-use crate::run::Limits;
+use crate::files::OverwritePolicy;
+use crate::run::RunLimits;
 use crate::run::sweep::{Outside, Request};
 
 /// Options of `sweep`.
@@ -23,7 +23,7 @@ pub struct SweepArgs {
     #[arg(long = "set", value_name = "KEY=VALUE,…", value_parser = key_value)]
     pub set: Vec<String>,
 
-    /// Directory of the sweep [default: the configuration's output.directory with _sweep behind it]
+    /// Directory of the sweep [default: the configuration's output.directory with _sweep appended]
     #[arg(long, value_name = "DIR", alias = "output")]
     pub out: Option<PathBuf>,
 
@@ -63,11 +63,11 @@ pub struct SweepArgs {
     #[arg(long, conflicts_with = "script")]
     pub json: bool,
 
-    /// Let the files that the configuration names lie outside of its folder
+    /// Allow the configuration to name files outside its folder
     #[arg(long)]
     pub allow_outside: bool,
 
-    /// Replace runs in the directory that are none of this sweep; go on where the memory seems too small
+    /// Replace runs in the directory that do not belong to this sweep, and skip the check that the memory is sufficient
     #[arg(long)]
     pub force: bool,
 }
@@ -86,9 +86,12 @@ impl SweepArgs {
             config: &self.config,
             set: &self.set,
             out: self.out.as_deref(),
-            limits: Limits { max_evaluations: self.limits.max_evaluations, max_time: self.limits.max_time },
+            limits: RunLimits {
+                max_evaluations: self.limits.max_evaluations,
+                max_time: self.limits.max_time,
+            },
             outside: if self.allow_outside { Outside::Allowed } else { Outside::Refused },
-            older: if self.force { OlderRun::Replace } else { OlderRun::Keep },
+            overwrite: if self.force { OverwritePolicy::Replace } else { OverwritePolicy::Keep },
         }
     }
 }

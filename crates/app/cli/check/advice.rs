@@ -1,4 +1,4 @@
-//! What a look at the sizes tells before anything is solved: what is allowed, and yet seldom meant.
+//! Advice from the sizes before anything is solved: what is allowed, but rarely intended.
 //!
 //! Does not live here: what is wrong (`setup`), and the audit of skin depths (`fluxmorph_solver::audit`).
 
@@ -7,7 +7,7 @@ use fluxmorph_geometry::tet4::{norm, sub};
 use crate::build::Setup;
 use crate::config::{Coil, CoilShape, Config, ElementOrder, MeshConfig};
 
-/// Worst quality (Eq. 4) below which a mesh from a file is better made again. Generated meshes are layered on purpose, and
+/// Worst quality (Eq. 4) below which a mesh from a file should be regenerated. Generated meshes are layered on purpose, and
 /// move along their layers.
 const POOR: f64 = 0.05;
 
@@ -31,7 +31,7 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
     let worst = setup.problem.quality(setup.problem.original()).worst;
     if is_file && worst < POOR {
         all.push(format!(
-            "the worst element has a quality of {worst:.4}; below {POOR} a mesh from a file is better made again"
+            "the worst element has a quality of {worst:.4}; regenerate a mesh file whose worst quality is below {POOR}"
         ));
     }
     all.extend(config.coils.iter().filter_map(|coil| {
@@ -75,27 +75,27 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::build::{Purpose, set_up};
+    use crate::build::{Mode, set_up};
 
     fn of(configuration: &str, overrides: &[&str]) -> Vec<String> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(configuration);
         let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
         let (config, source) = Config::from_file(&path, &overrides).expect("shipped");
-        let setup = set_up(&config, &source, Purpose::Inspection).expect("sound");
+        let setup = set_up(&config, &source, Mode::Inspection).expect("sound");
         advice(&config, &setup)
     }
 
     #[test]
     fn shipped_devices_are_as_meant_and_sizes_without_units_are_told() {
         assert_eq!(of("shield_quick.toml", &[]), Vec::<String>::new());
-        let told = of("shield_quick.toml", &["design.upper=10", "remesh.rounds=50"]);
-        assert!(told.len() == 1 && told[0].contains("design.upper is 10 m"), "{told:?}");
+        let advice = of("shield_quick.toml", &["design.upper=10", "remesh.rounds=50"]);
+        assert!(advice.len() == 1 && advice[0].contains("design.upper is 10 m"), "{advice:?}");
     }
 
     #[test]
     fn linear_elements_and_poor_ones_of_a_file_are_told() {
-        let told = of("inductor.toml", &["analysis.order=1"]);
-        assert!(told.iter().any(|line| line.contains("analysis.order = 2")), "{told:?}");
+        let advice = of("inductor.toml", &["analysis.order=1"]);
+        assert!(advice.iter().any(|line| line.contains("analysis.order = 2")), "{advice:?}");
         assert!(!of("inductor.toml", &[]).iter().any(|line| line.contains("analysis.order = 2")));
     }
 }

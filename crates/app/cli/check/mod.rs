@@ -32,8 +32,8 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
             Some(bar) => Box::new(bar),
             None => Box::new(Silent),
         };
-        let told = &mut |stage| observer.stage(stage);
-        let summary = summary::summary(&config, &source, work.older_run(), told)?;
+        let progress = &mut |stage| observer.stage(stage);
+        let summary = summary::summary(&config, &source, work.overwrite_policy(), progress)?;
         drop(observer);
         if work.json {
             stdout::print_json(&summary)?;

@@ -1,6 +1,6 @@
 //! What `check` finds: the configuration as it is understood, and what the mesh and the problem are.
 //!
-//! Serialised as it stands by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
+//! Serialised as it is by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
@@ -9,13 +9,13 @@ use serde::Serialize;
 
 use super::advice::advice;
 use crate::build::memory_limit;
-use crate::build::{Purpose, Setup, set_up_watched};
+use crate::build::{Mode, Setup, set_up_watched};
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
 };
 use crate::error::Error;
-use crate::files::OlderRun;
+use crate::files::OverwritePolicy;
 use crate::run::mesh_independence;
 use crate::run::morph::{self, MotionSummary};
 use fluxmorph_optimizer::memory_estimate::of_evaluation;
@@ -127,19 +127,19 @@ fn model_name(model: RegionModel) -> &'static str {
     }
 }
 
-/// Looks at a configuration; `told` hears of every stage as it begins.
+/// Inspects a configuration; every stage is reported to `progress` as it begins.
 ///
 /// # Errors
 /// When the configuration or the mesh is wrong.
 pub(super) fn summary<'a>(
     config: &'a Config,
     source: &SourceMap,
-    older: OlderRun,
+    overwrite: OverwritePolicy,
     progress: &mut dyn Progress,
 ) -> Result<Summary<'a>, Error> {
-    let setup: Setup = set_up_watched(config, source, Purpose::Inspection, None, progress)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, older)?;
-    let motions = morph::inspected(config, source)?;
+    let setup: Setup = set_up_watched(config, source, Mode::Inspection, None, progress)?;
+    memory_limit::check_problem(of_evaluation(&setup.problem), source, overwrite)?;
+    let motions = morph::inspect(config, source)?;
     let mesh = &setup.full_mesh;
     let problem = &setup.problem;
     let skin = setup

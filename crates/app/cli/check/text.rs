@@ -162,7 +162,7 @@ fn region_table(summary: &Summary<'_>) -> Table<5> {
         ("model", Left),
     ]);
     for r in &summary.regions {
-        let volume = rounded(r.volume_m3 * 1e6);
+        let volume = format_number(r.volume_m3 * 1e6);
         table.row([r.name.clone(), r.tets.to_string(), volume, r.material.clone(), r.model.to_owned()]);
     }
     table
@@ -172,7 +172,7 @@ fn surface_table(summary: &Summary<'_>) -> Table<3> {
     let columns = [("surface", Align::Left), ("triangles", Align::Right), ("area cm²", Align::Right)];
     let mut table = Table::new(columns);
     for s in &summary.surfaces {
-        table.row([s.name.clone(), s.triangles.to_string(), rounded(s.area_m2 * 1e4)]);
+        table.row([s.name.clone(), s.triangles.to_string(), format_number(s.area_m2 * 1e4)]);
     }
     table
 }
@@ -266,6 +266,6 @@ fn millimetres(point: [f64; 3]) -> String {
 }
 
 /// Four decimals, and no more digits than a sum of element volumes has.
-fn rounded(value: f64) -> String {
+fn format_number(value: f64) -> String {
     if value.abs() < 1e9 { format!("{value:.4}") } else { format!("{value:.6e}") }
 }

@@ -47,7 +47,7 @@ pub(super) fn header(identity: &Identity) -> (String, String) {
     seal(&Header { fluxmorph_journal: FORM, identity }, "")
 }
 
-/// The line of a header or a record behind a checksum, and its own checksum.
+/// The line of a header or a record after a checksum, and its own checksum.
 pub(super) fn seal(object: &impl Serialize, before: &str) -> (String, String) {
     let mut line = serde_json::to_string(object).expect("numbers and text have a JSON form");
     line.pop();
@@ -116,7 +116,7 @@ fn first_line(bytes: &[u8], longest: usize) -> Option<&[u8]> {
     Some(&bytes[..=end])
 }
 
-/// The checksum of a line, if it is right behind another one.
+/// The checksum of a line, if it is right after another one.
 fn sum_of(line: &[u8], before: &str) -> Option<String> {
     let (body, own) = line.split_at_checked(line.len().checked_sub(TAIL)?)?;
     let sum = checksum(before, body);
@@ -130,7 +130,7 @@ fn longest_record(identity: &Identity) -> usize {
     numbers.saturating_mul(32).saturating_add(1 << 23)
 }
 
-/// What is behind the whole records. One that was cut short is a part of one line, and hardly longer than is usual.
+/// What is after the whole records. One that was cut short is a part of one line, and hardly longer than is usual.
 fn rest(rest: &[u8], usual: Option<usize>) -> Rest {
     let bytes = rest.len() as u64;
     let is_one_line = rest.iter().rev().skip(1).all(|&byte| byte != b'\n');

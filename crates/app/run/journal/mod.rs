@@ -30,13 +30,13 @@ pub struct Contents {
     pub records: Vec<Record>,
     /// Bytes of header and whole records.
     pub length: u64,
-    /// What is behind them.
+    /// What is after them.
     pub rest: Rest,
     /// Checksum that the next record carries on.
     sum: String,
 }
 
-/// What is behind the whole records of a journal.
+/// What is after the whole records of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rest {
     /// Nothing.
@@ -134,11 +134,11 @@ impl Journal {
     pub fn read_records(directory: &RunDirectory) -> Result<Vec<Record>, OutputError> {
         let Some(contents) = Self::read(directory)? else { return Ok(Vec::new()) };
         let Rest::Damaged(bytes) = contents.rest else { return Ok(contents.records) };
-        let message = format!("{bytes} bytes behind {} evaluations are no records", contents.records.len());
+        let message = format!("{bytes} bytes after {} evaluations are not records", contents.records.len());
         Err(OutputError::Damaged { path: directory.journal(), message })
     }
 
-    /// Keeps a copy of a damaged journal beside it, before it is cut behind its whole records.
+    /// Keeps a copy of a damaged journal beside it, before it is cut after its whole records.
     ///
     /// # Errors
     /// When the operating system refuses.
@@ -148,12 +148,12 @@ impl Journal {
         directory.write(&directory.damaged_journal(), &bytes)
     }
 
-    /// A journal to append to behind what was read of it.
+    /// A journal to append to after what was read of it.
     ///
     /// # Errors
     /// [`OutputError::InUse`] when another process writes it, or when the operating system refuses.
     pub fn reopen(directory: &RunDirectory, contents: &Contents) -> Result<Self, OutputError> {
-        let log = directory.reopened(&directory.journal(), contents.length)?;
+        let log = directory.reopen(&directory.journal(), contents.length)?;
         Ok(Self { log, identity: contents.identity.clone(), sum: contents.sum.clone() })
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use fluxmorph_solver::linear::Method;
 
 use super::*;
-use crate::files::{OlderRun, system_disk};
+use crate::files::{OverwritePolicy, system_disk};
 use crate::show::Evaluation;
 use fluxmorph_optimizer::problem::Timings;
 
@@ -84,7 +84,7 @@ impl Written {
         self.ends.iter().filter(|&&end| end <= at).count().checked_sub(1)
     }
 
-    /// Bytes that agree with these before `at` have the whole records before it; returns what is behind them.
+    /// Bytes that agree with these before `at` have the whole records before it; returns what is after them.
     #[track_caller]
     pub(super) fn assert_prefix(&self, bytes: &[u8], at: usize) -> Option<Rest> {
         // Decimal digits are those of one number alone.
@@ -200,7 +200,7 @@ fn a_line_is_json_that_anybody_can_read() {
 #[test]
 fn what_would_not_read_back_is_not_written() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let directory = RunDirectory::create(&system_disk(), folder.path(), OlderRun::Keep).expect("made");
+    let directory = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep).expect("made");
     let mut journal = Journal::create(&directory, identity()).expect("created");
     journal.append(&record(0)).expect("written");
     let changes: [fn(&mut Record); 7] = [

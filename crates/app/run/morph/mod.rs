@@ -12,7 +12,7 @@ mod table;
 mod tune;
 
 pub use report::{CaseReport, CaseResult, Inversion, MorphReport, QualityShares, WorstElement};
-pub use session::{MotionSummary, inspected, morph};
-pub use stepping::{Walk, walk};
+pub use session::{MotionSummary, inspect, morph};
+pub use stepping::{LoadStepping, step_along};
 pub use table::{csv, text};
 pub use tune::{Parameters, TuneReport, TunedRegion};

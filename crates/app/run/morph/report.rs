@@ -6,7 +6,7 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, centroid};
 use serde::Serialize;
 
-use super::{TuneReport, Walk};
+use super::{LoadStepping, TuneReport};
 use crate::build::MotionSetup;
 use crate::config::Paper;
 use crate::error::Error;
@@ -30,7 +30,7 @@ pub struct MorphReport {
     pub quality_of: &'static str,
     /// The cases; one without a name where the configuration has none.
     pub cases: Vec<CaseReport>,
-    /// What the tuner found, if it was asked; the cases are then made with it.
+    /// What the tuner found, if it was run; the cases are then computed with it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tuned: Option<TuneReport>,
     /// Wall time [s].
@@ -44,7 +44,7 @@ pub struct MorphReport {
 pub struct CaseReport {
     /// Name of the case, or the title of the configuration.
     pub name: String,
-    /// Whether the whole motion was made, without an inverted element and not below the least quality.
+    /// Whether the whole motion was reached, without an inverted element and not below the least quality.
     pub valid: bool,
     /// Why the motion could not be computed; without it there is a result.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,7 +55,7 @@ pub struct CaseReport {
     pub tets: usize,
     /// Nodes whose motion is prescribed.
     pub moved_nodes: usize,
-    /// What came out; its keys stand among those of the case.
+    /// The result; its keys are among those of the case.
     #[serde(flatten)]
     pub result: Option<CaseResult>,
     /// Published values.
@@ -78,12 +78,13 @@ pub struct CaseResult {
     pub worst_element: WorstElement,
     /// First inversion along the whole motion in one straight step.
     pub inversion: Inversion,
-    /// Share of the motion that was made.
+    /// Share of the motion that was reached.
     pub reached: f64,
     /// Increments taken.
     pub increments: usize,
-    /// Remedies taken.
-    pub rescues: usize,
+    /// Fallbacks of the mesh motion.
+    #[serde(rename = "rescues")]
+    pub fallbacks: usize,
 }
 
 /// How the quality of the body's elements is distributed.
@@ -127,7 +128,7 @@ pub struct Inversion {
     pub at_m: Option<Point>,
 }
 
-/// Status and reason of motions that were all made.
+/// Status and reason of motions that were all tried.
 ///
 /// A single motion that leaves inverted elements has failed; a sweep has stopped at a limit, since its other rows are worth
 /// having, and so has a motion that goes no further and leaves a valid mesh.
@@ -151,10 +152,10 @@ impl MorphReport {
 }
 
 impl CaseReport {
-    /// A motion that was made.
-    pub fn made(name: &str, setup: &MotionSetup, walk: &Walk, least_quality: f64) -> Self {
-        let result = CaseResult::new(walk);
-        let valid = walk.reached >= 1.0 && walk.inverted == 0 && result.after.worst >= least_quality;
+    /// A motion with its result.
+    pub fn with_result(name: &str, setup: &MotionSetup, motion: &LoadStepping, least_quality: f64) -> Self {
+        let result = CaseResult::new(motion);
+        let valid = motion.reached >= 1.0 && motion.inverted == 0 && result.after.worst >= least_quality;
         Self { valid, result: Some(result), ..Self::of(name, setup) }
     }
 
@@ -179,24 +180,24 @@ impl CaseReport {
 
     /// The same with published values.
     #[must_use]
-    pub fn beside(self, paper: Option<Paper>) -> Self {
+    pub fn with_paper(self, paper: Option<Paper>) -> Self {
         Self { paper, ..self }
     }
 }
 
 impl CaseResult {
     /// Measures a motion.
-    fn new(walk: &Walk) -> Self {
-        let topology = &walk.topology;
+    fn new(motion: &LoadStepping) -> Self {
+        let topology = &motion.topology;
         let quality = |points: &[Point]| {
-            QualityReport::of_points(topology, points, &walk.body).expect("an elastic body has elements")
+            QualityReport::of_points(topology, points, &motion.body).expect("an elastic body has elements")
         };
-        let (before, after) = (quality(&walk.before), quality(&walk.after));
-        let step = walk.inversion.step;
-        let first = walk.inversion.element.map(|e| (e, topology.tet(e)));
+        let (before, after) = (quality(&motion.before), quality(&motion.after));
+        let step = motion.inversion.step;
+        let first = motion.inversion.element.map(|e| (e, topology.tet(e)));
         Self {
-            equations: walk.equations,
-            inverted: walk.inverted,
+            equations: motion.equations,
+            inverted: motion.inverted,
             worst_element: WorstElement {
                 element: after.worst_element.0,
                 region: topology.region_name_at(after.worst_element).to_owned(),
@@ -206,13 +207,13 @@ impl CaseResult {
                 step: step.is_finite().then_some(step),
                 element: first.map(|(e, _)| e.0),
                 region: first.map(|(e, _)| topology.region_name_at(e).to_owned()),
-                at_m: first.map(|(_, tet)| centroid(tet.map(|n| walk.before[n.index()]))),
+                at_m: first.map(|(_, tet)| centroid(tet.map(|n| motion.before[n.index()]))),
             },
             before: QualityShares::new(&before),
             after: QualityShares::new(&after),
-            reached: walk.reached,
-            increments: walk.increments,
-            rescues: walk.rescues,
+            reached: motion.reached,
+            increments: motion.increments,
+            fallbacks: motion.fallbacks,
         }
     }
 }

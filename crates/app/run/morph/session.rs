@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use super::report::verdict;
 use super::tune::{Found, nothing_to_search, tune};
-use super::{CaseReport, MorphReport, Parameters, Walk, csv, walk};
+use super::{CaseReport, LoadStepping, MorphReport, Parameters, csv, step_along};
 use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Morph, Paper, SourceMap, resolved_toml};
 use crate::error::Error;
@@ -23,7 +23,7 @@ use crate::files::{Manifest, RunDirectory, RunStatus, StopReason, peak_memory_by
 use crate::run::{Options, mesh_hash};
 use crate::show::RunObserver;
 
-/// One motion to be made.
+/// One motion to run.
 struct Job<'a> {
     name: &'a str,
     config: &'a Config,
@@ -33,7 +33,7 @@ struct Job<'a> {
     setup: MotionSetup,
 }
 
-/// Makes the motions of a configuration, or tunes its elastic parameters, and writes the run directory.
+/// Runs the motions of a configuration, or tunes its elastic parameters, and writes the run directory.
 ///
 /// Whether the user wants to stop is asked before each motion and each evaluation of the tuner but the first: what is done
 /// by then is written. A case of a sweep that cannot be computed is a row with its error.
@@ -54,8 +54,9 @@ pub fn morph(
     // An earlier run is replaced only by one that can begin.
     jobs.iter().try_for_each(|job| check_body(&job.setup))?;
     warn(config, parameters, &jobs, observer);
-    let directory = RunDirectory::create_flat(options.disk, &config.output.directory, options.older_run)?;
-    let mut manifest = Manifest::started("morph", options.threads).reading(source);
+    let directory =
+        RunDirectory::create_flat(options.disk, &config.output.directory, options.overwrite_policy)?;
+    let mut manifest = Manifest::new("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;
     let session = Session { config, source, parameters, jobs, directory, options, clock };
@@ -92,7 +93,7 @@ fn warn(config: &Config, parameters: Parameters, jobs: &[Job<'_>], observer: &mu
         .for_each(|warning| observer.warning(warning));
 }
 
-/// A motion that was set up and not made.
+/// A motion that was set up and not run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MotionSummary {
     /// Name of the case, or the title of the configuration.
@@ -111,7 +112,7 @@ pub struct MotionSummary {
 ///
 /// # Errors
 /// Faults of the configuration, and whatever the elastic map refuses.
-pub fn inspected(config: &Config, source: &SourceMap) -> Result<Vec<MotionSummary>, Error> {
+pub fn inspect(config: &Config, source: &SourceMap) -> Result<Vec<MotionSummary>, Error> {
     if config.morph.is_none() {
         return Ok(Vec::new());
     }
@@ -159,7 +160,7 @@ fn jobs<'a>(
     own.cases.iter().enumerate().map(job).collect()
 }
 
-/// A run directory that is open, and the motions to be made.
+/// A run directory that is open, and the motions to run.
 struct Session<'a> {
     config: &'a Config,
     source: &'a SourceMap,
@@ -175,7 +176,7 @@ impl Session<'_> {
         let directory = &self.directory;
         directory.write(&directory.config(), self.source.text().as_bytes())?;
         directory.write(&directory.resolved(), resolved_toml(self.config).as_bytes())?;
-        let tuned = self.tuned(observer)?;
+        let tuned = self.tune(observer)?;
         let (mut cases, mut cut_short) = (Vec::new(), None);
         for (index, job) in self.jobs.iter().enumerate() {
             let first = index == 0 && tuned.is_none();
@@ -188,12 +189,12 @@ impl Session<'_> {
                 Some(found) => (&found.setup, found.config.morph.as_ref().unwrap_or(job.morph)),
                 None => (&job.setup, job.morph),
             };
-            let made = self.made(index, setup, morph, observer);
-            if made.as_ref().is_ok_and(|walk| walk.reached < 1.0) && (self.options.interrupted)() {
+            let moved = self.run_motion(index, setup, morph, observer);
+            if moved.as_ref().is_ok_and(|motion| motion.reached < 1.0) && (self.options.interrupted)() {
                 cut_short = Some(job.name);
             }
-            let case = match made {
-                Ok(walk) => CaseReport::made(job.name, setup, &walk, morph.least_quality),
+            let case = match moved {
+                Ok(motion) => CaseReport::with_result(job.name, setup, &motion, morph.least_quality),
                 // The others of a sweep are worth having; without files there is no place for them.
                 Err(error) if self.jobs.len() > 1 && !matches!(error, Error::Output(_)) => {
                     observer.warning(&format!("{}: {error}; the other cases are not affected", job.name));
@@ -201,7 +202,7 @@ impl Session<'_> {
                 }
                 Err(error) => return Err(error),
             };
-            cases.push(case.beside(job.paper));
+            cases.push(case.with_paper(job.paper));
             if cut_short.is_some() {
                 break;
             }
@@ -230,32 +231,32 @@ impl Session<'_> {
         Ok(report)
     }
 
-    /// What the tuner finds, if it is asked; written at once.
-    fn tuned(&self, observer: &mut dyn RunObserver) -> Result<Option<Found>, Error> {
+    /// Runs the tuner, if it is asked for, and writes what it finds.
+    fn tune(&self, observer: &mut dyn RunObserver) -> Result<Option<Found>, Error> {
         let (Parameters::Tuned, [job]) = (self.parameters, self.jobs.as_slice()) else { return Ok(None) };
         let found = tune(job.config, job.source, &job.setup, self.options.interrupted, observer)?;
         self.directory.write(&self.directory.tuned(), resolved_toml(&found.config).as_bytes())?;
         Ok(Some(found))
     }
 
-    /// Makes one motion and writes both meshes.
-    fn made(
+    /// Runs one motion and writes both meshes.
+    fn run_motion(
         &self,
         index: usize,
         setup: &MotionSetup,
         morph: &Morph,
         observer: &mut dyn RunObserver,
-    ) -> Result<Walk, Error> {
+    ) -> Result<LoadStepping, Error> {
         let number = (self.jobs.len() > 1).then_some(index);
         let interrupted = self.options.interrupted;
-        let mut tell = |line: &str| {
+        let mut report = |line: &str| {
             observer.note(line);
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let walked = walk(setup, morph.increments, morph.least_quality, &mut tell)?;
-        self.directory.write(&self.directory.before(number), &vtu(&walked, &walked.before)?)?;
-        self.directory.write(&self.directory.after(number), &vtu(&walked, &walked.after)?)?;
-        Ok(walked)
+        let stepped = step_along(setup, morph.increments, morph.least_quality, &mut report)?;
+        self.directory.write(&self.directory.before(number), &vtu(&stepped, &stepped.before)?)?;
+        self.directory.write(&self.directory.after(number), &vtu(&stepped, &stepped.after)?)?;
+        Ok(stepped)
     }
 
     /// What a signal left out, in words.
@@ -281,18 +282,18 @@ impl Session<'_> {
     }
 }
 
-/// The mesh at some places of its nodes, with the displacement of the whole motion, region and quality.
-fn vtu(walk: &Walk, points: &[Point]) -> Result<Vec<u8>, Error> {
-    let topology = &walk.topology;
+/// The mesh with its nodes at `points`, with the displacement of the whole motion, region and quality.
+fn vtu(motion: &LoadStepping, points: &[Point]) -> Result<Vec<u8>, Error> {
+    let topology = &motion.topology;
     let region: Vec<i32> = topology.region_of().iter().map(|r| r.0 as i32).collect();
     let qualities: Vec<f64> =
         topology.tets().iter().map(|tet| quality(tet.map(|n| points[n.index()]))).collect();
     let mut in_body = vec![0; topology.tets().len()];
-    walk.body.iter().for_each(|e| in_body[e.index()] = 1);
+    motion.body.iter().for_each(|e| in_body[e.index()] = 1);
     Ok(vtu_bytes_at(
         topology,
         points,
-        &[Field { name: "displacement", data: ArrayData::Vector(&walk.displacement) }],
+        &[Field { name: "displacement", data: ArrayData::Vector(&motion.displacement) }],
         &[
             Field { name: "region", data: ArrayData::Integer(&region) },
             Field { name: "quality", data: ArrayData::Scalar(&qualities) },

@@ -1,4 +1,4 @@
-//! The way of a mesh along a path: one increment, a number of equal ones, or as many as it asks for.
+//! Load stepping: a mesh moved along a path in one increment, in a number of equal ones, or in as many as it needs.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use crate::build::MotionSetup;
 use crate::config::Increments;
 use crate::error::Error;
 
-/// Where a motion came to. The mesh may have inverted elements: then there was no increment left to refuse them in.
+/// The result of a motion in increments. The mesh may have inverted elements: the last increment is not refused.
 #[derive(Debug)]
-pub struct Walk {
+pub struct LoadStepping {
     /// Connectivity and regions.
     pub topology: Arc<Topology>,
     /// The undeformed mesh [m].
@@ -30,59 +30,59 @@ pub struct Walk {
     pub equations: usize,
     /// First inversion along the straight motion of the whole path, as a multiple of it.
     pub inversion: StepToInversion,
-    /// How much of the path is done: 1 for all.
+    /// Share of the path that was reached: 1 for all.
     pub reached: f64,
     /// Increments taken, each with a stiffness of its own.
     pub increments: usize,
-    /// Remedies taken on the way.
-    pub rescues: usize,
+    /// Fallbacks of the mesh motion on the way.
+    pub fallbacks: usize,
     /// Elements without a positive volume, of the whole mesh.
     pub inverted: usize,
 }
 
-/// Where a sequence of increments came to.
-struct Taken {
+/// The result of a sequence of increments.
+struct Steps {
     /// Displacement of all nodes from the undeformed mesh [m].
     displacement: Vec<Point>,
-    /// Share of the path done.
+    /// Share of the path that was reached.
     reached: f64,
     increments: usize,
-    rescues: usize,
+    fallbacks: usize,
 }
 
 /// Moves the mesh along the path of a set-up; no increment but the last of a given number may fall below a quality.
 ///
-/// `tell` is told what happens on the way, a line each, and may end it there.
+/// `report` receives a line for each thing that happens on the way, and may end the motion there.
 ///
 /// # Errors
 /// Whatever the elastic map refuses.
-pub fn walk(
+pub fn step_along(
     setup: &MotionSetup,
     increments: Increments,
     least_quality: f64,
-    tell: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Walk, Error> {
+    report: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<LoadStepping, Error> {
     let path = |t: f64| setup.path.at(t);
     let motion = Motion::new(setup.mesh.clone(), setup.remesh.clone())?;
     let step = motion.step(&path(1.0))?;
     let inversion = motion.inversion(&step);
     let (body, equations) = (motion.map().elements().to_vec(), motion.map().equation_count());
     let taken = match increments {
-        Increments::Count(1) => Taken { displacement: step, reached: 1.0, increments: 1, rescues: 0 },
-        Increments::Count(count) => equal(motion, &path, count, least_quality, tell)?,
+        Increments::Count(1) => Steps { displacement: step, reached: 1.0, increments: 1, fallbacks: 0 },
+        Increments::Count(count) => equal(motion, &path, count, least_quality, report)?,
         Increments::Auto(_) => {
             let limits = StepLimits { least_quality, ..StepLimits::default() };
             let SteppingOutcome { moved, reached, steps, fallbacks, .. } =
-                motion.step_along(&path, &limits, &mut |event| tell(&line(event)))?;
-            Taken { displacement: moved.displacement, reached, increments: steps, rescues: fallbacks }
+                motion.step_along(&path, &limits, &mut |event| report(&line(event)))?;
+            Steps { displacement: moved.displacement, reached, increments: steps, fallbacks }
         }
     };
-    let Taken { displacement, reached, increments, rescues } = taken;
+    let Steps { displacement, reached, increments, fallbacks } = taken;
     let topology = Arc::clone(setup.mesh.topology());
     let before = setup.mesh.points().to_vec();
     let after: Vec<Point> = before.iter().zip(&displacement).map(|(x, u)| add(*x, *u)).collect();
     let inverted = topology.tets().iter().filter(|tet| volume(tet.map(|n| after[n.index()])) <= 0.0).count();
-    Ok(Walk {
+    Ok(LoadStepping {
         topology,
         before,
         after,
@@ -92,7 +92,7 @@ pub fn walk(
         inversion,
         reached,
         increments,
-        rescues,
+        fallbacks,
         inverted,
     })
 }
@@ -105,15 +105,15 @@ fn equal(
     path: &dyn Fn(f64) -> Vec<Point>,
     count: usize,
     least_quality: f64,
-    tell: &mut dyn FnMut(&str) -> ControlFlow<()>,
-) -> Result<Taken, RemeshError> {
+    report: &mut dyn FnMut(&str) -> ControlFlow<()>,
+) -> Result<Steps, RemeshError> {
     for k in 1..count {
         let t = k as f64 / count as f64;
-        let taken = |motion: &Motion, increments: usize| Taken {
+        let taken = |motion: &Motion, increments: usize| Steps {
             displacement: motion.reference_displacement().to_vec(),
             reached: increments as f64 / count as f64,
             increments,
-            rescues: 0,
+            fallbacks: 0,
         };
         let moved = match motion.moved(&path(t)) {
             Ok(moved) if motion.quality(&moved.mesh).worst >= least_quality => moved,
@@ -122,14 +122,14 @@ fn equal(
         };
         let quality = motion.quality(&moved.mesh).worst;
         motion = motion.rebased(moved.mesh, moved.displacement, path(t), motion.policy())?;
-        if tell(&format!("increment {k} of {count}: worst quality {quality:.4}")).is_break() {
+        if report(&format!("increment {k} of {count}: worst quality {quality:.4}")).is_break() {
             return Ok(taken(&motion, k));
         }
     }
     let step = motion.step(&path(1.0))?;
     let displacement =
         motion.reference_displacement().iter().zip(step).map(|(u, step)| add(*u, step)).collect();
-    Ok(Taken { displacement, reached: 1.0, increments: count, rescues: 0 })
+    Ok(Steps { displacement, reached: 1.0, increments: count, fallbacks: 0 })
 }
 
 fn line(event: &StepEvent) -> String {
@@ -151,7 +151,7 @@ fn line(event: &StepEvent) -> String {
                 }
             };
             let [before, after] = report.quality;
-            format!("rescue: {what}, worst quality {before:.4} -> {after:.4}")
+            format!("fallback: {what}, worst quality {before:.4} -> {after:.4}")
         }
     }
 }

@@ -5,15 +5,24 @@ use crate::config::Paper;
 use crate::files::csv_text;
 
 /// The columns of the first table.
-const ROW: [&str; 9] =
-    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "increments", "rescues"];
+const ROW: [&str; 9] = [
+    "case",
+    "equations",
+    "elements",
+    "q worst",
+    "q <= 0.3",
+    "inverted",
+    "motion %",
+    "increments",
+    "fallbacks",
+];
 /// The columns of the table of shares.
 const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
 /// The columns of the table of places.
 const PLACES: [&str; 8] =
     ["case", "worst element", "region", "at mm", "first inverts", "at motion x", "region", "at mm"];
 
-/// The report as text: tables with a row for each case, published values in brackets behind the own ones: counts, shares
+/// The report as text: tables with a row for each case, published values in brackets after the own ones: counts, shares
 /// and places; each fits a terminal of 120 columns.
 pub fn text(report: &MorphReport) -> String {
     let mut text = report.tuned.as_ref().map_or_else(String::new, TuneReport::text);
@@ -24,13 +33,13 @@ pub fn text(report: &MorphReport) -> String {
     }
     text += "\n\n";
     let rows: Vec<Vec<String>> = report.cases.iter().map(row).collect();
-    text += &aligned(&ROW, &rows);
+    text += &align(&ROW, &rows);
     text.push('\n');
     let rows: Vec<Vec<String>> = report.cases.iter().map(shares).collect();
-    text += &aligned(&SHARES, &rows);
+    text += &align(&SHARES, &rows);
     text.push('\n');
     let rows: Vec<Vec<String>> = report.cases.iter().map(places).collect();
-    text += &aligned(&PLACES, &rows);
+    text += &align(&PLACES, &rows);
     for case in report.cases.iter().filter(|case| !case.valid) {
         text += &format!("\n{}: {}", case.name, trouble(case));
     }
@@ -70,7 +79,7 @@ fn row(case: &CaseReport) -> Vec<String> {
         result.inverted.to_string(),
         format!("{:.1}", result.reached * 100.0),
         result.increments.to_string(),
-        result.rescues.to_string(),
+        result.fallbacks.to_string(),
     ]
 }
 
@@ -128,7 +137,7 @@ fn places(case: &CaseReport) -> Vec<String> {
 }
 
 /// Columns of equal width, the first to the left.
-pub(super) fn aligned(header: &[&str], rows: &[Vec<String>]) -> String {
+pub(super) fn align(header: &[&str], rows: &[Vec<String>]) -> String {
     let width = |column: usize| {
         let cells = rows.iter().map(|row| row[column].chars().count());
         cells.chain([header[column].chars().count()]).max().unwrap_or(0)
@@ -217,7 +226,7 @@ fn result_cells(result: &CaseResult) -> Vec<String> {
         inversion.element.map_or_else(String::new, |e| e.to_string()),
         number(Some(result.reached)),
         result.increments.to_string(),
-        result.rescues.to_string(),
+        result.fallbacks.to_string(),
     ]
 }
 

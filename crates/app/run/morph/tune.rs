@@ -13,7 +13,7 @@ use fluxmorph_geometry::tet4::{Point, add, norm, volume};
 use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
-use super::table::aligned;
+use super::table::align;
 use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
@@ -97,7 +97,7 @@ impl TuneReport {
                 ]
             })
             .collect();
-        text + &aligned(&["region", "young", "poisson", "force"], &rows) + "\n"
+        text + &align(&["region", "young", "poisson", "force"], &rows) + "\n"
     }
 }
 

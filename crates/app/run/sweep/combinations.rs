@@ -15,7 +15,7 @@ pub struct Combination {
     pub name: String,
     /// Values of the swept keys, in the order of the settings.
     pub values: Vec<String>,
-    /// What `run` is told with `--set`, those that all combinations share included.
+    /// The `--set` arguments of `run`, including those that all combinations share.
     pub overrides: Vec<String>,
 }
 

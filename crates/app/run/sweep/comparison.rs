@@ -141,7 +141,7 @@ impl Comparison {
     }
 }
 
-/// Columns of `sweep.csv` behind those of the keys.
+/// Columns of `sweep.csv` after those of the keys.
 const COLUMNS: [&str; 11] = [
     "status",
     "stop_reason",

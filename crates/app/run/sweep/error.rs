@@ -118,7 +118,7 @@ pub enum SweepError {
         /// What is missing or differs.
         cause: String,
     },
-    /// A file stands in the place of the script.
+    /// A file exists in the place of the script.
     #[error(
         "`{}` exists and is no script of a sweep; choose another name, or replace it with --force",
         path.display()

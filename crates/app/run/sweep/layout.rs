@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
-use crate::files::{Disk, FileHash, OlderRun, OutputError, shell_word, to_json, write_whole};
+use crate::files::{Disk, FileHash, OutputError, OverwritePolicy, shell_word, to_json, write_whole};
 
 /// The mark by which a directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -54,8 +54,8 @@ struct Described {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Task {
     /// It is begun; what is in its directory is kept or replaced.
-    Begin(OlderRun),
-    /// It is gone on with.
+    Begin(OverwritePolicy),
+    /// It is resumed.
     Resume,
 }
 
@@ -67,7 +67,9 @@ impl Layout {
     pub fn create(disk: &Arc<dyn Disk>, sweep: &Sweep) -> Result<Self, Error> {
         let layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone() };
         match layout.description() {
-            Ok(earlier) if sweep.older == OlderRun::Keep => layout.goes_on(&earlier, sweep)?,
+            Ok(earlier) if sweep.overwrite == OverwritePolicy::Keep => {
+                layout.check_continues(&earlier, sweep)?
+            }
             Ok(_) => {}
             Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
                 layout.is_free()?;
@@ -151,7 +153,7 @@ impl Layout {
     }
 
     /// Whether a sweep is an earlier one with the same or more values.
-    fn goes_on(&self, earlier: &Description, sweep: &Sweep) -> Result<(), SweepError> {
+    fn check_continues(&self, earlier: &Description, sweep: &Sweep) -> Result<(), SweepError> {
         let refused = |cause: String| Err(SweepError::OtherSweep { path: self.path.clone(), cause });
         let keys = |settings: &[Setting]| -> Vec<String> {
             settings.iter().filter(|s| s.is_swept()).map(|s| format!("`{}`", s.key)).collect()
@@ -179,7 +181,7 @@ impl Description {
                 index,
                 directory: planned.combination.name.clone(),
                 values: values.map(|(setting, value)| (setting.key.clone(), value.clone().into())).collect(),
-                command: command_text(&sweep.arguments(planned, Task::Begin(OlderRun::Keep))),
+                command: command_text(&sweep.arguments(planned, Task::Begin(OverwritePolicy::Keep))),
             }
         };
         Self {
@@ -194,7 +196,7 @@ impl Description {
 }
 
 impl Sweep {
-    /// The arguments of the command that begins a combination, or goes on with it.
+    /// The arguments of the command that runs or resumes a combination.
     pub fn arguments(&self, planned: &Planned, task: Task) -> Vec<String> {
         let directory = self.run_directory(planned).display().to_string();
         let mut arguments = Vec::new();
@@ -220,7 +222,7 @@ impl Sweep {
         if self.outside == super::Outside::Allowed {
             add(&["--allow-outside"]);
         }
-        if self.older == OlderRun::Replace || task == Task::Begin(OlderRun::Replace) {
+        if self.overwrite == OverwritePolicy::Replace || task == Task::Begin(OverwritePolicy::Replace) {
             add(&["--force"]);
         }
         arguments

@@ -2,7 +2,7 @@
 //!
 //! `setting` takes a `--set key=v1,v2` apart, `combinations` makes their product and `names` the names of the directories;
 //! `plan` reads the configuration of every combination before anything runs. `layout` owns the directory of the sweep and
-//! `sweep.json`, `state` tells what a run directory still needs, `work` lets child processes do that, `script` writes it
+//! `sweep.json`, `state` says what a run directory still needs, `work` lets child processes do that, `script` writes it
 //! down for a scheduler. `comparison` gathers the results into `sweep.csv`, `page` into `sweep.html`.
 //!
 //! Does not live here: anything that solves or optimises. A combination is a `fluxmorph run` or `resume` like any other, in

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use super::Setting;
 use crate::files::blake3_hex;
 
-/// Longest name [bytes]; the limit of file systems is 255, and some tools put something before or behind.
+/// Longest name [bytes]; the limit of file systems is 255, and some tools put something before or after.
 const LONGEST: usize = 120;
 
-/// Digits of the hash behind a name that does not tell all.
+/// Digits of the hash after a name that is shortened.
 const DIGITS: usize = 8;
 
 /// A name for each choice of one value for each setting: the swept keys with their values.
@@ -29,7 +29,7 @@ pub(super) fn directory_names(settings: &[Setting], chosen: &[Vec<&str>]) -> Vec
         *alike.entry(name.text.to_lowercase()).or_default() += 1;
     }
     let is_plain = |name: &Named| name.is_exact && alike[&name.text.to_lowercase()] == 1;
-    named.iter().map(|name| if is_plain(name) { name.text.clone() } else { name.hashed() }).collect()
+    named.iter().map(|name| if is_plain(name) { name.text.clone() } else { name.with_hash() }).collect()
 }
 
 struct Named {
@@ -49,7 +49,7 @@ impl Named {
             }
             named.push(key);
             named.text.push('=');
-            named.push(unquoted(value));
+            named.push(unquote(value));
             named.exact += &format!("{key}={value}\n");
         }
         if named.text.is_empty() {
@@ -83,7 +83,7 @@ impl Named {
         }
     }
 
-    fn hashed(&self) -> String {
+    fn with_hash(&self) -> String {
         let room = LONGEST - DIGITS - 1;
         let end = (0..=room.min(self.text.len())).rev().find(|&end| self.text.is_char_boundary(end));
         let text = self.text[..end.unwrap_or(0)].trim_end_matches(['.', '_']);
@@ -92,7 +92,7 @@ impl Named {
 }
 
 /// A value without the quotes around it.
-fn unquoted(value: &str) -> &str {
+fn unquote(value: &str) -> &str {
     let inner = |quote| value.strip_prefix(quote)?.strip_suffix(quote);
     inner('"').or_else(|| inner('\'')).unwrap_or(value)
 }

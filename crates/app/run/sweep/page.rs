@@ -109,12 +109,12 @@ impl Row {
             (Some(RunStatus::Stopped | RunStatus::Done), _) => "ended".to_owned(),
             (Some(RunStatus::Interrupted), _) => "interrupted".to_owned(),
             (Some(RunStatus::Failed), _) => "failed".to_owned(),
-            (Some(RunStatus::Running), _) => "running, or broken off".to_owned(),
+            (Some(RunStatus::Running), _) => "running or interrupted".to_owned(),
         }
     }
 }
 
-/// Columns behind those of the keys.
+/// Columns after those of the keys.
 const HEAD: [&str; 10] = [
     "run",
     "status",

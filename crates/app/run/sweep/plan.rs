@@ -9,10 +9,10 @@ use crate::build::memory_limit;
 use crate::build::with_names;
 use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
 use crate::error::Error;
-use crate::files::{FileHash, LimitsInForce, OlderRun, blake3_hex};
-use crate::run::Limits;
+use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
+use crate::run::RunLimits;
 
-/// Combinations whose faults are told; the rest are counted.
+/// Combinations whose faults are shown; the rest are counted.
 const MOST_REPORTS: usize = 5;
 
 /// Whether the files that a configuration names may lie outside of its folder.
@@ -34,11 +34,11 @@ pub struct Request<'a> {
     /// The directory, in place of the one that the configuration implies.
     pub out: Option<&'a Path>,
     /// Limits in place of those of the configuration.
-    pub limits: Limits,
+    pub limits: RunLimits,
     /// Files elsewhere.
     pub outside: Outside,
-    /// What becomes of runs that are no combination; [`OlderRun::Replace`] also goes on where the memory seems too small.
-    pub older: OlderRun,
+    /// What becomes of runs that are no combination; [`OverwritePolicy::Replace`] also overrides the memory check.
+    pub overwrite: OverwritePolicy,
 }
 
 /// A sweep whose configurations are sound.
@@ -53,11 +53,11 @@ pub struct Sweep {
     /// The keys and their values.
     pub settings: Vec<Setting>,
     /// Limits of the command line.
-    pub limits: Limits,
+    pub limits: RunLimits,
     /// Files elsewhere.
     pub outside: Outside,
     /// What becomes of runs that are no combination.
-    pub older: OlderRun,
+    pub overwrite: OverwritePolicy,
     /// The combinations; the first key changes slowest.
     pub combinations: Vec<Planned>,
 }
@@ -67,7 +67,7 @@ pub struct Sweep {
 pub struct Planned {
     /// Name and values.
     pub combination: Combination,
-    /// What tells its configuration from others, but for the place of its mesh file.
+    /// Identifies its configuration, except for the path of its mesh file.
     pub fingerprint: [u8; 32],
     /// The mesh file, where the mesh is read.
     pub mesh: Option<PathBuf>,
@@ -129,7 +129,7 @@ impl Sweep {
             settings,
             limits: request.limits,
             outside: request.outside,
-            older: request.older,
+            overwrite: request.overwrite,
             combinations: planned,
         })
     }
@@ -165,7 +165,7 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMa
         source.confined(by)?;
     }
     config.optimisation(&source)?;
-    if request.older == OlderRun::Keep {
+    if request.overwrite == OverwritePolicy::Keep {
         memory_limit::check_mesh(&config, &source)?;
     }
     Ok((config, source))
@@ -195,9 +195,9 @@ impl Subject {
         if self.count == 0 {
             return Ok(());
         }
-        // Looking up names takes the mesh: only for what is told.
-        let told = |(name, report)| (name, with_names(ConfigError::Invalid(report)));
-        let reports = self.reports.into_iter().map(told).collect();
+        // Looking up names takes the mesh: only for what is shown.
+        let with_mesh_names = |(name, report)| (name, with_names(ConfigError::Invalid(report)));
+        let reports = self.reports.into_iter().map(with_mesh_names).collect();
         Err(SweepError::Faults { faulty: self.count, of: self.count + sound, reports })
     }
 }

@@ -10,7 +10,7 @@ use crate::show::report::ticks::{Count, number};
 /// Height of a drawing area.
 const HEIGHT: f64 = 190.0;
 
-/// Curves in one figure: more could not be told apart.
+/// Curves in one figure: more could not be distinguished.
 const MOST_CURVES: usize = 24;
 
 /// Colours of the style sheet; with three strokes each they make [`MOST_CURVES`].

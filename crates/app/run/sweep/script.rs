@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::layout::command_text;
 use super::{Outside, Sweep, SweepError};
 use crate::error::Error;
-use crate::files::{Disk, OlderRun, OutputError, shell_word, write_whole};
+use crate::files::{Disk, OutputError, OverwritePolicy, shell_word, write_whole};
 
 /// The line by which a script is known as ours.
 const MARK: &str = "# A sweep of fluxmorph, written by `fluxmorph sweep --script`:";
@@ -42,7 +42,7 @@ impl ScriptFile<'_> {
             Ok(bytes) => String::from_utf8_lossy(&bytes).lines().any(|line| line == MARK),
             Err(_) => false,
         };
-        if !is_ours && sweep.older == OlderRun::Keep {
+        if !is_ours && sweep.overwrite == OverwritePolicy::Keep {
             return Err(SweepError::ScriptExists { path: self.path.to_owned() }.into());
         }
         let absolute =
@@ -68,7 +68,7 @@ pub fn script(file: &ScriptFile<'_>, sweep: &Sweep, config: &Path, directory: &P
         "#!/usr/bin/env bash\n\
          {MARK}\n\
          # {count} combinations, one array task each. Submit it with sbatch; add time, memory and partition below or there.\n\
-         # A task that is submitted again skips what is finished and goes on with what was broken off.\n\
+         # A task that is submitted again skips finished runs and resumes interrupted ones.\n\
          #SBATCH --job-name=fluxmorph-sweep\n\
          #SBATCH --array=0-{last}{at_once}\n\
          {processors}\
@@ -86,7 +86,7 @@ pub fn script(file: &ScriptFile<'_>, sweep: &Sweep, config: &Path, directory: &P
     )
 }
 
-/// What the sweep was told, for a process with another working directory.
+/// The arguments of the sweep, for a process with another working directory.
 fn arguments(sweep: &Sweep, config: &Path, directory: &Path) -> Vec<String> {
     let mut arguments = vec!["sweep".to_owned(), config.display().to_string()];
     let mut add = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
@@ -103,7 +103,7 @@ fn arguments(sweep: &Sweep, config: &Path, directory: &Path) -> Vec<String> {
     if sweep.outside == Outside::Allowed {
         arguments.push("--allow-outside".to_owned());
     }
-    if sweep.older == OlderRun::Replace {
+    if sweep.overwrite == OverwritePolicy::Replace {
         arguments.push("--force".to_owned());
     }
     arguments

@@ -19,13 +19,13 @@ const LARGEST: u64 = 1 << 30;
 pub enum State {
     /// Nothing is there.
     Missing,
-    /// It was broken off before there was anything to keep.
+    /// It was interrupted before there was anything to keep.
     Unborn,
-    /// It was broken off, or its limits are wider now: it can be gone on with.
+    /// It was interrupted, or its limits are wider now: it can be resumed.
     Broken,
     /// It has ended, for this reason.
     Finished(StopReason),
-    /// Another process works on it.
+    /// Another process is working on it.
     InUse,
     /// It is something else, and this is the difference.
     Other(String),
@@ -92,13 +92,13 @@ impl<'a> States<'a> {
         let other_mesh = || State::Other("its mesh file is another, or has changed since".to_owned());
         let is_here = mesh_file(&config) == planned.mesh.as_deref();
         Ok(match result(&run, &manifest).filter(|_| has_ended(&manifest)) {
-            Some(result) if !may_go_on(&result, self.sweep, planned) => {
+            Some(result) if !may_continue(&result, self.sweep, planned) => {
                 match self.has_mesh(planned, config, &source, &manifest) {
                     true => State::Finished(result.stop_reason),
                     false => other_mesh(),
                 }
             }
-            // Whether the file has changed is found out by the run that goes on.
+            // Whether the file has changed is checked by the run that is resumed.
             _ if is_here => State::Broken,
             _ => other_mesh(),
         })
@@ -160,7 +160,7 @@ fn has_ended(manifest: &Manifest) -> bool {
 }
 
 /// Whether the limits of now are wider than those that ended a run.
-fn may_go_on(result: &RunResult, sweep: &Sweep, planned: &Planned) -> bool {
+fn may_continue(result: &RunResult, sweep: &Sweep, planned: &Planned) -> bool {
     match result.stop_reason {
         StopReason::MaxEvaluations => planned.limits.max_evaluations > result.evaluations,
         // More time is what the user gives, and not what the configuration says every time.

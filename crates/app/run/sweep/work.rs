@@ -1,6 +1,6 @@
 //! Child processes of this program that run the combinations, so many at a time.
 //!
-//! Every child leads a process group of its own: Ctrl-C on a terminal reaches the sweep alone, which hands it on once, so
+//! Every child leads a process group of its own: Ctrl-C on a terminal reaches the sweep alone, which forwards it once, so
 //! that no child takes one signal for two and leaves its evaluation unfinished.
 
 use std::fs::{File, OpenOptions};
@@ -15,8 +15,8 @@ use crate::exit_code::ExitCode;
 use crate::files::OutputError;
 use crate::run::launcher;
 
-/// Between two looks at the children: far shorter than a run, and no load.
-const PATIENCE: Duration = Duration::from_millis(10);
+/// Time between two polls of the children: far shorter than a run, and no load.
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Who runs the combinations.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub struct Workers {
 pub enum Ending {
     /// By itself, with a code of the documentation.
     Code(ExitCode),
-    /// In another way, told in words.
+    /// In another way, described in words.
     Broken(String),
 }
 
@@ -59,47 +59,47 @@ impl Workers {
         (cores / jobs.max(1)).max(1)
     }
 
-    /// Does tasks in their order. When `interrupted` tells a signal no further one begins, and those at work are told to save
-    /// and end.
+    /// Does tasks in their order. Once `interrupted` gives a signal no further one is started, and the signal is sent to those
+    /// running, which save and end.
     ///
     /// A process that cannot be started, or fails, does not end the others.
     ///
     /// # Errors
-    /// What `tell` fails with, after the processes at work have ended.
+    /// What `report` fails with, after the running processes have ended.
     pub fn work(
         &self,
         sweep: &Sweep,
         layout: &Layout,
         tasks: &[(usize, Task)],
         interrupted: &dyn Fn() -> Option<ExitCode>,
-        tell: &mut dyn FnMut(Event) -> Result<(), Error>,
+        report: &mut dyn FnMut(Event) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut waiting = tasks.iter().copied();
         let mut running: Vec<Running> = Vec::new();
-        let mut is_told = false;
+        let mut is_interrupted = false;
         let mut outcome = Ok(());
-        let mut told = |event| {
-            let answer = tell(event);
+        let mut reports = |event| {
+            let answer = report(event);
             if outcome.is_ok() {
                 outcome = answer;
             }
             outcome.is_ok()
         };
-        let mut goes_on = true;
+        let mut continues = true;
         loop {
             if let Some(signal) = interrupted()
-                && !is_told
+                && !is_interrupted
             {
-                is_told = true;
-                hand_on(signal, &running);
+                is_interrupted = true;
+                forward(signal, &running);
             }
-            while goes_on && !is_told && running.len() < self.jobs {
+            while continues && !is_interrupted && running.len() < self.jobs {
                 let Some((index, task)) = waiting.next() else { break };
-                goes_on &= told(Event::Begun(index, task));
+                continues &= reports(Event::Begun(index, task));
                 match self.start(sweep, layout, &sweep.combinations[index], task) {
                     Ok(child) => running.push(Running { index, child }),
                     Err(error) => {
-                        goes_on &= told(Event::Ended(index, Ending::Broken(error.to_string())));
+                        continues &= reports(Event::Ended(index, Ending::Broken(error.to_string())));
                     }
                 }
             }
@@ -107,15 +107,17 @@ impl Workers {
             for mut one in running {
                 match one.child.try_wait() {
                     Ok(None) => still.push(one),
-                    Ok(Some(status)) => goes_on &= told(Event::Ended(one.index, Ending::of(status))),
-                    Err(error) => goes_on &= told(Event::Ended(one.index, Ending::Broken(error.to_string()))),
+                    Ok(Some(status)) => continues &= reports(Event::Ended(one.index, Ending::of(status))),
+                    Err(error) => {
+                        continues &= reports(Event::Ended(one.index, Ending::Broken(error.to_string())))
+                    }
                 }
             }
             running = still;
-            if running.is_empty() && (is_told || !goes_on || waiting.len() == 0) {
+            if running.is_empty() && (is_interrupted || !continues || waiting.len() == 0) {
                 break;
             }
-            std::thread::sleep(PATIENCE);
+            std::thread::sleep(POLL_INTERVAL);
         }
         outcome
     }
@@ -142,7 +144,7 @@ impl Workers {
     }
 }
 
-/// The log of a process: that of one that goes on is added to what the one before has said.
+/// The log of a process: a resumed run appends to the log of the earlier process.
 fn log(path: &Path, task: Task) -> io::Result<File> {
     let is_plain = std::fs::symlink_metadata(path).map(|entry| entry.is_file());
     match (task, is_plain) {
@@ -157,7 +159,7 @@ fn log(path: &Path, task: Task) -> io::Result<File> {
 }
 
 /// Sends children the signal that the sweep has got. The standard library sends none but the one that kills.
-fn hand_on(signal: ExitCode, running: &[Running]) {
+fn forward(signal: ExitCode, running: &[Running]) {
     let name = if signal == ExitCode::Interrupted { "INT" } else { "TERM" };
     let ids: String = running.iter().map(|one| format!(" {}", one.child.id())).collect();
     if cfg!(unix) && !ids.is_empty() {

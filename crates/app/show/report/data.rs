@@ -72,7 +72,7 @@ impl RunData {
             None => last_improved(&history),
         };
         let outline = outline(&config, &source)
-            .map_err(|error| format!("the mesh cannot be made again: {}", reason(&error)));
+            .map_err(|error| format!("the mesh cannot be rebuilt: {}", reason(&error)));
         let kept = directory.evaluations_with_fields()?;
         let fields = [Some(0).filter(|_| manifest.command == "run"), best].map(|evaluation| {
             let Some(evaluation) = evaluation else { return Ok(Err(NO_EVALUATION.to_owned())) };
@@ -217,7 +217,7 @@ impl Snapshot {
         let points = contents.points;
         let finite = points.iter().flatten().chain(&flux_density).all(|v| v.is_finite());
         if !finite {
-            return Err(damaged(&path)("it holds a value that is no number").into());
+            return Err(damaged(&path)("it holds a value that is not finite").into());
         }
         Ok(Ok(Self { evaluation, points, flux_density }))
     }

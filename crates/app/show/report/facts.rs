@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 use maud::{Markup, html};
 
 use super::data::RunData;
-use super::ticks::{duration, grouped, number, trimmed};
+use super::ticks::{duration, group_digits, number, trim_zeros};
 use crate::files::{Manifest, shell_word};
 
 /// Names and values in their order.
@@ -25,7 +25,9 @@ impl Facts {
 
 /// Mesh and linear systems.
 pub(super) fn mesh(data: &RunData) -> Markup {
-    let size = |nodes: usize, tets: usize| format!("{} nodes, {} tetrahedra", grouped(nodes), grouped(tets));
+    let size = |nodes: usize, tets: usize| {
+        format!("{} nodes, {} tetrahedra", group_digits(nodes), group_digits(tets))
+    };
     let mut facts = Facts::default();
     if let Some(mesh) = &data.manifest.mesh {
         facts.add("mesh with all regions", size(mesh.nodes, mesh.tets));
@@ -33,28 +35,28 @@ pub(super) fn mesh(data: &RunData) -> Markup {
     if let Some(result) = &data.result {
         let mesh = &result.mesh;
         facts.add("mesh that is solved on", size(mesh.nodes, mesh.tets));
-        facts.add("unknowns", grouped(mesh.unknowns));
+        facts.add("unknowns", group_digits(mesh.unknowns));
         let quality = [mesh.worst_quality_initial, mesh.worst_quality_final].map(|q| number(q, 3));
         facts.add("worst quality", if data.is_run() { quality.join(" → ") } else { quality[1].clone() });
         facts.add("linear solver", result.linear_solver.methods.join(", "));
         facts.add("largest relative residual", number(result.linear_solver.worst_residual, 2));
     }
     let order = if u8::from(data.config.analysis.order) == 1 { "linear" } else { "quadratic" };
-    let penalty = trimmed(data.config.analysis.penalty, 4);
+    let penalty = trim_zeros(data.config.analysis.penalty, 4);
     facts.add("elements", format!("{order} tetrahedra, nodal A–ψ, ν_p/ν = {penalty}"));
     if let Ok(outline) = &data.outline {
         facts.add("bounding box", bounding_box(&outline.full_mesh));
         if let Some(design) = &outline.design {
-            let [nodes, triangles] = [design.surface.nodes().len(), design.triangles.len()].map(grouped);
+            let [nodes, triangles] = [design.surface.nodes().len(), design.triangles.len()].map(group_digits);
             facts.add("design surface", format!("{nodes} nodes, {triangles} triangles"));
-            facts.add("elements that may move", grouped(design.moving.len()));
+            facts.add("elements that may move", group_digits(design.moving.len()));
         }
     }
     facts.list()
 }
 
 fn bounding_box(mesh: &Mesh) -> String {
-    let [low, high] = mesh.bounding_box().map(|p| p.map(|c| trimmed(1e3 * c, 1)).join(", "));
+    let [low, high] = mesh.bounding_box().map(|p| p.map(|c| trim_zeros(1e3 * c, 1)).join(", "));
     format!("({low}) to ({high}) mm")
 }
 
@@ -82,7 +84,7 @@ pub(super) fn provenance(data: &RunData) -> Markup {
     for resumption in &manifest.resumed {
         let place = format!("{} on {}", resumption.at, resumption.host.name);
         let work = format!("{} evaluations, {} threads", resumption.evaluations, resumption.threads);
-        facts.add("resumed", format!("{place}, behind {work}"));
+        facts.add("resumed", format!("{place}, after {work}"));
     }
     if let Some(finished) = &manifest.finished {
         facts.add("finished", finished.clone());
@@ -92,7 +94,7 @@ pub(super) fn provenance(data: &RunData) -> Markup {
         let parts =
             parts.map(|(part, seconds)| format!("{} {} s", part.replace('_', " "), number(*seconds, 2)));
         facts.add("time by parts", parts.collect::<Vec<_>>().join(", "));
-        facts.add("most memory held", format!("{} MiB", result.peak_memory_bytes.div_ceil(1 << 20)));
+        facts.add("peak memory", format!("{} MiB", result.peak_memory_bytes.div_ceil(1 << 20)));
     }
     facts.list()
 }

@@ -9,7 +9,7 @@ use super::field_cut::{FieldCut, colour_scale};
 use super::frame::Frame;
 use super::observed;
 use super::plot::{Scale, axes, colour_bar, path, rect, svg, text};
-use super::ticks::{Count, number, trimmed};
+use super::ticks::{Count, number, trim_zeros};
 use super::window::Window;
 use crate::build::Outline;
 
@@ -69,7 +69,7 @@ impl Drawing<'_> {
         };
         let content = html! {
             (frame.image(ColourMap::Field, coloured))
-            (frame.clipped(&format!("{id}-frame"), &inside))
+            (frame.clip(&format!("{id}-frame"), &inside))
             (axes(&frame.x, &frame.y, window.page.titles.each_ref().map(String::as_str), [6, 5]))
             (colour_bar(id, ColourMap::Field, scale, "|B| [mT]", frame.bar_top()))
         };
@@ -137,7 +137,7 @@ fn caption(
         text += " (peak value)";
     }
     if let [first, _, ..] = frequencies {
-        text += &format!(" at {} Hz, the first of {} frequencies", trimmed(*first, 6), frequencies.len());
+        text += &format!(" at {} Hz, the first of {} frequencies", trim_zeros(*first, 6), frequencies.len());
     }
     text += &format!(
         ", {} scale from {} to {} mT, the same for all; lines: boundaries of regions. What lies beyond has the colour of \

@@ -1,4 +1,4 @@
-//! Links to the files of the run, and how to go on with it.
+//! Links to the files of the run, and how to continue it.
 
 use maud::{Markup, html};
 
@@ -60,7 +60,7 @@ fn describe(file: &str) -> &'static str {
     }
 }
 
-/// Whether the run can go on: why, and by which command.
+/// Whether the run can be resumed: why, and by which command.
 fn continuation(data: &RunData) -> Option<(&'static str, String)> {
     if !data.is_run() {
         return None;
@@ -72,10 +72,10 @@ fn continuation(data: &RunData) -> Option<(&'static str, String)> {
     match result.stop_reason {
         StopReason::Interrupted | StopReason::MaxTime => Some(("All evaluations are saved:", resume)),
         _ if result.status == RunStatus::Interrupted => {
-            Some(("The check on a fresh mesh can be made up for:", resume))
+            Some(("To run the check on a fresh mesh that is missing:", resume))
         }
         StopReason::MaxEvaluations => Some((
-            "The search stopped at its limit of evaluations; with more of them it goes on from here:",
+            "The search stopped at its limit of evaluations; to continue with more:",
             extend_command(&data.directory, result.evaluations),
         )),
         _ => None,

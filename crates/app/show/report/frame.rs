@@ -71,7 +71,7 @@ impl Frame {
     }
 
     /// What is drawn inside of the frame and cut off at its edge; `id` is that of the edge.
-    pub(super) fn clipped(&self, id: &str, content: &Markup) -> Markup {
+    pub(super) fn clip(&self, id: &str, content: &Markup) -> Markup {
         let [left, top, width, height] = self.place().map(px);
         html! {
             clipPath id=(id) { rect x=(left) y=(top) width=(width) height=(height) {} }

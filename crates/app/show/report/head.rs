@@ -5,7 +5,7 @@ use maud::Markup;
 use super::data::RunData;
 use super::markup::{Card, header};
 use super::plane::bounds;
-use super::ticks::{duration, grouped, number, trimmed};
+use super::ticks::{duration, group_digits, number, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::{MeshConfig, Objective};
@@ -27,10 +27,10 @@ pub(super) fn head(data: &RunData) -> Markup {
         cards.push(("time", duration(seconds), format!("on {} threads", data.manifest.threads)));
     }
     if let Some(result) = &data.result {
-        let unknowns = format!("{} unknowns", grouped(result.mesh.unknowns));
-        cards.push(("tetrahedra", grouped(result.mesh.tets), unknowns));
+        let unknowns = format!("{} unknowns", group_digits(result.mesh.unknowns));
+        cards.push(("tetrahedra", group_digits(result.mesh.tets), unknowns));
     } else if let Some(mesh) = &data.manifest.mesh {
-        cards.push(("tetrahedra", grouped(mesh.tets), format!("{} nodes", grouped(mesh.nodes))));
+        cards.push(("tetrahedra", group_digits(mesh.tets), format!("{} nodes", group_digits(mesh.nodes))));
     }
     cards.extend(data.outline.as_ref().ok().map(size_card));
     header(kind, &data.config.title, (class, &status), &lead, &cards)
@@ -40,7 +40,7 @@ pub(super) fn head(data: &RunData) -> Markup {
 fn status(data: &RunData) -> (&'static str, String) {
     let Some(result) = &data.result else {
         let (class, text) = match data.manifest.status {
-            RunStatus::Running => ("fair", "Still running, or broken off: there is no result yet"),
+            RunStatus::Running => ("fair", "Still running or interrupted: there is no result yet"),
             RunStatus::Interrupted => ("fair", "Interrupted before there was a result"),
             RunStatus::Failed => ("bad", "Failed before there was a result"),
             _ => ("bad", "There is no result.json, though the run has ended"),
@@ -90,7 +90,8 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
     let (value, remark) = match (objective.verified_ratio, objective.verification, &data.config.mesh) {
         (Some(ratio), Some(v), _) => {
-            let remark = format!("refined × {}, {} tetrahedra", trimmed(v.refinement, 3), grouped(v.tets));
+            let remark =
+                format!("refined × {}, {} tetrahedra", trim_zeros(v.refinement, 3), group_digits(v.tets));
             (number(ratio, 4), remark)
         }
         (Some(ratio), None, _) => (number(ratio, 4), "the initial shape is the best".to_owned()),
@@ -105,7 +106,8 @@ fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
 /// Extents of the design surface and of the mesh.
 fn size_card(outline: &Outline) -> Card {
     let extents = |[low, high]: [[f64; 3]; 2]| [0, 1, 2].map(|d| high[d] - low[d]);
-    let shown = |extents: &[f64]| extents.iter().map(|e| trimmed(1e3 * e, 1)).collect::<Vec<_>>().join(" × ");
+    let shown =
+        |extents: &[f64]| extents.iter().map(|e| trim_zeros(1e3 * e, 1)).collect::<Vec<_>>().join(" × ");
     let mesh = shown(&extents(outline.full_mesh.bounding_box()));
     let Some(design) = &outline.design else {
         return ("size", format!("{mesh} mm"), "of the whole mesh".to_owned());

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::data::{RunData, Snapshot};
 use super::plot::{WIDTH, rect, svg, text};
-use super::ticks::{grouped, number};
+use super::ticks::{group_digits, number};
 use crate::build::Outline;
 
 /// Height of the two bars of a tenth, and the room above and below.
@@ -57,7 +57,7 @@ fn draw(before: Option<&QualityReport>, after: &QualityReport) -> Markup {
         let seen = length.max(if count > 0 { 0.8 } else { 0.0 });
         html! {
             (rect(class, [START, y, seen, BAR]))
-            (text("count", START + length + 4.0, y + 8.0, &grouped(count)))
+            (text("count", START + length + 4.0, y + 8.0, &group_digits(count)))
         }
     };
     let content = html! {
@@ -81,10 +81,11 @@ fn draw(before: Option<&QualityReport>, after: &QualityReport) -> Markup {
 fn caption(before: Option<&QualityReport>, after: &QualityReport, of: &str) -> String {
     let mut text = format!(
         "Quality (Eq. 4 of the paper: 1 for a regular tetrahedron, 0 for a flat one) of {of}, {} in all. ",
-        grouped(after.elements)
+        group_digits(after.elements)
     );
-    let words =
-        |r: &QualityReport| format!("worst {}, {} elements up to 0.3", number(r.worst, 3), grouped(r.poor));
+    let words = |r: &QualityReport| {
+        format!("worst {}, {} elements up to 0.3", number(r.worst, 3), group_digits(r.poor))
+    };
     if let Some(before) = before {
         text += &format!("Before: {}; after: {}.", words(before), words(after));
     } else {

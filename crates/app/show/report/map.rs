@@ -8,7 +8,7 @@ use super::data::RunData;
 use super::frame::Frame;
 use super::plane::{Plane, extremes, images, mirrored, mirrors};
 use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, dot, line, svg, text};
-use super::ticks::{Count, number, trimmed};
+use super::ticks::{Count, number, trim_zeros};
 use super::words::capital;
 use crate::build::{Outline, OutlinedDesign};
 use crate::config::{DesignDirection, DirectionWord};
@@ -149,7 +149,7 @@ impl Drawing {
             @for end in ends { @if let Some(at) = self.middle_of(values, end) { (self.mark(at, end)) } }
             (colour_bar(id, surface.colours(), &self.scale, &bar, self.frame.bar_top()))
         };
-        let [from, to] = [least, most].map(|end| trimmed(end, 2));
+        let [from, to] = [least, most].map(|end| trim_zeros(end, 2));
         let label = format!("Map of the {} {name}: from {from} to {to} millimetres", surface.name());
         svg(self.frame.height(), &label, &content)
     }
@@ -160,7 +160,7 @@ impl Drawing {
         let (class, x) = if right { ("spot-text end", at[0] - 6.0) } else { ("spot-text", at[0] + 6.0) };
         html! {
             (dot("spot", at, 2.2))
-            (text(class, x, at[1] + 4.0, &format!("{} mm", trimmed(value, 2))))
+            (text(class, x, at[1] + 4.0, &format!("{} mm", trim_zeros(value, 2))))
         }
     }
 
@@ -182,7 +182,7 @@ impl Drawing {
             let to_edge = [p[0] - x.low, x.high - p[0], p[1] - y.low, y.high - p[1]];
             to_other.chain(to_edge).fold(f64::INFINITY, f64::min)
         };
-        // A thousand candidates tell where there is room.
+        // A thousand candidates are enough to find where there is room.
         let step = whole.len().div_ceil(1000).max(1);
         let candidates = whole.iter().step_by(step).map(|(place, _)| (apart(place), place));
         candidates.max_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, place)| self.frame.at(*place))
@@ -219,15 +219,15 @@ fn caption(
     if let Some(before) = &surface.values[0] {
         let [low, high] = extremes(before.iter().flatten().copied());
         let range = if high - low < 1e-6 * high.abs().max(1e-3) {
-            format!("{} mm everywhere", trimmed(low, 2))
+            format!("{} mm everywhere", trim_zeros(low, 2))
         } else {
-            format!("{} to {} mm", trimmed(low, 2), trimmed(high, 2))
+            format!("{} to {} mm", trim_zeros(low, 2), trim_zeros(high, 2))
         };
         text += &format!("; before: {range}");
     }
-    text += &format!("; after: {} to {} mm. ", trimmed(least, 2), trimmed(most, 2));
+    text += &format!("; after: {} to {} mm. ", trim_zeros(least, 2), trim_zeros(most, 2));
     if let Some(before) = &surface.values[0] {
-        let [less, more] = changed(outline, design, before, after);
+        let [less, more] = shares_changed(outline, design, before, after);
         let words = if surface.is_thickness {
             ["thinner", "thicker"]
         } else {
@@ -253,7 +253,7 @@ fn caption(
 }
 
 /// Shares of the area whose value has become less and more.
-fn changed(
+fn shares_changed(
     outline: &Outline,
     design: &OutlinedDesign,
     before: &[Option<f64>],

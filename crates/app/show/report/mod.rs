@@ -68,12 +68,12 @@ impl ReportedRun {
         if !matches!(manifest.command.as_str(), "run" | "solve") {
             let command = &manifest.command;
             return Err(refused(format!(
-                "it holds a `{command}`; a report is made of the directory that `fluxmorph run` or `fluxmorph solve` has written"
+                "it holds a `{command}`; a report needs a directory that `fluxmorph run` or `fluxmorph solve` has written"
             )));
         }
         if !directory.holds_configuration() {
             return Err(refused(
-                "it was broken off before its configuration was saved; start it again".into(),
+                "it was interrupted before its configuration was saved; start it again".into(),
             ));
         }
         let (config, source) = run::configuration(&directory, &manifest)?;

@@ -1,4 +1,4 @@
-//! The page: its sections in their order, and what stands in the place of a figure that cannot be made.
+//! The page: its sections in their order, and what replaces a figure that cannot be drawn.
 
 use maud::{Markup, html};
 
@@ -7,7 +7,7 @@ use super::files::files;
 use super::head::head;
 use super::markup::{document, footer, json, missing, section};
 use super::surface::Surface;
-use super::ticks::{grouped, trimmed};
+use super::ticks::{group_digits, trim_zeros};
 use super::words::capital;
 use super::{convergence, facts, field, histogram, map, tables};
 use crate::build::{Outline, OutlinedDesign};
@@ -48,7 +48,7 @@ fn body(data: &RunData, links: &str, detail: Detail) -> Markup {
         (section("results", "Results", &results(data)))
         @if !data.history.is_empty() { (section("evaluations", "Evaluations", &tables::evaluations(data))) }
         (section("mesh", "Mesh and equations", &mesh(data)))
-        (section("files", "Files, and how to go on", &files(data, links)))
+        (section("files", "Files, and how to continue", &files(data, links)))
         (section("provenance", "Provenance", &provenance(data)))
         (footer("the run"))
     }
@@ -156,10 +156,10 @@ fn caption(data: &RunData, surface: &Surface) -> String {
         "{} at evaluation {}, {} triangles. ",
         capital(&surface.what),
         data.best.map_or("–".to_owned(), |best| best.to_string()),
-        grouped(surface.triangles)
+        group_digits(surface.triangles)
     );
     if surface.exaggeration > 1.0 {
-        text += &format!("The motion is drawn {} times as large. ", trimmed(surface.exaggeration, 0));
+        text += &format!("The motion is drawn {} times as large. ", trim_zeros(surface.exaggeration, 0));
     }
     text += "Drag to turn, wheel or two fingers to zoom, arrow keys when selected; the slider goes from the initial shape \
              to the best one.";

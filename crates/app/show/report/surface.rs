@@ -229,8 +229,8 @@ fn pack(
 ) -> Value {
     let [low, high] = bounds(places.iter().flatten().copied());
     let packed = |points: &Vec<Point>| {
-        let axis = |d: usize, p: &Point| quantised(p[d], [low[d], high[d]], u16::MAX);
-        encoded(points.iter().flat_map(|p| (0..3).map(move |d| axis(d, p))))
+        let axis = |d: usize, p: &Point| quantise(p[d], [low[d], high[d]], u16::MAX);
+        encode(points.iter().flat_map(|p| (0..3).map(move |d| axis(d, p))))
     };
     let index = |n: &NodeId| nodes.binary_search(n).unwrap_or(0);
     let wide = nodes.len() > usize::from(u16::MAX);
@@ -239,7 +239,7 @@ fn pack(
         let bytes: Vec<u8> = corners.flat_map(|i| (i as u32).to_le_bytes()).collect();
         STANDARD.encode(bytes)
     } else {
-        encoded(corners.map(|i| i as u16))
+        encode(corners.map(|i| i as u16))
     };
     let mirrors: Vec<Value> = mirrors(&data.config).iter().map(|m| json!([m.axis, 1e3 * m.at])).collect();
     let millimetres = |p: Point| p.map(|c| 1e3 * c);
@@ -270,10 +270,10 @@ impl Colouring {
         let form = |v: f64| if logarithmic { v.max(low).ln() } else { v };
         // The last number stands for no value.
         let one = |v: &Option<f64>| match v {
-            Some(v) => quantised(form(*v), [form(low), form(high)], u16::MAX - 1),
+            Some(v) => quantise(form(*v), [form(low), form(high)], u16::MAX - 1),
             None => u16::MAX,
         };
-        let packed = |values: &Vec<Option<f64>>| encoded(values.iter().map(one));
+        let packed = |values: &Vec<Option<f64>>| encode(values.iter().map(one));
         Some(json!({
             "name": self.name,
             "unit": self.unit,
@@ -288,12 +288,12 @@ impl Colouring {
 }
 
 /// A value between two others as a number from 0 to `most`.
-fn quantised(value: f64, [low, high]: [f64; 2], most: u16) -> u16 {
+fn quantise(value: f64, [low, high]: [f64; 2], most: u16) -> u16 {
     let share = if high > low { (value - low) / (high - low) } else { 0.0 };
     (share.clamp(0.0, 1.0) * f64::from(most)).round() as u16
 }
 
-fn encoded(numbers: impl Iterator<Item = u16>) -> String {
+fn encode(numbers: impl Iterator<Item = u16>) -> String {
     STANDARD.encode(numbers.flat_map(u16::to_le_bytes).collect::<Vec<u8>>())
 }
 
@@ -307,12 +307,12 @@ mod tests {
         let step = (high - low) / 65_535.0;
         for i in 0..=1000 {
             let value = low + (high - low) * f64::from(i) / 1000.0;
-            let back = low + f64::from(quantised(value, [low, high], u16::MAX)) * step;
+            let back = low + f64::from(quantise(value, [low, high], u16::MAX)) * step;
             // Half a step, and the rounding of the sums here.
             assert!((back - value).abs() <= 0.5 * step + 1e-16, "{value}: {back}");
         }
-        assert_eq!((quantised(5.0, [1.0, 1.0], 9), quantised(f64::NAN, [0.0, 1.0], 9)), (0, 0));
-        assert_eq!(encoded([1u16, 0x0203].into_iter()), STANDARD.encode([1, 0, 3, 2]));
+        assert_eq!((quantise(5.0, [1.0, 1.0], 9), quantise(f64::NAN, [0.0, 1.0], 9)), (0, 0));
+        assert_eq!(encode([1u16, 0x0203].into_iter()), STANDARD.encode([1, 0, 3, 2]));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::data::RunData;
 use super::markup::{note, table};
-use super::ticks::{number, trimmed};
+use super::ticks::{number, trim_zeros};
 use crate::build::{Audited, Outline};
 use crate::config::RegionModel;
 use crate::files::{ConstraintResult, ProbeResult, RunResult, TermResult};
@@ -25,7 +25,7 @@ const MOST_ROWS: usize = 800;
 const MOST_EVENTS: usize = 160;
 
 /// A table under its title, nothing where it is empty; of a very long one the beginning.
-fn titled(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
+fn titled_table(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
     let shown = rows.len().min(most);
     html! {
         @if !rows.is_empty() {
@@ -45,7 +45,7 @@ fn columns(rows: &[Evaluation]) -> Vec<(&str, Cell<'_>)> {
         (title, Box::new(cell))
     }
     let thickness = |row: &Evaluation| {
-        let [low, high] = [row.min_thickness_m?, row.max_thickness_m?].map(|t| trimmed(1e3 * t, 2));
+        let [low, high] = [row.min_thickness_m?, row.max_thickness_m?].map(|t| trim_zeros(1e3 * t, 2));
         Some(format!("{low}–{high}"))
     };
     let mut all = vec![
@@ -131,7 +131,7 @@ fn constraints(constraints: &[ConstraintResult]) -> Markup {
     };
     let rows: Vec<Vec<String>> = constraints.iter().map(row).collect();
     let head = ["constraint", "value [SI]", "bound [SI]", ""];
-    titled("Constraints at the best design", &head, &rows, MOST_ROWS)
+    titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
 }
 
 fn terms(terms: &[TermResult]) -> Markup {
@@ -140,14 +140,14 @@ fn terms(terms: &[TermResult]) -> Markup {
             t.kind.replace('_', " "),
             t.region.clone().unwrap_or_else(|| "whole mesh".to_owned()),
             t.frequency.map_or("all".to_owned(), hertz),
-            trimmed(t.weight, 6),
+            trim_zeros(t.weight, 6),
             number(t.value, 6),
             number(t.weight * t.value, 6),
         ]
     };
     let rows: Vec<Vec<String>> = terms.iter().map(row).collect();
     let head = ["term", "region", "frequency", "weight", "value [SI]", "weighted"];
-    titled("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
+    titled_table("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
 }
 
 fn losses(states: &[State<'_>]) -> Markup {
@@ -157,18 +157,18 @@ fn losses(states: &[State<'_>]) -> Markup {
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|(f, losses, _)| losses.iter().map(|entry| row(*f, entry))).collect();
     let head = ["region", "frequency", "loss [W]"];
-    titled("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
+    titled_table("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
 }
 
 fn probes(states: &[State<'_>]) -> Markup {
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|(f, _, probes)| probes.iter().flat_map(|probe| rows_of(*f, probe))).collect();
     let head = ["probe", "x, y, z [mm]", "frequency", "|B| [mT]", "Bx [mT]", "By [mT]", "Bz [mT]"];
-    titled("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
+    titled_table("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
 }
 
 fn hertz(frequency: f64) -> String {
-    format!("{} Hz", trimmed(frequency, 6))
+    format!("{} Hz", trim_zeros(frequency, 6))
 }
 
 /// The rows of one probe.
@@ -181,7 +181,7 @@ fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
         if frequency == 0.0 { real } else { format!("{real} {sign} {} j", number(1e3 * im.abs(), 3)) }
     };
     let row = |k: usize| {
-        let place = probe.points_m[k].map(|c| trimmed(1e3 * c, 2)).join(", ");
+        let place = probe.points_m[k].map(|c| trim_zeros(1e3 * c, 2)).join(", ");
         let mut cells = vec![probe.name.clone(), place, hertz(frequency)];
         if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {
             let size = re.iter().chain(&im).map(|c| c * c).sum::<f64>().sqrt();
@@ -227,12 +227,12 @@ pub(super) fn skin(outline: &Outline) -> Markup {
     }
 }
 
-/// Rounds and remedies of the mesh motion; nothing where there were none.
+/// Rounds and fallbacks of the mesh motion; nothing where there were none.
 pub(super) fn rounds(result: &RunResult) -> Markup {
     let listed = result.rounds.len().min(MOST_EVENTS);
     html! {
         @if listed > 0 {
-            h3 { "Rounds and remedies of the mesh motion" }
+            h3 { "Rounds and fallbacks of the mesh motion" }
             ul {
                 @for event in &result.rounds[..listed] { li { (event.describe()) } }
                 @if listed < result.rounds.len() { li { "and " (result.rounds.len() - listed) " more" } }

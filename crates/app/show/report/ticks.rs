@@ -63,7 +63,7 @@ pub(crate) fn labels(ticks: &[f64]) -> Vec<String> {
         return ticks.iter().map(|t| number(*t, 3)).collect();
     }
     if !(1e-3..1e6).contains(&step) || largest >= 1e6 {
-        // As many digits as tell neighbours apart.
+        // As many digits as distinguish neighbours.
         let digits = (largest.log10().floor() - step.log10().floor()).clamp(0.0, 12.0) as usize + 1;
         return ticks.iter().map(|t| number(*t, digits)).collect();
     }
@@ -82,20 +82,20 @@ pub(crate) fn number(value: f64, digits: usize) -> String {
             let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
             minus(&format!("{value:.decimals$}"))
         }
-        _ if mantissa == "1" => format!("10{}", raised(exponent)),
-        _ => format!("{} × 10{}", minus(mantissa), raised(exponent)),
+        _ if mantissa == "1" => format!("10{}", superscript(exponent)),
+        _ => format!("{} × 10{}", minus(mantissa), superscript(exponent)),
     }
 }
 
-/// A number with as many decimals as asked for, without zeros behind.
-pub(crate) fn trimmed(value: f64, decimals: usize) -> String {
+/// A number with as many decimals as asked for, without trailing zeros.
+pub(crate) fn trim_zeros(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value);
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     minus(if text == "-0" { "0" } else { text })
 }
 
 /// Thousands set apart by thin spaces.
-pub(crate) fn grouped(count: usize) -> String {
+pub(crate) fn group_digits(count: usize) -> String {
     let digits = count.to_string();
     if digits.len() < 5 {
         return digits;
@@ -124,7 +124,7 @@ fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
 
-fn raised(exponent: i32) -> String {
+fn superscript(exponent: i32) -> String {
     let digit = |c: char| match c {
         '-' => '⁻',
         '1' => '¹',
@@ -165,10 +165,13 @@ mod tests {
         assert_eq!((of(3.704e-9), of(0.0), of(1e7)), ("3.70 × 10⁻⁹".into(), "0".into(), "1.00 × 10⁷".into()));
         assert_eq!(number(1e-9, 1), "10⁻⁹");
         assert_eq!(
-            (trimmed(30.0, 1), trimmed(-0.01, 1), trimmed(2.50, 2)),
+            (trim_zeros(30.0, 1), trim_zeros(-0.01, 1), trim_zeros(2.50, 2)),
             ("30".into(), "0".into(), "2.5".into())
         );
-        assert_eq!((grouped(9999), grouped(1_234_567)), ("9999".into(), "1\u{202f}234\u{202f}567".into()));
+        assert_eq!(
+            (group_digits(9999), group_digits(1_234_567)),
+            ("9999".into(), "1\u{202f}234\u{202f}567".into())
+        );
         assert_eq!(
             (duration(9.87), duration(61.5), duration(7325.0)),
             ("9.87 s".into(), "1 min 01 s".into(), "2 h 02 min".into())

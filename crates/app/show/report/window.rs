@@ -76,7 +76,7 @@ impl Window {
     /// The plane in words: `y = 12.5`, in the unit of `millimetres`.
     pub(super) fn describe(&self, millimetres: &str) -> String {
         let axis = ["x", "y", "z"][self.plane.axis];
-        format!("the plane {axis} = {} {millimetres}", super::ticks::trimmed(1e3 * self.plane.at, 1))
+        format!("the plane {axis} = {} {millimetres}", super::ticks::trim_zeros(1e3 * self.plane.at, 1))
     }
 }
 

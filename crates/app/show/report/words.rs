@@ -1,6 +1,6 @@
 //! The configuration in plain words.
 
-use super::ticks::{number, trimmed};
+use super::ticks::{number, trim_zeros};
 use crate::config::{
     Algorithm, BodyKind, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal, Limit,
     ObjectiveKind, UpperBound, Weighting,
@@ -38,14 +38,14 @@ pub(super) fn functional(functional: &Functional) -> String {
             sum(&format!("|B − ({target}) T|²"))
         }
         ObjectiveKind::FieldComponent => {
-            let along = functional.direction.unwrap_or_default().map(|c| trimmed(c, 3)).join(", ");
+            let along = functional.direction.unwrap_or_default().map(|c| trim_zeros(c, 3)).join(", ");
             format!("the mean of B along ({along}) in {region}")
         }
         ObjectiveKind::Loss => format!("the eddy-current loss in {region}"),
         ObjectiveKind::Energy => format!("the magnetic energy in {region}"),
     };
     match functional.frequency {
-        Some(frequency) => format!("{what} at {} Hz", trimmed(frequency, 6)),
+        Some(frequency) => format!("{what} at {} Hz", trim_zeros(frequency, 6)),
         None => what,
     }
 }
@@ -54,7 +54,7 @@ pub(super) fn functional(functional: &Functional) -> String {
 pub(super) fn frequencies(config: &Config) -> String {
     match config.analysis.frequencies() {
         [0.0] => "in a static field".to_owned(),
-        all => format!("at {} Hz", all.iter().map(|f| trimmed(*f, 6)).collect::<Vec<_>>().join(", ")),
+        all => format!("at {} Hz", all.iter().map(|f| trim_zeros(*f, 6)).collect::<Vec<_>>().join(", ")),
     }
 }
 
@@ -67,17 +67,19 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
             Some(axis) => {
                 format!("along {}{}", if vector[axis] < 0.0 { "−" } else { "+" }, ["x", "y", "z"][axis])
             }
-            None => format!("along ({})", vector.map(|c| trimmed(c, 3)).join(", ")),
+            None => format!("along ({})", vector.map(|c| trim_zeros(c, 3)).join(", ")),
         },
     };
-    let [lower, upper] = [design.lower, design.upper].map(|bound| trimmed(1e3 * bound, 3));
+    let [lower, upper] = [design.lower, design.upper].map(|bound| trim_zeros(1e3 * bound, 3));
     let mut text = format!("by moving {} {along} between {lower} and {upper} mm", design.surface.join(", "));
     if let Some(variables) = variables {
         text += &format!(" with {variables} variables");
     }
     match (design.grid, design.filter_radius) {
         (Some([n, m]), _) => text += &format!(" (control grid {n} × {m})"),
-        (None, Some(radius)) => text += &format!(" (nodes, filtered over {} mm)", trimmed(1e3 * radius, 3)),
+        (None, Some(radius)) => {
+            text += &format!(" (nodes, filtered over {} mm)", trim_zeros(1e3 * radius, 3))
+        }
         (None, None) => text += " (one a node)",
     }
     Some(text)
@@ -87,7 +89,7 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
 pub(super) fn constraint(constraint: &Constraint) -> String {
     let upper = |bound: &UpperBound, unit: &str| match bound {
         UpperBound::Value(value) => format!("at most {}{unit}", number(*value, 4)),
-        UpperBound::Ratio(ratio) => format!("at most {} times its initial value", trimmed(*ratio, 6)),
+        UpperBound::Ratio(ratio) => format!("at most {} times its initial value", trim_zeros(*ratio, 6)),
     };
     match &constraint.limit {
         Limit::Field { functional: measured, bound } => {
@@ -103,7 +105,7 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];
             let words = bounds.iter().filter_map(|(word, bound)| {
-                bound.map(|bound| format!("{word} {} mm", trimmed(1e3 * bound, 3)))
+                bound.map(|bound| format!("{word} {} mm", trim_zeros(1e3 * bound, 3)))
             });
             format!("a thickness of {}", words.collect::<Vec<_>>().join(" and "))
         }

@@ -122,7 +122,7 @@ impl<'a> Surface<'a> {
             let mut images = Vec::new();
             for plane in planes.iter().filter(|plane| plane.axis == axis) {
                 for seen in all.iter().filter(|seen| (seen.place[axis] - plane.at).abs() < radius) {
-                    let (place, direction) = (plane.image(seen.place), plane.turned(seen.direction));
+                    let (place, direction) = (plane.image(seen.place), plane.reflect(seen.direction));
                     images.push(Seen { node: seen.node, place, direction });
                 }
             }

@@ -2,16 +2,16 @@
 //!
 //! `Δx_b = D W p`: `D` holds the directions (one for all, or the surface's normals, see `normal`), `W` the weights of the
 //! variables at every node. A variable is a node of the surface, a point of a control grid (`grid`), or a node seen through
-//! a smoothing filter (`filter`); mirrored variables may be tied to one (`ties`), and the free rim held (`rim`). In every
-//! case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node that stays. So the normal_displacements
-//! keep the bounds of the variables, and the transpose, which takes derivatives at the nodes to those with respect to `p`,
-//! is exact.
+//! a smoothing filter (`filter`); mirror images may be constrained to be equal (`symmetry`), and the free boundary edges
+//! held (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at
+//! a node that stays. So the displacements keep the bounds of the variables, and the transpose, which takes derivatives at
+//! the nodes to those with respect to `p`, is exact.
 
+mod boundary_edges;
 mod filter;
 mod grid;
 mod normal;
-mod rim;
-mod ties;
+mod symmetry;
 mod transfer;
 
 use std::collections::BTreeSet;
@@ -42,7 +42,7 @@ pub enum Control {
     /// On a grid with these numbers of points, both at least 2, over the two coordinates across the direction; the first
     /// coordinate is slow in the order of the variables.
     Grid([usize; 2]),
-    /// On every node, and a node's height is the mean of the variables within this radius [m].
+    /// On every node, and a node's displacement is the mean of the variables within this radius [m].
     Filter(f64),
 }
 
@@ -63,15 +63,15 @@ impl Mirror {
     }
 
     /// The mirror image of a vector.
-    pub fn turned(&self, mut vector: Point) -> Point {
+    pub fn reflect(&self, mut vector: Point) -> Point {
         vector[self.axis] = -vector[self.axis];
         vector
     }
 }
 
-/// What the nodes on the design surface's free rim do.
+/// What the nodes on the design surface's free boundary edges do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rim {
+pub enum BoundaryMotion {
     /// They move like all others.
     Free,
     /// They stay.
@@ -87,13 +87,13 @@ pub struct DesignSetup {
     pub direction: Direction,
     /// Where the variables sit.
     pub control: Control,
-    /// Planes over which variables are tied to their mirror images, at most one an axis.
+    /// Planes over which variables equal their mirror images, at most one an axis.
     pub mirrors: Vec<Mirror>,
-    /// What the free rim does.
-    pub rim: Rim,
+    /// What the free boundary edges do.
+    pub boundary: BoundaryMotion,
     /// Faces that a node on them must not leave when it moves along a normal.
     pub kept: Vec<[NodeId; 3]>,
-    /// Faces where the model ends, though not the device: symmetry planes. The rim on them is not free.
+    /// Faces where the model ends, though not the device: symmetry planes. A boundary edge on them is not free.
     pub cuts: Vec<[NodeId; 3]>,
 }
 
@@ -105,7 +105,7 @@ impl DesignSetup {
             direction,
             control: Control::Nodes,
             mirrors: Vec::new(),
-            rim: Rim::Free,
+            boundary: BoundaryMotion::Free,
             kept: Vec::new(),
             cuts: Vec::new(),
         }
@@ -206,35 +206,36 @@ impl DesignSurface {
         let on_nodes = !matches!(setup.control, Control::Grid(_));
         // Where neither normals nor variables sit on nodes, a mirror need not map nodes onto nodes.
         let mirrors_nodes = on_nodes || setup.direction == Direction::Normal;
-        let pairs = if mirrors_nodes { ties::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
+        let pairs =
+            if mirrors_nodes { symmetry::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
         match setup.direction {
-            Direction::Along(direction) => ties::check_direction(direction, &setup.mirrors)?,
-            Direction::Normal => ties::mirror_directions(&mut directions, &setup.mirrors, &pairs),
+            Direction::Along(direction) => symmetry::check_direction(direction, &setup.mirrors)?,
+            Direction::Normal => symmetry::mirror_directions(&mut directions, &setup.mirrors, &pairs),
         }
-        let rim = rim::Edges::new(&setup.triangles, &setup.cuts);
+        let edges = boundary_edges::BoundaryEdges::new(&setup.triangles, &setup.cuts);
 
-        let (mut rows, mut points, ties) = match setup.control {
+        let (mut rows, mut points, groups) = match setup.control {
             Control::Nodes => {
                 let rows = (0..nodes.len()).map(|i| vec![(i, 1.0)]).collect();
-                (rows, places, ties::groups(nodes.len(), &pairs))
+                (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Filter(radius) => {
                 let mut surface = filter::Surface::new(mesh, &nodes, &setup.triangles, &directions);
                 surface.mirror_areas(&pairs);
-                let rows = surface.rows(radius, &rim.symmetry_planes(mesh, &setup.cuts))?;
-                (rows, places, ties::groups(nodes.len(), &pairs))
+                let rows = surface.rows(radius, &edges.symmetry_planes(mesh, &setup.cuts))?;
+                (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Grid(counts) => {
                 let grid = grid::Grid::new(&places, &directions, counts)?;
                 let points = grid.points(&places);
-                let pairs = ties::pairs("control point", &grid.flat(&points), &setup.mirrors)?;
-                let groups = ties::groups(points.len(), &pairs);
+                let pairs = symmetry::pairs("control point", &grid.flat(&points), &setup.mirrors)?;
+                let groups = symmetry::groups(points.len(), &pairs);
                 (places.iter().map(|&x| grid.row(x)).collect(), points, groups)
             }
         };
-        ties.apply(&mut rows, &mut points);
+        groups.apply(&mut rows, &mut points);
         for (i, row) in rows.iter_mut().enumerate() {
-            let held = setup.rim == Rim::Fixed && rim.is_free_rim(nodes[i]);
+            let held = setup.boundary == BoundaryMotion::Fixed && edges.is_on_free_edge(nodes[i]);
             if held || directions[i] == [0.0; 3] {
                 row.clear();
             }
@@ -277,7 +278,7 @@ impl DesignSurface {
         &self.nodes
     }
 
-    /// Unit direction in which a positive height moves each node, shape `(n_nodes, 3)`; zero where a node cannot move.
+    /// Unit direction in which a positive displacement moves each node, shape `(n_nodes, 3)`; zero where a node cannot move.
     pub fn directions(&self) -> &[Point] {
         &self.directions
     }
@@ -308,14 +309,14 @@ impl DesignSurface {
         normal_displacements
             .iter()
             .zip(&self.directions)
-            .map(|(height, direction)| direction.map(|d| height * d))
+            .map(|(along, direction)| direction.map(|d| along * d))
             .collect()
     }
 
-    /// `Wᵀ g`: from derivatives with respect to the nodes' normal_displacements to those with respect to the variables.
-    pub fn normal_displacement_gradient(&self, normal_displacements: &[f64]) -> Vec<f64> {
+    /// `Wᵀ g`: from derivatives with respect to the nodes' displacements along their directions to those with respect to the variables.
+    pub fn normal_displacement_gradient(&self, nodal: &[f64]) -> Vec<f64> {
         let mut gradient = vec![0.0; self.variable_count()];
-        for (row, g) in self.rows.iter().zip(normal_displacements) {
+        for (row, g) in self.rows.iter().zip(nodal) {
             for &(k, weight) in row {
                 gradient[k] += weight * g;
             }

@@ -57,7 +57,7 @@ fn quarter(mesh: &Mesh, direction: Direction, control: Control) -> DesignSetup {
 
 const UP: Direction = Direction::Along([0.0, 0.0, 1.0]);
 
-fn made(mesh: &Mesh, setup: &DesignSetup) -> DesignSurface {
+fn build(mesh: &Mesh, setup: &DesignSetup) -> DesignSurface {
     DesignSurface::new(mesh, setup).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -91,7 +91,7 @@ fn the_gradient_is_the_transpose_of_the_displacement() {
     let (plate, curved) = (plate(), moved_block(6, cap));
     let mirrored = |setup: DesignSetup| DesignSetup {
         mirrors: vec![Mirror { axis: 0, at: 0.5 }],
-        rim: Rim::Fixed,
+        boundary: BoundaryMotion::Fixed,
         ..setup
     };
     let flat = moved_block(6, |x| x);
@@ -99,11 +99,11 @@ fn the_gradient_is_the_transpose_of_the_displacement() {
         plate_surface(&plate, None),
         plate_surface(&plate, Some([7, 13])),
         plate_surface(&plate, Some([2, 2])),
-        made(&curved, &quarter(&curved, Direction::Normal, Control::Nodes)),
-        made(&curved, &quarter(&curved, Direction::Normal, Control::Grid([3, 4]))),
-        made(&curved, &quarter(&curved, Direction::Normal, Control::Filter(0.4))),
-        made(&flat, &mirrored(quarter(&flat, UP, Control::Filter(0.4)))),
-        made(&flat, &mirrored(quarter(&flat, UP, Control::Grid([4, 3])))),
+        build(&curved, &quarter(&curved, Direction::Normal, Control::Nodes)),
+        build(&curved, &quarter(&curved, Direction::Normal, Control::Grid([3, 4]))),
+        build(&curved, &quarter(&curved, Direction::Normal, Control::Filter(0.4))),
+        build(&flat, &mirrored(quarter(&flat, UP, Control::Filter(0.4)))),
+        build(&flat, &mirrored(quarter(&flat, UP, Control::Grid([4, 3])))),
     ];
     for surface in surfaces {
         let p: Vec<f64> = (0..surface.variable_count()).map(|k| (k as f64 * 0.7).sin()).collect();
@@ -123,7 +123,7 @@ fn a_uniform_variable_translates_a_flat_surface() {
     let mesh = moved_block(6, |x| x);
     for control in [Control::Nodes, Control::Grid([3, 5]), Control::Filter(0.3)] {
         for direction in [UP, Direction::Normal] {
-            let surface = made(&mesh, &quarter(&mesh, direction, control));
+            let surface = build(&mesh, &quarter(&mesh, direction, control));
             for u in surface.displacement(&vec![0.2; surface.variable_count()]) {
                 assert!(norm(sub(u, [0.0, 0.0, 0.2])) < 1e-15, "{control:?} {direction:?}: {u:?}");
             }
@@ -135,7 +135,7 @@ fn a_uniform_variable_translates_a_flat_surface() {
 fn a_sphere_grows_along_its_normals_and_keeps_its_symmetry_planes() {
     let errors = [8, 16].map(|cells| {
         let mesh = moved_block(cells, cap);
-        let surface = made(&mesh, &quarter(&mesh, Direction::Normal, Control::Nodes));
+        let surface = build(&mesh, &quarter(&mesh, Direction::Normal, Control::Nodes));
         let mut worst = 0.0_f64;
         let displacement = surface.displacement(&vec![0.1; surface.variable_count()]);
         for (&node, u) in surface.nodes().iter().zip(displacement) {
@@ -146,10 +146,10 @@ fn a_sphere_grows_along_its_normals_and_keeps_its_symmetry_planes() {
                 assert_eq!(u[d], 0.0, "{x:?} must stay on its plane");
             }
             let error = norm(sub(u, radial)) / 0.1;
-            let on_rim = x[0] == 1.0 || x[1] == 1.0;
-            // On the free rim triangles lie on one side only: half a cell's turn of the normal, radius 2.
+            let on_edge = x[0] == 1.0 || x[1] == 1.0;
+            // At a free edge triangles are on one side only: half a cell's turn of the normal, radius 2.
             assert!(error < 0.5 / cells as f64, "{x:?}: {error}");
-            if !on_rim {
+            if !on_edge {
                 worst = worst.max(error);
             }
         }
@@ -165,11 +165,11 @@ fn a_node_in_a_corner_of_three_planes_stays() {
     let mut setup = quarter(&mesh, Direction::Normal, Control::Nodes);
     // A third face that holds the origin's opposite: the corner of the upper face lies on all of them.
     setup.kept.push(setup.triangles[0]);
-    let all = made(&mesh, &setup);
+    let all = build(&mesh, &setup);
     assert_eq!(all.variable_count(), 16, "a face of the surface itself keeps nothing");
     setup.kept = ["x_min", "y_min", "z_max"].iter().flat_map(|name| outward(&mesh, name)).collect();
     setup.triangles.retain(|t| t.iter().any(|&n| mesh.point(n)[0] > 0.5));
-    let held = made(&mesh, &setup);
+    let held = build(&mesh, &setup);
     let beside = held.nodes().iter().zip(held.directions()).filter(|(n, _)| mesh.point(**n)[0] < 0.5);
     for (_, direction) in beside {
         assert_eq!(*direction, [0.0; 3], "its plane is kept by the triangles outside of the surface");
@@ -181,7 +181,7 @@ fn a_node_in_a_corner_of_three_planes_stays() {
 fn the_filter_keeps_the_bounds_and_sums_to_one() {
     let mesh = moved_block(9, cap);
     for radius in [0.05, 0.2, 5.0] {
-        let surface = made(&mesh, &quarter(&mesh, Direction::Normal, Control::Filter(radius)));
+        let surface = build(&mesh, &quarter(&mesh, Direction::Normal, Control::Filter(radius)));
         for row in surface.rows() {
             let sum: f64 = row.iter().map(|(_, weight)| weight).sum();
             assert!((sum - 1.0).abs() < 1e-14 && row.iter().all(|&(_, weight)| weight >= 0.0), "{sum}");
@@ -196,7 +196,7 @@ fn the_filter_keeps_the_bounds_and_sums_to_one() {
 fn mesh_dependence(cells: usize, radius: f64, field: impl Fn(Point) -> f64) -> f64 {
     let (coarse, fine) = (moved_block(cells, |x| x), moved_block(2 * cells, |x| x));
     let [(nodes, normal_displacements), (fine_nodes, fine_heights)] = [&coarse, &fine].map(|mesh| {
-        let surface = made(mesh, &quarter(mesh, UP, Control::Filter(radius)));
+        let surface = build(mesh, &quarter(mesh, UP, Control::Filter(radius)));
         (surface.nodes().to_vec(), surface.normal_displacements(&values(&surface, &field)))
     });
     let difference = |(node, h): (&NodeId, &f64)| {
@@ -237,10 +237,10 @@ fn a_quarter_filters_like_the_whole() {
         Mesh::new(Arc::clone(mesh.topology()), points).expect("a translation")
     };
     let field = |x: Point| (3.0 * x[0].abs() + 1.0).sin() + (4.0 * x[1].abs()).cos();
-    let surface = made(&part, &quarter(&part, UP, Control::Filter(radius)));
+    let surface = build(&part, &quarter(&part, UP, Control::Filter(radius)));
     let full =
         DesignSetup { control: Control::Filter(radius), ..DesignSetup::new(&outward(&whole, "z_max"), UP) };
-    let full = made(&whole, &full);
+    let full = build(&whole, &full);
     let normal_displacements = full.normal_displacements(&values(&full, field));
     for (&node, h) in surface.nodes().iter().zip(surface.normal_displacements(&values(&surface, field))) {
         let x = part.point(node);
@@ -261,7 +261,7 @@ fn the_two_faces_of_a_sheet_do_not_mix() {
     let triangles = [outward(&mesh, "z_min"), outward(&mesh, "z_max")].concat();
     let setup =
         DesignSetup { control: Control::Filter(0.5), ..DesignSetup::new(&triangles, Direction::Normal) };
-    let surface = made(&mesh, &setup);
+    let surface = build(&mesh, &setup);
     let p = values(&surface, |x| if x[2] > 0.005 { 1.0 } else { 0.0 });
     for (&node, h) in surface.nodes().iter().zip(surface.normal_displacements(&p)) {
         let expected = if mesh.point(node)[2] > 0.005 { 1.0 } else { 0.0 };
@@ -286,7 +286,7 @@ fn mirrored_nodes_share_a_variable_and_move_alike() {
                 mirrors: mirrors.clone(),
                 ..DesignSetup::new(&outward(&mesh, "z_max"), Direction::Normal)
             };
-            let surface = made(&mesh, &setup);
+            let surface = build(&mesh, &setup);
             assert_eq!(surface.variable_count(), count, "{control:?}");
             let p: Vec<f64> = (0..count).map(|k| (1.3 * k as f64).sin()).collect();
             let displacement = surface.displacement(&p);
@@ -295,7 +295,7 @@ fn mirrored_nodes_share_a_variable_and_move_alike() {
                     let image = mirror.image(mesh.point(node));
                     let at = |n: &NodeId| norm(sub(mesh.point(*n), image)) < 1e-12;
                     let partner = surface.nodes().iter().position(at).expect("a symmetric mesh");
-                    let off = sub(displacement[i], mirror.turned(displacement[partner]));
+                    let off = sub(displacement[i], mirror.reflect(displacement[partner]));
                     // Sums in another order, of weights and variables of order 1.
                     assert!(norm(off) < 1e-14, "{control:?} at {:?}: {off:?}", mesh.point(node));
                 }
@@ -324,10 +324,11 @@ fn a_node_without_partner_is_named() {
 }
 
 #[test]
-fn a_fixed_rim_stays_except_on_symmetry_planes() {
+fn a_fixed_boundary_stays_except_on_symmetry_planes() {
     let mesh = moved_block(8, |x| x);
     for (control, count) in [(Control::Nodes, 64), (Control::Filter(0.2), 81), (Control::Grid([3, 3]), 9)] {
-        let surface = made(&mesh, &DesignSetup { rim: Rim::Fixed, ..quarter(&mesh, UP, control) });
+        let surface =
+            build(&mesh, &DesignSetup { boundary: BoundaryMotion::Fixed, ..quarter(&mesh, UP, control) });
         assert_eq!(surface.variable_count(), count, "{control:?}");
         let normal_displacements = surface.normal_displacements(&vec![1.0; count]);
         for (&node, h) in surface.nodes().iter().zip(normal_displacements) {

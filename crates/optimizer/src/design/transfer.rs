@@ -1,9 +1,9 @@
-//! Displacements of one triangulation of a design surface, taken over by another one of the same surface.
+//! Displacements of one triangulation of a design surface, transferred to another one of the same surface.
 //!
 //! A node takes the displacement of the nearest point of the undeformed old surface, linear on its triangle: constant and
 //! linear displacements are reproduced, and a planar surface keeps its shape but for the corners between nodes. A node on
-//! the rim takes that of the nearest point of the old rim: it stays in the planes that the rim slides in, and a held rim
-//! stays. Does not live here: what a displacement does to the mesh.
+//! a boundary edge takes that of the nearest point of the old boundary edges: it stays in the planes that these slide in, and
+//! a held boundary stays. Does not live here: what a displacement does to the mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -45,7 +45,7 @@ impl Triangulation {
     }
 
     /// Edges of one triangle only, ascending.
-    fn rim(&self) -> Vec<[usize; 2]> {
+    fn boundary_edges(&self) -> Vec<[usize; 2]> {
         let mut count: BTreeMap<[usize; 2], usize> = BTreeMap::new();
         for &[a, b, c] in &self.triangles {
             for [i, j] in [[a, b], [b, c], [c, a]] {
@@ -62,13 +62,13 @@ impl Triangulation {
     ///
     /// # Panics
     /// If there is not one displacement per node.
-    pub fn transferred(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
+    pub fn transfer(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
         assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
         let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
-        let rim = Pieces::new(&self.places, self.rim().iter().map(|e| e.to_vec()).collect());
-        let on_rim: BTreeSet<usize> = fresh.rim().into_iter().flatten().collect();
+        let boundary = Pieces::new(&self.places, self.boundary_edges().iter().map(|e| e.to_vec()).collect());
+        let on_boundary: BTreeSet<usize> = fresh.boundary_edges().into_iter().flatten().collect();
         let of = |(i, &place): (usize, &Point)| {
-            let pieces = if on_rim.contains(&i) { &rim } else { &inner };
+            let pieces = if on_boundary.contains(&i) { &boundary } else { &inner };
             let weights = pieces.nearest(place).ok_or(SurfaceMismatch { point: place })?;
             Ok(weights.iter().fold([0.0; 3], |sum: Point, &(node, weight)| {
                 std::array::from_fn(|d| sum[d] + weight * displacement[node][d])
@@ -185,7 +185,7 @@ mod tests {
             |x: &Point| [0.2 * x[1], -0.1 * x[0], 0.01],
         ] {
             let displacement: Vec<Point> = old.places.iter().map(law).collect();
-            let found = old.transferred(&displacement, &fresh).expect("the same plane");
+            let found = old.transfer(&displacement, &fresh).expect("the same plane");
             for (place, found) in fresh.places.iter().zip(found) {
                 // Rounding of places of half a metre, times slopes below one.
                 assert!(norm(sub(found, law(place))) < 1e-15, "{place:?}: {found:?}");
@@ -197,7 +197,7 @@ mod tests {
     fn a_surface_takes_its_own_displacements_over_exactly() {
         let old = plate([5, 6], |x, y| 0.1 * (3.0 * x * x - y * y));
         let displacement: Vec<Point> = (0..old.places.len()).map(|i| [0.0, 1e-3 * i as f64, 1.0]).collect();
-        let found = old.transferred(&displacement, &old).expect("the same surface");
+        let found = old.transfer(&displacement, &old).expect("the same surface");
         for (found, expected) in found.iter().zip(&displacement) {
             // Rounding of displacements of a metre.
             assert!(norm(sub(*found, *expected)) < 1e-14, "{found:?}: {expected:?}");
@@ -206,12 +206,12 @@ mod tests {
 
     #[test]
     fn a_held_rim_stays_and_a_rim_in_a_plane_keeps_to_it() {
-        // On a bent surface the nearest point to a node of the rim may lie inside, where nodes leave the rim's plane.
+        // On a bent surface the nearest point to a node of the boundary may lie inside, where nodes leave its plane.
         let bent = |x: f64, y: f64| 0.3 * (x * x + x * y);
         let (old, fresh) = (plate([4, 5], bent), plate([7, 6], bent));
         let law = |x: &Point| if x[0] == 0.0 { [0.0, 0.0, 0.01] } else { [0.01, 0.0, 0.01] };
         let displacement: Vec<Point> = old.places.iter().map(law).collect();
-        let found = old.transferred(&displacement, &fresh).expect("the same surface");
+        let found = old.transfer(&displacement, &fresh).expect("the same surface");
         assert!(fresh.places.iter().zip(&found).all(|(x, u)| x[0] > 0.0 || u[0] == 0.0));
     }
 
@@ -219,7 +219,7 @@ mod tests {
     fn another_surface_is_refused_with_the_place() {
         let (old, other) = (plate([4, 4], |_, _| 0.0), plate([4, 4], |_, _| 0.1));
         let displacement = vec![[0.0; 3]; old.places.len()];
-        let refused = old.transferred(&displacement, &other).expect_err("a tenth of a metre apart");
+        let refused = old.transfer(&displacement, &other).expect_err("a tenth of a metre apart");
         assert_eq!(refused, SurfaceMismatch { point: [0.0, 0.0, 0.1] });
     }
 }

@@ -3,7 +3,7 @@
 use super::evaluation::Evaluation;
 use crate::problem::{RoundEvent, Stage};
 
-/// Is told what happens during a run. Nothing is shown unless a method is overridden; what is a line in any form goes
+/// Receives what happens during a run. Nothing is shown unless a method is overridden; whatever is shown as a line goes
 /// through [`Observer::line`].
 pub trait Observer {
     /// Shows a line.
@@ -31,17 +31,17 @@ pub trait Observer {
         let _ = evaluation;
     }
 
-    /// The mesh has a new reference, or a remedy was taken.
+    /// The mesh has a new reference, the trust region shrank, or the mesh motion fell back.
     fn round(&mut self, event: &RoundEvent) {
         self.line(&event.describe());
     }
 
-    /// Something that was left out, and why; nothing to act on.
+    /// Something that was skipped, and why; nothing to act on.
     fn notice(&mut self, message: &str) {
         self.line(&format!("note: {message}"));
     }
 
-    /// Something the user should know; the run goes on.
+    /// Something the user should know; the run continues.
     fn warning(&mut self, message: &str) {
         let _ = message;
     }

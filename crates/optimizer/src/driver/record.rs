@@ -10,7 +10,7 @@ use crate::problem::Timings;
 /// One evaluation with everything that a resumed run needs of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Its row in the history; objective and round stand there.
+    /// Its row in the history, with objective and round.
     pub row: Evaluation,
     /// Whether it was the best until then.
     pub improved: bool,

@@ -30,14 +30,14 @@ pub(super) struct Run<'a> {
     /// The record that the next design should be answered with.
     pub(super) next: Option<Record>,
     pub(super) best: Option<Incumbent>,
-    /// The best design has another mesh now: the next evaluation takes its place.
+    /// The mesh of the best design has changed: the next evaluation replaces it.
     pub(super) best_is_stale: bool,
     worst_residual: f64,
     timings: Timings,
     rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
-    /// Whether ranks have a share in what is computed, or had one in what is replayed.
+    /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
 
@@ -100,18 +100,18 @@ impl<'a> Run<'a> {
         self.best.as_ref().map(|best| best.evaluation)
     }
 
-    /// Violation and objective of the best design, where it stands on its own mesh.
-    pub(super) fn standing(&self) -> Option<(f64, f64)> {
+    /// Violation and objective of the best design, unless its mesh has changed since it was evaluated.
+    pub(super) fn incumbent_values(&self) -> Option<(f64, f64)> {
         let best = self.best.as_ref().filter(|_| !self.best_is_stale)?;
         Some((best.violation, best.objective))
     }
 
-    /// Whether the best design is better than it was `before`, at so many evaluations and with that standing, by more
-    /// than the share `least`.
+    /// Whether the best design is better than it was `before`, after so many evaluations and with those
+    /// [`Run::incumbent_values`], by more than the share `least`.
     pub(super) fn has_gained(&self, before: (usize, Option<(f64, f64)>), least: f64) -> bool {
         self.best.as_ref().is_some_and(|best| match before {
             (evaluations, None) => best.evaluation > evaluations,
-            (_, Some(standing)) => best.has_gained(standing, least),
+            (_, Some(values)) => best.has_gained(values, least),
         })
     }
 

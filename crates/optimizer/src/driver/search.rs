@@ -79,7 +79,7 @@ pub(super) enum NextStep {
     FallBack(Refusal),
 }
 
-/// Where the search for the best design stands between two starts of the method.
+/// The state of the search for the best design between two starts of the method.
 pub(super) struct Search<'a> {
     settings: &'a Settings,
     trust: TrustRegion,
@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
         };
-        let before = (run.evaluations(), run.standing());
+        let before = (run.evaluations(), run.incumbent_values());
         let outcome = minimise(&minimisation, &run.centre(), |p| run.evaluate(p));
         let evaluations = run.evaluations() - before.0;
         if let Outcome::Interrupted(Stop::Mesh(refusal)) = &outcome {
@@ -202,13 +202,13 @@ impl<'a> Search<'a> {
         ));
     }
 
-    /// Lays the trust region around the best design.
+    /// Centres the trust region on the best design.
     pub(super) fn move_trust_region(&mut self, run: &Run<'_>) -> Result<(), Error> {
         self.trust = TrustRegion::new(run.shape(), &run.centre(), self.trust.scale)?;
         Ok(())
     }
 
-    /// Makes the best mesh the reference of a new round, and lays the trust region around the best design.
+    /// Makes the best mesh the reference of a new round, and centres the trust region on the best design.
     pub(super) fn begin_round(&mut self, run: &mut Run<'_>, cause: &str) -> Result<(), Error> {
         run.begin_round()?;
         // What a trust region shrank to is doubled with every gain.
@@ -221,7 +221,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Searches nearer to the best design.
+    /// Shrinks the trust region around the best design.
     pub(super) fn shrink_trust_region(
         &mut self,
         run: &mut Run<'_>,

@@ -1,36 +1,37 @@
-//! The box a method may search in during a round: how far the mesh of the round can be trusted.
+//! The trust region of a round: a box around its first design in which the method may search.
 //!
 //! The mesh carries a motion of all variables towards their upper bounds up to some share, within
-//! [`fluxmorph_remesh::StepLimits::inversion_share`] of the first inversion. That share of the longest of these ways is how far
-//! every variable may go up, though never beyond its bound; down likewise. A variable that lies on its bound already asks
-//! nothing of the mesh, and one that is near it may go there. Without rounds the box is that of the bounds, since no other
-//! reference can be had. Designs inside the box may still be refused one by one; then `scale` makes it smaller.
+//! [`fluxmorph_remesh::StepLimits::inversion_share`] of the first inversion. That share of the largest distance of a
+//! variable to its upper bound is how far every variable may go up, though never beyond its bound; down likewise. A
+//! variable on its bound asks nothing of the mesh, and one near it may go there. Without rounds the trust region is the box
+//! of the bounds, since there can be no other reference mesh. Designs inside it may still be refused one by one; then
+//! `scale` shrinks it.
 
 use fluxmorph_remesh::RemeshError;
 
 use crate::problem::Shape;
 
-/// Of its span, a variable nearer than this to a bound lies on it: far below any step, and above rounding.
+/// A variable nearer to a bound than this share of its span is on it: far below any step, and above rounding.
 const ON_BOUND: f64 = 1e-9;
 
-/// A box reaches at least this share of the longest way: methods need room, and designs in it may still be refused.
+/// Least share of the distance to the bounds: methods need room, and designs may still be refused one by one.
 const LEAST_REACH: f64 = 1e-3;
 
-/// A box around the first design of a round.
+/// The trust region of a round.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TrustRegion {
-    /// The design in its middle [m].
+    /// The design at its centre [m].
     centre: Vec<f64>,
-    /// Longest way of a variable to its lower and to its upper bound [m].
-    ways: [f64; 2],
-    /// Shares of these ways that the mesh carries.
+    /// Largest distance of a variable to its lower and to its upper bound [m].
+    distances: [f64; 2],
+    /// Shares of these distances that the mesh carries.
     reach: [f64; 2],
     /// Both are multiplied by it.
     pub(super) scale: f64,
 }
 
 impl TrustRegion {
-    /// The box of the present round around a design.
+    /// The trust region of the present round around a design.
     ///
     /// # Errors
     /// As [`fluxmorph_remesh::ElasticMap::linear`].
@@ -46,27 +47,27 @@ impl TrustRegion {
             let share = shape.limits.inversion_share * shape.motion().inversion(&step).step;
             Ok(share.clamp(LEAST_REACH, 1.0))
         };
-        let longest = |change: &Vec<f64>| change.iter().fold(0.0_f64, |longest, d| longest.max(d.abs()));
+        let largest = |change: &Vec<f64>| change.iter().fold(0.0_f64, |largest, d| largest.max(d.abs()));
         Ok(Self {
             centre: centre.to_vec(),
-            ways: changes.each_ref().map(longest),
+            distances: changes.each_ref().map(largest),
             reach: [reach(&changes[0])?, reach(&changes[1])?],
             scale,
         })
     }
 
-    /// How far the search may go down and up, as shares of the longest way to a bound.
+    /// How far the variables may go down and up, as shares of the largest distance to a bound.
     pub(super) fn reach(&self) -> [f64; 2] {
         self.reach.map(|reach| self.scale * reach)
     }
 
-    /// Lower and upper bounds of the variables in the box [m].
+    /// Lower and upper bounds of the variables in the trust region [m].
     pub(super) fn bounds(&self, shape: &Shape) -> [Vec<f64>; 2] {
-        let ([down, up], [lowest, highest]) = (self.reach(), self.ways);
-        // The whole way is the bound itself, to the last bit.
-        let to = |centre: f64, way: f64, share: f64, bound: f64| {
-            if share < 1.0 && way < (bound - centre).abs() {
-                centre + way.copysign(bound - centre)
+        let ([down, up], [lowest, highest]) = (self.reach(), self.distances);
+        // The whole distance is the bound itself, to the last bit.
+        let to = |centre: f64, distance: f64, share: f64, bound: f64| {
+            if share < 1.0 && distance < (bound - centre).abs() {
+                centre + distance.copysign(bound - centre)
             } else {
                 bound
             }
@@ -77,7 +78,7 @@ impl TrustRegion {
         [lower.collect(), upper.collect()]
     }
 
-    /// Whether the box, and not the design's own bounds, keeps a variable from going on.
+    /// Whether a variable is on the boundary of the trust region that is no bound of the design.
     pub(super) fn holds_back(&self, shape: &Shape, p: &[f64]) -> bool {
         let [lower, upper] = self.bounds(shape);
         (0..p.len()).any(|k| {

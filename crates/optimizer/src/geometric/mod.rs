@@ -7,13 +7,13 @@ mod thickness_bound;
 mod volume;
 mod wall_thickness;
 
-pub use thickness_bound::{Bound, MARGIN, ThicknessBound};
+pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit};
 pub use volume::Volume;
 pub use wall_thickness::WallThickness;
 
 use fluxmorph_geometry::MeshError;
 
-/// Why a geometric function cannot be made.
+/// Why a geometric function cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GeometricError {

@@ -20,7 +20,7 @@ pub const MARGIN: f64 = 0.01;
 
 /// A limit of the thickness [m].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bound {
+pub enum ThicknessLimit {
     /// At least this thick.
     Minimum(f64),
     /// At most this thick.
@@ -30,7 +30,7 @@ pub enum Bound {
 /// A limit of the thickness at every design node as one function of the variables.
 #[derive(Clone, Debug)]
 pub struct ThicknessBound {
-    bound: Bound,
+    bound: ThicknessLimit,
     /// `ρ` [1/m].
     sharpness: f64,
 }
@@ -38,16 +38,16 @@ pub struct ThicknessBound {
 impl ThicknessBound {
     /// # Errors
     /// [`GeometricError::NoThickness`] where the shape has none.
-    pub fn new(shape: &Shape, bound: Bound) -> Result<Self, GeometricError> {
+    pub fn new(shape: &Shape, bound: ThicknessLimit) -> Result<Self, GeometricError> {
         let thickness = shape.thickness().ok_or(GeometricError::NoThickness)?;
-        let (Bound::Minimum(limit) | Bound::Maximum(limit)) = bound;
+        let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0; a limit of zero is held as one of a micrometre.
         let count = thickness.at_nodes().count().max(2) as f64;
         Ok(Self { bound, sharpness: count.ln() / (MARGIN * limit.abs().max(1e-6)) })
     }
 
     /// The limit.
-    pub fn bound(&self) -> Bound {
+    pub fn bound(&self) -> ThicknessLimit {
         self.bound
     }
 
@@ -60,8 +60,8 @@ impl ThicknessBound {
         let thickness = shape.thickness().expect("a bound is made for a shape with a thickness");
         let normal_displacements = shape.surface().normal_displacements(p);
         let (sign, limit) = match self.bound {
-            Bound::Minimum(limit) => (-1.0, limit),
-            Bound::Maximum(limit) => (1.0, limit),
+            ThicknessLimit::Minimum(limit) => (-1.0, limit),
+            ThicknessLimit::Maximum(limit) => (1.0, limit),
         };
         let excess: Vec<(usize, f64)> = thickness
             .at_nodes()

@@ -1,4 +1,4 @@
-//! WallThickness of the designed body behind every design node, measured along the node's direction of motion.
+//! Wall thickness of the designed body behind every design node, measured along the node's direction of motion.
 //!
 //! From each node of the design surface a ray runs against its direction to the body's opposite face. That face is held
 //! (docs/theory.md), so the thickness of a design is the initial one plus the node's height: exactly where one direction

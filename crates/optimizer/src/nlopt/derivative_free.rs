@@ -32,7 +32,7 @@ pub struct Search {
 
 /// Makes `evaluate` large from `start`, which is moved into the bounds, and gives the best point with its value; a value
 /// that is not finite is worse than all others. `Break` ends the search at once, and so does a point of the library's that is
-/// no number.
+/// not finite.
 ///
 /// `None` without variables, where bounds or start are not finite or the bounds cross, and where the library refuses its
 /// arguments at once.
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_that_is_broken_off_asks_no_more_and_keeps_its_best() {
+    fn an_interrupted_search_asks_no_more_and_keeps_its_best() {
         let mut asked = 0;
         let search = Search { lower: vec![0.0; 3], upper: vec![1.0; 3], evaluations: 100 };
         let best = maximise(&search, &[0.5; 3], |x| {

@@ -5,8 +5,8 @@
 //! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
 //! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
 //! thrown away. A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
-//! NLopt's that is no number, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
-//! caught here and goes on after NLopt has returned.
+//! NLopt's that is not finite, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
+//! caught here and resumed after NLopt has returned.
 
 use std::cell::RefCell;
 
@@ -67,7 +67,7 @@ impl Sample {
         derivatives("the relative objective", &self.gradient)?;
         if self.constraints.len() != constraints {
             return Err(Error::Optimisation {
-                cause: "an evaluation gives another number of constraints than the method was told",
+                cause: "an evaluation gives another number of constraints than was announced to the method",
             });
         }
         for (number, (value, gradient)) in self.constraints.iter().enumerate() {
@@ -198,7 +198,7 @@ pub fn minimise<E: From<Error>>(
         evaluate,
         settings,
         scaling: &scaling,
-        start: (start, scaling.scaled(start)),
+        start: (start, scaling.scale(start)),
         last: None,
         asked: 0,
         guard: PanicGuard::default(),
@@ -212,7 +212,7 @@ pub fn minimise<E: From<Error>>(
     };
     let mut library =
         ::nlopt::Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
-    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scaled(bounds));
+    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
     let mut accepted = library
         .set_lower_bounds(&lower)
         .and_then(|_| library.set_upper_bounds(&upper))
@@ -228,7 +228,7 @@ pub fn minimise<E: From<Error>>(
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
     }
-    let mut x = scaling.scaled(start);
+    let mut x = scaling.scale(start);
     for (k, x) in x.iter_mut().enumerate() {
         *x = x.clamp(lower[k], upper[k]);
     }
@@ -279,7 +279,7 @@ impl Scaling {
         })
     }
 
-    fn scaled(&self, values: &[f64]) -> Vec<f64> {
+    fn scale(&self, values: &[f64]) -> Vec<f64> {
         values.iter().zip(&self.unit).map(|(v, unit)| v / unit).collect()
     }
 

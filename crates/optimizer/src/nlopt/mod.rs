@@ -13,7 +13,7 @@ pub use gradient::{Algorithm, CONSTRAINT_TOLERANCE, Ending, Minimisation, Outcom
 /// Below every objective: returning less makes NLopt stop.
 const STOP_VALUE: f64 = -1e300;
 
-/// Calls closures for the library: a panic is caught at the C boundary, and goes on after the library has returned.
+/// Calls closures for the library: a panic is caught at the C boundary, and resumed after the library has returned.
 #[derive(Default)]
 struct PanicGuard {
     caught: Option<Box<dyn Any + Send>>,
@@ -29,7 +29,7 @@ impl PanicGuard {
         self.caught.is_some()
     }
 
-    /// Lets a caught panic go on.
+    /// Resumes a caught panic.
     fn resume(self) {
         if let Some(panic) = self.caught {
             resume_unwind(panic);

@@ -66,8 +66,8 @@ impl Shape {
         Ok(motion.moved(&goal)?)
     }
 
-    /// The round after a motion that stands at displacements of the design nodes, and what happened on the way there;
-    /// `None` if the motion does.
+    /// The round whose reference has these displacements of the design nodes, and what happened on the way there; `None`
+    /// if the reference of `motion` has them already.
     fn continued_to(
         &self,
         motion: &Motion,
@@ -97,13 +97,13 @@ impl Shape {
             if t == 1.0 { goal.clone() } else { start.iter().zip(&goal).map(between).collect() }
         };
         let mut events = Vec::new();
-        let travelled = motion.clone().step_along(&path, &limits, &mut |event: &StepEvent| {
+        let outcome = motion.clone().step_along(&path, &limits, &mut |event: &StepEvent| {
             events.push(RoundEvent::of_continuation(event));
             if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
-        let SteppingOutcome { motion, moved, reached, .. } = travelled;
+        let SteppingOutcome { motion, moved, reached, .. } = outcome;
         if reached < 1.0 {
-            Error::unless(interrupted)?;
+            Error::check_interrupted(interrupted)?;
             return Err(Error::DesignUnreached { reached });
         }
         let policy = motion.policy();

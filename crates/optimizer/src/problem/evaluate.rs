@@ -65,7 +65,7 @@ impl Problem {
         Ok(analysis)
     }
 
-    /// The second half of [`Problem::evaluate`]: on the mesh of the variables `p`, for whoever looks at that first.
+    /// The second part of [`Problem::evaluate`]: on the mesh of the variables `p`, for callers that check that mesh first.
     ///
     /// # Errors
     /// As [`Problem::evaluate`].

@@ -1,7 +1,7 @@
-//! The last look at what an evaluation has computed, before an optimiser, a history or a file sees any of it.
+//! Checks that what an evaluation has computed is finite, before an optimiser, a history or a file sees any of it.
 //!
-//! Linear solvers audit their residuals, and a mesh its volumes; a solution of them is finite. What is made of it may still
-//! leave the range of numbers: the square of a large field, a weighted sum, the norm of a gradient. Each is refused here by
+//! Linear solvers audit their residuals, and a mesh its volumes; a solution of them is finite. What is computed from
+//! it may still overflow: the square of a large field, a weighted sum, the norm of a gradient. Each is refused here by
 //! name, as [`Error::NotFinite`], so that no file holds a `NaN`, an infinity, or the `null` that JSON writes for them. One
 //! pass over unknowns, nodes and variables; docs/robustness.md has what it costs and what a run does then.
 
@@ -15,10 +15,10 @@ use crate::error::Error;
 use crate::objective::Term;
 use crate::problem::Analysis;
 
-/// What to do about a field that is no number.
+/// What to do about a field that is not finite.
 const FIELD: &str = "expected a finite number; check currents, material data and units";
 
-/// What to do about an objective or constraint that is no number.
+/// What to do about an objective or constraint that is not finite.
 const SUM: &str = "expected a finite number; check weights, currents and units";
 
 /// `the state at 60 Hz`, or another problem there.
@@ -49,11 +49,11 @@ pub(crate) fn of_term(
     }
 }
 
-/// Potentials [T m] up to here have fields, losses and squares of both that are numbers, in elements of any size that a mesh
+/// Potentials [T m] up to here have finite fields, losses and squares of both, in elements of any size that a mesh
 /// can have (1e-30 m) and for any material (1e60 S/m).
 const SAFE_POTENTIAL: f64 = 1e60;
 
-/// Flux density and loss of every element, and their squares, are numbers.
+/// Checks that flux density and loss of every element, and their squares, are finite.
 ///
 /// One pass over the unknowns; over the elements only where a potential is beyond [`SAFE_POTENTIAL`].
 ///
@@ -88,10 +88,10 @@ pub fn state(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Resul
     Ok(())
 }
 
-/// Values, gradients and their norms, and mesh quality of an evaluation are numbers.
+/// Checks that values, gradients and their norms, and mesh quality of an evaluation are finite.
 ///
 /// # Errors
-/// [`Error::NotFinite`] names the first that is none.
+/// [`Error::NotFinite`] names the first that is not.
 pub fn analysis(analysis: &Analysis, constraints: &[Constraint]) -> Result<(), Error> {
     if let Some(value) = analysis.objective.filter(|value| !value.is_finite()) {
         return Err(Error::NotFinite { what: "the objective".to_owned(), value, expected: SUM });
@@ -117,7 +117,7 @@ pub fn analysis(analysis: &Analysis, constraints: &[Constraint]) -> Result<(), E
     Ok(())
 }
 
-/// dF/dx at every node is a number.
+/// Checks that dF/dx is finite at every node.
 ///
 /// # Errors
 /// [`Error::NotFinite`] names the first node.
@@ -125,7 +125,7 @@ pub fn sensitivity(of: &str, nodal: &[Point]) -> Result<(), Error> {
     let Some(node) = nodal.iter().position(|g| g.iter().any(|g| !g.is_finite())) else { return Ok(()) };
     let value = nodal[node].into_iter().find(|g| !g.is_finite()).unwrap_or_default();
     Err(Error::NotFinite {
-        what: format!("the derivative of {of} by the place of node {node}"),
+        what: format!("the derivative of {of} with respect to the position of node {node}"),
         value,
         expected: SUM,
     })
@@ -135,7 +135,7 @@ pub fn sensitivity(of: &str, nodal: &[Point]) -> Result<(), Error> {
 fn derivative(of: &str, gradient: &[f64]) -> Result<(), Error> {
     let refused = |what: String, value: f64| Err(Error::NotFinite { what, value, expected: SUM });
     if let Some((k, &value)) = gradient.iter().enumerate().find(|(_, g)| !g.is_finite()) {
-        return refused(format!("the derivative of {of} by design variable {k}"), value);
+        return refused(format!("the derivative of {of} with respect to design variable {k}"), value);
     }
     let square: f64 = gradient.iter().map(|g| g * g).sum();
     if square.is_finite() { Ok(()) } else { refused(format!("the squared gradient norm of {of}"), square) }

@@ -1,6 +1,6 @@
-//! Progress of a long piece of work, reported to whoever watches it.
+//! Progress of a long piece of work, reported to an observer.
 //!
-//! Whoever computes reports each stage as it begins; what comes of it, a word on a terminal or nothing, is decided above.
+//! Each stage is reported as it begins; how it is shown is decided by the caller.
 
 /// What is being computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

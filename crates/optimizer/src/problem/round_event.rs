@@ -1,4 +1,4 @@
-//! What happens to the mesh between evaluations: rounds that begin, and remedies that are taken.
+//! What happens to the mesh between evaluations: new rounds, smaller trust regions and fallbacks of the mesh motion.
 
 use fluxmorph_remesh::{Fallback, FallbackReport, StepEvent};
 use serde::{Deserialize, Serialize};
@@ -7,17 +7,18 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RoundKind {
-    /// A step towards the first design, which lies too far for a single one.
-    Approach,
+    /// A continuation step towards the first design, which is too far away for a single one.
+    #[serde(rename = "approach")]
+    Continuation,
     /// The best mesh became the reference of a new round.
     Round,
-    /// The box to search in became smaller.
+    /// The trust region shrank.
     SmallerSteps,
     /// Stiffness follows element size in another way.
     Policy,
     /// The interior nodes were smoothed.
     Smoothing,
-    /// The mesh was made anew with all nodes moving along the design's axis.
+    /// The mesh was moved again from the undeformed one, with all nodes constrained to the design's axis.
     Guided,
 }
 
@@ -36,14 +37,15 @@ pub struct RoundEvent {
     pub admitted: Option<[f64; 2]>,
     /// How stiffness follows element size from now on.
     pub stiffness: String,
-    /// How far down and up the search may go from there, as shares of the longest way of a variable to its bound.
+    /// The trust region: how far the variables may go down and up from there, as shares of the largest distance of a
+    /// variable to its lower and to its upper bound.
     pub reach: [f64; 2],
     /// Why.
     pub cause: String,
 }
 
 impl RoundEvent {
-    /// A step of the way to the first design.
+    /// A continuation step towards the first design.
     pub fn of_continuation(event: &StepEvent) -> Self {
         let (round, policy, quality) = match *event {
             StepEvent::Stepped { round, policy, quality, .. } => (round + 1, policy, [quality; 2]),
@@ -51,7 +53,7 @@ impl RoundEvent {
         };
         let event_of_step = Self {
             round,
-            kind: RoundKind::Approach,
+            kind: RoundKind::Continuation,
             evaluation: None,
             worst_quality: quality,
             admitted: None,
@@ -65,7 +67,7 @@ impl RoundEvent {
         }
     }
 
-    /// The same with what a remedy did.
+    /// The same with what a fallback of the mesh motion did.
     #[must_use]
     pub fn with(self, report: &FallbackReport) -> Self {
         let kind = match report.fallback {
@@ -89,17 +91,18 @@ impl RoundEvent {
         };
         let percent = |share: &f64| 100.0 * share;
         match self.kind {
-            RoundKind::Approach => {
-                format!("round {round} on the way to the design: worst quality {after:.4}")
+            RoundKind::Continuation => {
+                format!("round {round} of the continuation to the design: worst quality {after:.4}")
             }
             RoundKind::Round => format!(
-                "round {round}: {cause}; {reference}, worst quality {after:.4}, the search may go {:.1} % of the longest \
-                 way to a lower bound and {:.1} % to an upper one",
+                "round {round}: {cause}; {reference}, worst quality {after:.4}, trust region: {:.1} % of the bound range \
+                 downwards, {:.1} % upwards",
                 percent(down),
                 percent(up)
             ),
             RoundKind::SmallerSteps => format!(
-                "{cause}; less than optimizer.ftol_rel gained since the search began anew: it may go {:.2} % of the longest way to a lower bound and {:.2} % to an upper one",
+                "{cause}; gained less than the relative tolerance since the search was restarted; smaller trust region: \
+                 {:.2} % of the bound range downwards, {:.2} % upwards",
                 percent(down),
                 percent(up)
             ),

@@ -7,7 +7,7 @@ mod session;
 
 use std::path::{Path, PathBuf};
 
-use fluxmorph::build::{Purpose, set_up};
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Config, Goal, Optimizer};
 use fluxmorph_geometry::fem::{c64, norm};
 use fluxmorph_optimizer::problem::Problem;
@@ -24,7 +24,7 @@ fn quick_path() -> PathBuf {
 fn quick(overrides: &[&str]) -> (Problem, Optimizer) {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let (config, source) = Config::from_file(&quick_path(), &overrides).unwrap_or_else(|e| panic!("{e}"));
-    (set_up(&config, &source, Purpose::Optimisation).unwrap().problem, config.optimizer)
+    (set_up(&config, &source, Mode::Optimisation).unwrap().problem, config.optimizer)
 }
 
 /// The field problems of a case with something changed.

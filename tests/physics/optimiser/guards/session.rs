@@ -4,8 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use fluxmorph::config::Config;
-use fluxmorph::files::{OlderRun, system_disk};
-use fluxmorph::run::{self, Limits, Options, SavedRun};
+use fluxmorph::files::{OverwritePolicy, system_disk};
+use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::{Evaluation, Observer, RunObserver, Silent};
 use serde_json::Value;
 
@@ -34,8 +34,13 @@ fn run(directory: &Path, observer: &mut dyn RunObserver) -> Result<(), fluxmorph
     let (mut config, source) = Config::from_file(&quick_path(), &overrides).unwrap();
     config.output.directory = directory.to_owned();
     let disk = system_disk();
-    let options =
-        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
+    let options = Options {
+        disk: &disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 1,
+        ranks: None,
+        interrupted: &|| false,
+    };
     run::run(&config, &source, options, observer).map(drop)
 }
 
@@ -54,9 +59,14 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     }
     // Its evaluations are not lost.
     let disk = system_disk();
-    let options =
-        Options { disk: &disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
-    let limits = Limits { max_evaluations: None, max_time: None };
+    let options = Options {
+        disk: &disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 1,
+        ranks: None,
+        interrupted: &|| false,
+    };
+    let limits = RunLimits { max_evaluations: None, max_time: None };
     let resumed = run::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();
     run(&sound, &mut Silent).unwrap();
     let expected = json(&sound.join("result.json"));

@@ -1,8 +1,8 @@
-//! A team of threads, and a leader that does something with its problem.
+//! A group of threads, and a leader that does something with its problem.
 
 use std::sync::Arc;
 
-use fluxmorph::build::{Purpose, Setup, set_up_watched};
+use fluxmorph::build::{Mode, Setup, set_up_watched};
 use fluxmorph::run;
 use fluxmorph_geometry::parallel::{RankGroup, Role, threads};
 
@@ -16,15 +16,15 @@ pub(crate) fn led<T: Send>(
     lead: impl Fn(Setup) -> T + Sync,
 ) -> T {
     let led = threads::run(size, |ranks| {
-        let team = RankGroup::new(ranks, Arc::default());
+        let group = RankGroup::new(ranks, Arc::default());
         let (config, source) = support::config(name, overrides);
-        if team.role() == Role::Worker {
-            run::serve(&team, &config, &source, Purpose::Optimisation);
+        if group.role() == Role::Worker {
+            run::serve(&group, &config, &source, Mode::Optimisation);
             return None;
         }
-        let setup = set_up_watched(&config, &source, Purpose::Optimisation, Some(&team), &mut |_| ());
+        let setup = set_up_watched(&config, &source, Mode::Optimisation, Some(&group), &mut |_| ());
         let result = lead(setup.unwrap_or_else(|error| panic!("{error}")));
-        team.shut_down();
+        group.shut_down();
         Some(result)
     });
     led.into_iter().flatten().next().expect("the first rank leads")

@@ -1,4 +1,4 @@
-//! A second sweep into the same directory: what is finished stays, what was broken off goes on, what is new begins.
+//! A second sweep into the same directory: what is finished stays, what was interrupted is resumed, what is new is run.
 
 use std::process::Child;
 
@@ -120,7 +120,7 @@ fn a_signal_reaches_the_runs_at_work_once_and_no_further_one_begins() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(code), "{said}");
         assert!(said.contains("design.upper=2mm: interrupted, ") && said.contains("are saved"), "{said}");
-        assert!(said.contains("go on with the same command"), "{said}");
+        assert!(said.contains("resume with the same command"), "{said}");
         // It came to its end in order: what it has computed is in a result.
         assert_eq!(home.json("out/design.upper=2mm/result.json")["status"], "interrupted");
         assert!(home.text("out/sweep.csv").contains("\n3 mm,not_begun,"), "{}", home.text("out/sweep.csv"));
@@ -141,7 +141,7 @@ fn a_run_that_another_process_works_on_is_left_to_it() {
     let mut elsewhere = resume.spawn().expect("the program starts");
     wait_until("its work", || home.rows(&run) > 1);
     home.sweep("out", &one)
-        .with(5, &["design.upper=2mm: another process works on it", "design.upper=3mm: skipped"]);
+        .with(5, &["design.upper=2mm: another process is working on it", "design.upper=3mm: skipped"]);
     elsewhere.kill().expect("killed");
     elsewhere.wait().expect("it has ended");
 }

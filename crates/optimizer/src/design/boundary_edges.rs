@@ -1,4 +1,4 @@
-//! The rim of the design surface: which of its edges are free, and which lie on a plane where only the model ends.
+//! The boundary edges of the design surface: which are free, and which lie on a symmetry plane, where only the model ends.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,29 +13,30 @@ const PLANE_TOLERANCE: f64 = 1e-6;
 type Edge = [NodeId; 2];
 
 /// Edges of the design surface that belong to one of its triangles only.
-pub(super) struct Edges {
-    /// Nodes of those that lie on no cut.
+pub(super) struct BoundaryEdges {
+    /// Nodes of those on no cut.
     free: BTreeSet<NodeId>,
-    /// Those that lie on a cut.
+    /// Those on a cut.
     cut: BTreeSet<Edge>,
 }
 
-impl Edges {
-    /// The rim of `triangles`; `cuts` are the faces where the model ends.
+impl BoundaryEdges {
+    /// The boundary edges of `triangles`; `cuts` are the faces where the model ends.
     pub(super) fn new(triangles: &[[NodeId; 3]], cuts: &[[NodeId; 3]]) -> Self {
         let mut count: BTreeMap<Edge, usize> = BTreeMap::new();
         for edge in triangles.iter().flat_map(edges) {
             *count.entry(edge).or_default() += 1;
         }
-        let border: BTreeSet<Edge> =
+        let boundary: BTreeSet<Edge> =
             count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect();
-        let cut: BTreeSet<Edge> = cuts.iter().flat_map(edges).filter(|edge| border.contains(edge)).collect();
-        let free = border.difference(&cut).flatten().copied().collect();
+        let cut: BTreeSet<Edge> =
+            cuts.iter().flat_map(edges).filter(|edge| boundary.contains(edge)).collect();
+        let free = boundary.difference(&cut).flatten().copied().collect();
         Self { free, cut }
     }
 
-    /// Whether a node lies on the rim, on an edge that is not on a symmetry plane.
-    pub(super) fn is_free_rim(&self, node: NodeId) -> bool {
+    /// Whether a node is on a boundary edge that is not on a symmetry plane.
+    pub(super) fn is_on_free_edge(&self, node: NodeId) -> bool {
         self.free.contains(&node)
     }
 

@@ -1,4 +1,4 @@
-//! Symmetry pairs: variables that are mirror images of each other become one.
+//! Symmetry constraints: variables that are mirror images of each other are constrained to be equal, and become one.
 //!
 //! Mirrors are normal to coordinate axes, one an axis at most; so they commute, and the images of a point are at most
 //! eight. A point on a mirror is its own partner.
@@ -46,7 +46,7 @@ pub(super) fn pairs(
     mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
 }
 
-/// Whether one direction for all nodes lies in every mirror.
+/// Checks that one direction for all nodes is in every mirror plane.
 ///
 /// # Errors
 /// [`DesignError::Oblique`] for the first that it leaves.
@@ -65,7 +65,7 @@ pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror],
             .iter()
             .zip(partner)
             .map(|(&own, &other)| {
-                let image = mirror.turned(directions[other]);
+                let image = mirror.reflect(directions[other]);
                 let sum: Point = std::array::from_fn(|d| own[d] + image[d]);
                 let length = norm(sum);
                 // Unit vectors that all but cancel, or a node that cannot move: neither has a symmetric direction.
@@ -75,7 +75,7 @@ pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror],
     }
 }
 
-/// Which old variable goes into which new one.
+/// The linear constraints of the variables: which old variable goes into which new one.
 pub(super) struct Groups {
     new_of: Vec<usize>,
     /// The first old variable of each new one.
@@ -104,10 +104,10 @@ impl Groups {
             return;
         }
         for row in rows {
-            let mut tied: Row = row.iter().map(|&(k, weight)| (self.new_of[k], weight)).collect();
-            tied.sort_by_key(|&(k, _)| k);
+            let mut merged: Row = row.iter().map(|&(k, weight)| (self.new_of[k], weight)).collect();
+            merged.sort_by_key(|&(k, _)| k);
             row.clear();
-            for (k, weight) in tied {
+            for (k, weight) in merged {
                 match row.last_mut() {
                     Some((last, sum)) if *last == k => *sum += weight,
                     _ => row.push((k, weight)),
