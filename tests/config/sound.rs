@@ -3,8 +3,8 @@
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SphereParameters};
 
 use crate::case::{Case, overwrite, read};
-use crate::program::app::config::{Config, MeshConfig, SourceMap, resolved_toml};
 use crate::program::app::build::build_mesh;
+use crate::program::app::config::{Config, MeshConfig, SourceMap, resolved_toml};
 use crate::program::{folder, text};
 
 /// The configuration must be that of its resolved form, bit for bit.

@@ -6,8 +6,8 @@
 use std::collections::BTreeSet;
 
 use crate::looks::report;
-use crate::program::app::config::Config;
 use crate::program::app::build::build_mesh;
+use crate::program::app::config::Config;
 use crate::program::repository;
 
 /// Least share of typos for which the original is suggested.

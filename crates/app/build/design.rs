@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
+use fluxmorph_optimizer::design::{
+    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
+};
 
 use super::millimetres;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
-use fluxmorph_optimizer::design::{
-    Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Rim, Triangulation,
-};
 
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(

@@ -3,6 +3,10 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
+use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
+use fluxmorph_optimizer::problem::Shape;
+use fluxmorph_optimizer::{Error as OptimizerError, geometric};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional};
 
@@ -10,11 +14,6 @@ use crate::config::{
     self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, UpperBound,
 };
 use crate::error::Error;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
-use fluxmorph_optimizer::geometric;
-use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
-use fluxmorph_optimizer::problem::Shape;
 
 /// Every functional of the configuration with its key path: terms of the objective, then constraints.
 pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {

@@ -5,14 +5,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_remesh::KinematicConstraint;
 
 use super::shape::{regions_at, remesh_setup, thickened};
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::geometric::WallThickness;
 
 /// Mesh, design surface and audits of a configuration.
 #[derive(Debug)]

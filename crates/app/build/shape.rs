@@ -5,6 +5,9 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::parallel::{Ownership, Role};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::geometric::WallThickness;
+use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, ElasticMap, KinematicConstraint, Motion, RemeshError, RemeshSetup, SolverChoice,
     StepLimits, StiffnessPolicy, Subregion,
@@ -17,9 +20,6 @@ use crate::config::{
     StiffnessLaw,
 };
 use crate::error::Error;
-use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::geometric::WallThickness;
-use fluxmorph_optimizer::problem::Shape;
 
 /// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
 const LEAST_QUALITY_SHARE: f64 = 0.05;

@@ -1,16 +1,16 @@
 //! `fluxmorph gradient`.
 
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
+
 use super::args::GradientArgs;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
-use crate::build::memory_limit;
-use crate::build::{Purpose, set_up_watched};
+use crate::build::{Purpose, memory_limit, set_up_watched};
 use crate::config::FactorReuse;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::read_design;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
-use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
 /// Do what the command line says.
 ///

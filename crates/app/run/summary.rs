@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::constraint::{Bound, Constraint};
+use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
 use fluxmorph_solver::{SolverError, recovery};
 
 use super::Session;
@@ -13,9 +16,6 @@ use crate::files::{
     StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
-use fluxmorph_optimizer::constraint::{Bound, Constraint};
-use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
 
 impl Session<'_> {
     /// The parts of a result that run and solve share.

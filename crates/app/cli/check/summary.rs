@@ -4,12 +4,13 @@
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::problem::Progress;
 use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
-use crate::build::memory_limit;
-use crate::build::{Purpose, Setup, set_up_watched};
+use crate::build::{Purpose, Setup, memory_limit, set_up_watched};
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
@@ -18,8 +19,6 @@ use crate::error::Error;
 use crate::files::OlderRun;
 use crate::run::mesh_independence;
 use crate::run::morph::{self, MotionSummary};
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
-use fluxmorph_optimizer::problem::Progress;
 
 /// What `check` found.
 #[derive(Debug, Serialize)]

@@ -10,6 +10,7 @@ use std::ops::ControlFlow;
 
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, add, norm, volume};
+use fluxmorph_optimizer::nlopt::{Search, maximise};
 use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
@@ -18,7 +19,6 @@ use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::show::Observer;
-use fluxmorph_optimizer::nlopt::{Search, maximise};
 
 /// Gain of worst quality for which another policy is taken: on equal cells the isotropic ones are
 /// the same but for rounding.
