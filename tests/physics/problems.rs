@@ -3,8 +3,7 @@
 use fluxmorph::config::Optimizer;
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 /// Number of design variables.

@@ -8,8 +8,7 @@ use fluxmorph::files::StopReason;
 use fluxmorph::show::{Evaluation, Observer, Silent};
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
-use fluxmorph_optimizer::problem::{RoundEvent, RoundKind};
+use fluxmorph_optimizer::problem::{Analysis, Problem, RoundEvent, RoundKind, Shape};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
 fn quick() -> (Problem, Optimizer) {

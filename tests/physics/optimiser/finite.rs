@@ -2,8 +2,7 @@
 
 use fluxmorph::build::{Purpose, set_up};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::problem::finite;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache, finite};
 
 fn named(error: Result<(), Error>) -> String {
     let error = error.expect_err("it is not finite");
