@@ -195,24 +195,21 @@ pub(super) fn constraints(
                 add(written.name.clone(), Quantity::Volume(body), upper(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
-                // Both bounds of one entry are two constraints, told apart by their names.
-                let name = |suffix: &str| match (minimum, maximum) {
-                    (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
-                    _ => written.name.clone(),
-                };
-                let measure = |bound: geometric::Bound| {
-                    geometric::ThicknessBound::new(shape, bound).map_err(|error| {
+                use geometric::Bound::{Maximum, Minimum};
+                let bounds = [
+                    minimum.map(|bound| ("minimum", bound, Minimum(bound), Limit::AtLeast(bound))),
+                    maximum.map(|bound| ("maximum", bound, Maximum(bound), Limit::AtMost(bound))),
+                ];
+                let has_both = minimum.is_some() && maximum.is_some();
+                for (suffix, bound, side, limit) in bounds.into_iter().flatten() {
+                    let measure = geometric::ThicknessBound::new(shape, side).map_err(|error| {
                         let fault = source.diagnostic(&format!("constraints[{k}].kind"), error.to_string());
                         source.error(vec![fault.help("limit design.lower and design.upper instead")])
-                    })
-                };
-                if let Some(bound) = *minimum {
-                    let measure = measure(geometric::Bound::Minimum(bound))?;
-                    add(name("minimum"), Quantity::Thickness { measure, bound }, Limit::AtLeast(bound));
-                }
-                if let Some(bound) = *maximum {
-                    let measure = measure(geometric::Bound::Maximum(bound))?;
-                    add(name("maximum"), Quantity::Thickness { measure, bound }, Limit::AtMost(bound));
+                    })?;
+                    // Both bounds of one entry are two constraints, told apart by their names.
+                    let name =
+                        if has_both { format!("{}_{suffix}", written.name) } else { written.name.clone() };
+                    add(name, Quantity::Thickness { measure, bound }, limit);
                 }
             }
         }
@@ -221,9 +218,8 @@ pub(super) fn constraints(
     let mut names = BTreeSet::new();
     if let Some(twice) = constraints.iter().find(|constraint| !names.insert(constraint.name.as_str())) {
         let message = format!("two constraints are named `{}`", twice.name);
-        return Err(source
-            .error(vec![source.diagnostic("constraints", message).expected("a different name for each")])
-            .into());
+        let fault = source.diagnostic("constraints", message).expected("a different name for each");
+        return Err(source.error(vec![fault]).into());
     }
     Ok(constraints)
 }

@@ -9,7 +9,8 @@ use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_remesh::KinematicConstraint;
 
-use super::shape::{regions_at, remesh_setup, thickened};
+use super::elastic_body::{regions_at, remesh_setup};
+use super::shape::thickened;
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
