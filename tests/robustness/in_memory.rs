@@ -47,13 +47,11 @@ pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
 
 /// Runs a configuration from its start.
 pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
-    let options =
-        Options { disk, older_run: OlderRun::Replace, threads: 1, team: None, interrupted: &|| false };
+    let options = Options { older_run: OlderRun::Replace, ..support::options(disk) };
     run::run(config, source, options, &mut Silent)
 }
 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: Limits) -> Result<RunResult, Error> {
-    let options = Options { disk, older_run: OlderRun::Keep, threads: 1, team: None, interrupted: &|| false };
-    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
+    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, support::options(disk), &mut Silent)
 }
