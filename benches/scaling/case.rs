@@ -6,12 +6,10 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Config;
-use fluxmorph::files::fields;
-use fluxmorph::files::peak_memory_bytes;
+use fluxmorph::files::{fields, peak_memory_bytes};
 use fluxmorph::show::Silent;
 use fluxmorph_optimizer::driver::{self, Unrecorded};
-use fluxmorph_optimizer::problem::{Derivatives, Problem};
-use fluxmorph_optimizer::problem::{NoProgress, SolverCache};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_solver::adjoint;
 use serde::{Deserialize, Serialize};
 

@@ -5,9 +5,8 @@
 
 use std::path::PathBuf;
 
-use fluxmorph_fuzz::in_time;
-use fluxmorph_fuzz::mutation;
 use fluxmorph::config::{Config, resolved_toml};
+use fluxmorph_fuzz::{in_time, mutation};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target};
 
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));

@@ -2,9 +2,8 @@
 
 #![no_main]
 
-use fluxmorph_fuzz::in_time;
 use fluxmorph_fuzz::mesh::{Form, read, with_header};
-use fluxmorph_fuzz::mutation;
+use fluxmorph_fuzz::{in_time, mutation};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target};
 
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));

@@ -7,10 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fastrand::Rng;
+use fluxmorph::schema;
 
 use crate::changes::{CHANGES, Change, changed};
 use crate::places::{Step, all, schema_at, tables};
-use crate::program::app::schema;
 use crate::verdict::{bases, judge, validator};
 
 /// Changed configurations.

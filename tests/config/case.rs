@@ -17,7 +17,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::program::{repository, text, write};
+use crate::program::write;
+use crate::support::{repository, repository_text};
 
 /// Where the sound bases lie.
 const BASES: [&str; 4] =
@@ -135,10 +136,13 @@ impl Case {
     fn files(&self) -> (String, Option<String>) {
         let base = BASES.iter().map(|folder| format!("{folder}/{}", self.base));
         let base = base.into_iter().find(|path| repository(path).is_file());
-        let base = text(&base.unwrap_or_else(|| panic!("{}: no base `{}`", self.at, self.base)));
+        let base = repository_text(&base.unwrap_or_else(|| panic!("{}: no base `{}`", self.at, self.base)));
         let is_mesh = self.base.ends_with(".msh");
-        let (mut config, mut mesh) =
-            if is_mesh { (text("tests/config/bases/of_file.toml"), base) } else { (base, String::new()) };
+        let (mut config, mut mesh) = if is_mesh {
+            (repository_text("tests/config/bases/of_file.toml"), base)
+        } else {
+            (base, String::new())
+        };
         for (from, to) in &self.edits {
             let edited = if mesh.contains(from) { &mut mesh } else { &mut config };
             assert!(edited.contains(from), "{}: no `{from}`", self.at);

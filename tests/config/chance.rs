@@ -8,13 +8,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use cpu_time::ThreadTime;
+use fluxmorph::config::{Config, Dimension, parse_quantity};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
-use crate::program::app::config::{Config, Dimension, parse_quantity};
-use crate::program::repository;
 use crate::sound::assert_reads_back;
+use crate::support::repository;
 
 /// Longest computing time for a text of some kilobytes; the fuzz targets run with the same limit.
 const HANG: Duration = Duration::from_secs(2);
@@ -75,7 +75,7 @@ fn every_former_finding_is_answered_in_time() {
 
 #[test]
 fn odd_and_unfinished_texts_are_answered() {
-    let small = crate::program::text("fuzz/seeds/config/small.toml");
+    let small = crate::support::repository_text("fuzz/seeds/config/small.toml");
     for end in (0..small.len()).step_by(3) {
         read(&small[..end]);
     }

@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::program::{Ended, assert_holds, folder, limited, text, write};
+use crate::program::{assert_holds, limited, write};
+use crate::support::program::{Finished, folder};
+use crate::support::repository_text;
 
 fn quick() -> String {
-    text("configs/shield_quick.toml")
+    repository_text("configs/shield_quick.toml")
 }
 
 /// Writes the quick configuration with another directory of results.
@@ -14,15 +16,15 @@ fn write_quick(home: &Path, directory: &str) {
     write(home, "device.toml", quick().replace("\"runs/shield_quick\"", &format!("{directory:?}")));
 }
 
-fn run(home: &Path, arguments: &[&str]) -> Ended {
+fn run(home: &Path, arguments: &[&str]) -> Finished {
     limited(home, None, arguments)
 }
 
-fn solve(home: &Path, further: &[&str]) -> Ended {
+fn solve(home: &Path, further: &[&str]) -> Finished {
     run(home, &[&["solve", "device.toml", "--quiet"], further].concat())
 }
 
-fn check(home: &Path, further: &[&str]) -> Ended {
+fn check(home: &Path, further: &[&str]) -> Finished {
     run(home, &[&["check", "device.toml"], further].concat())
 }
 
@@ -32,8 +34,8 @@ fn apart(home: &Path, mesh: &str) -> PathBuf {
     for folder in [&own, &other] {
         fs::create_dir_all(folder).expect("made");
     }
-    write(&other, "device.msh", text("crates/geometry/tests/msh_support/sound_v4.msh"));
-    let config = text("tests/config/bases/of_file.toml").replace("face", "left|outside");
+    write(&other, "device.msh", repository_text("crates/geometry/tests/msh_support/sound_v4.msh"));
+    let config = repository_text("tests/config/bases/of_file.toml").replace("face", "left|outside");
     write(&own, "device.toml", config.replace("\"device.msh\"", &format!("{mesh:?}")));
     own
 }
@@ -188,7 +190,7 @@ fn texts_are_neither_executed_nor_expanded() {
         names.sort_unstable();
         assert_holds(home.path(), &names);
         // The same as a mesh: a file of that name, which there is none of.
-        let mesh = crate::program::text("tests/config/bases/of_file.toml")
+        let mesh = crate::support::repository_text("tests/config/bases/of_file.toml")
             .replace("\"device.msh\"", &format!("{:?}", format!("{text}.msh")));
         write(home.path(), "device.toml", mesh);
         check(home.path(), &[]).refuses(5, &["cannot read", &format!("{text}.msh")]);

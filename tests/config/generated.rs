@@ -1,11 +1,11 @@
 //! The shipped schema and the page of keys are fresh, every example is right, and every shipped file names the schema.
 
+use fluxmorph::config::Config;
+use fluxmorph::schema;
 use serde_json::Value;
 
 use crate::chance::files;
-use crate::program::app::config::Config;
-use crate::program::app::schema;
-use crate::program::{repository, text};
+use crate::support::{repository, repository_text};
 use crate::verdict::{bases, judge, validator};
 
 /// The shipped schema.
@@ -29,7 +29,7 @@ fn parts(page: &str) -> [&str; 3] {
 #[ignore = "writes configs/fluxmorph.schema.json and docs/configuration.md: just generate"]
 fn write_the_files() {
     std::fs::write(repository(SCHEMA), schema::text()).expect("the schema can be written");
-    let page = text(PAGE);
+    let page = repository_text(PAGE);
     let [head, _, tail] = parts(&page);
     std::fs::write(repository(PAGE), format!("{head}{BEGIN}{}{END}{tail}", schema::page()))
         .expect("the page can be written");
@@ -37,12 +37,12 @@ fn write_the_files() {
 
 #[test]
 fn the_shipped_schema_is_fresh() {
-    assert!(text(SCHEMA) == schema::text(), "{SCHEMA} is stale: run `just generate`");
+    assert!(repository_text(SCHEMA) == schema::text(), "{SCHEMA} is stale: run `just generate`");
 }
 
 #[test]
 fn the_page_is_fresh() {
-    let page = text(PAGE);
+    let page = repository_text(PAGE);
     assert!(parts(&page)[1] == schema::page(), "{PAGE} is stale: run `just generate`");
 }
 

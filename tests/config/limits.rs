@@ -7,7 +7,9 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 
-use crate::program::{BESIDE, Ended, assert_holds, baseline, check, folder, limited, text, write};
+use crate::program::{BESIDE, assert_holds, baseline, check, limited, write};
+use crate::support::program::{Finished, folder};
+use crate::support::repository_text;
 
 /// Largest configuration, and longest list of overrides, that is read [bytes].
 const LARGEST: usize = 1 << 20;
@@ -19,7 +21,7 @@ const LITTLE: u64 = 32 << 20;
 const BETWEEN: u64 = 130 << 20;
 
 fn quick() -> String {
-    text("configs/shield_quick.toml")
+    repository_text("configs/shield_quick.toml")
 }
 
 /// The quick configuration with one change.
@@ -144,7 +146,7 @@ fn what_is_too_many_is_refused() {
         ("faults of syntax", "= =\n".repeat(200_000).into_bytes(), &["not valid TOML", "not shown"]),
         (
             "cases",
-            (text("configs/block_table1.toml")
+            (repository_text("configs/block_table1.toml")
                 + &many(30_000, |i| format!("[[morph.case]]\nname=\"{i}\"\n")))
                 .into_bytes(),
             &["cases repeat a configuration of", "at most"],
@@ -167,14 +169,14 @@ fn overrides_have_limits_too() {
 }
 
 /// Runs a command on `device.toml` with so much memory.
-fn with_memory(home: &Path, bytes: u64, command: &str, further: &[&str]) -> Ended {
+fn with_memory(home: &Path, bytes: u64, command: &str, further: &[&str]) -> Finished {
     limited(home, Some(bytes), &[&[command, "device.toml"], further].concat())
 }
 
 #[test]
 fn a_problem_that_does_not_fit_is_refused_before_it_is_solved() {
     let home = folder();
-    write(home.path(), "device.toml", text("configs/sphere.toml"));
+    write(home.path(), "device.toml", repository_text("configs/sphere.toml"));
     for command in ["check", "solve"] {
         let says =
             ["solving the problem needs about", "allowed by the limit on data", "--force", "device.toml:6:"];
@@ -188,7 +190,7 @@ fn a_problem_that_does_not_fit_is_refused_before_it_is_solved() {
 #[test]
 fn a_generated_mesh_that_does_not_fit_is_refused_before_it_is_made() {
     let home = folder();
-    let block = text("configs/block_table1.toml");
+    let block = repository_text("configs/block_table1.toml");
     write(home.path(), "device.toml", &block);
     for (command, cells, tetrahedra) in
         [("check", 100, "6000000"), ("morph", 100, "6000000"), ("check", 200, "48000000")]
@@ -247,7 +249,7 @@ fn what_is_no_regular_file_is_not_waited_for() {
         write(
             home.path(),
             "device.toml",
-            text("tests/config/bases/of_file.toml").replace("device.msh", mesh),
+            repository_text("tests/config/bases/of_file.toml").replace("device.msh", mesh),
         );
         check(home.path(), &[]).refuses(code, &[mesh, says]);
     }

@@ -3,14 +3,17 @@
 use std::fs;
 use std::process::Command;
 
+use fluxmorph::config::{Config, ConfigError, DiagnosticReport};
+use fluxmorph::diagnostics::{Style, render};
+
 use crate::case::read;
-use crate::program::app::config::{Config, ConfigError, DiagnosticReport};
-use crate::program::app::diagnostics::{Style, render};
-use crate::program::{assert_holds, folder, limited, text, write};
+use crate::program::{assert_holds, limited, write};
+use crate::support::program::folder;
+use crate::support::repository_text;
 
 /// The quick configuration with three faults.
 fn three_faults() -> String {
-    text("configs/shield_quick.toml")
+    repository_text("configs/shield_quick.toml")
         .replace("\"60 Hz\"", "\"60 mm\"")
         .replace("axis = \"z\"", "axis = \"w\"")
         .replace("poisson = 0.3", "poisson = 0.5")
@@ -55,7 +58,7 @@ fn no_color_and_no_terminal_leave_colours_out() {
 
 #[test]
 fn a_long_line_is_cut_around_the_place() {
-    let quick = text("configs/shield_quick.toml");
+    let quick = repository_text("configs/shield_quick.toml");
     let shown = |from: &str, to: &str| render(&report(&quick.replacen(from, to, 1)), Style::Plain);
     let longest = |text: &str| text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     let lengths = "\"1.0 mm\", ".repeat(250);
@@ -71,7 +74,7 @@ fn a_long_line_is_cut_around_the_place() {
 
 #[test]
 fn a_later_fault_points_at_its_key() {
-    let small = text("fuzz/seeds/config/small.toml");
+    let small = repository_text("fuzz/seeds/config/small.toml");
     let (_, source) = Config::from_str(&small, "small.toml").expect("sound");
     let faults = vec![
         source.unknown_name("design.surface", "surface", "plate_bottom", &["plate_botom", "plate_top"]),
@@ -119,7 +122,7 @@ fn nothing_is_written_for_a_wrong_input() {
 #[test]
 fn the_bound_that_a_message_offers_can_be_used() {
     let home = folder();
-    let config = text("configs/shield_quick.toml");
+    let config = repository_text("configs/shield_quick.toml");
     write(home.path(), "device.toml", config.replacen("[remesh]\n", "[remesh]\nrounds = 0\n", 1));
     let check = |millimetres: f64, further: &[&str]| {
         let bound = format!("design.upper={millimetres:?} mm");

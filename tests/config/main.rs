@@ -20,6 +20,8 @@ mod places;
 mod program;
 mod samples;
 mod sound;
+#[path = "../support/mod.rs"]
+mod support;
 mod typos;
 mod verdict;
 mod wrong;

@@ -14,7 +14,9 @@ use crate::damage::{
     Damaged,
 };
 use crate::msh_support::{Device, Form, Version};
-use crate::program::{BESIDE, Ended, baseline, folder, least_limit, limited, text, write};
+use crate::program::{BESIDE, baseline, least_limit, limited, write};
+use crate::support::program::{Finished, folder};
+use crate::support::repository_text;
 
 /// Memory of the promise for each byte of a mesh file [bytes].
 const PER_BYTE: u64 = 12;
@@ -24,13 +26,13 @@ const ENDLESS: usize = 1 << 20;
 
 /// Writes a configuration and its mesh.
 fn write_mesh(home: &Path, mesh: &[u8]) {
-    let config =
-        text("tests/config/bases/of_file.toml").replace("\"face\"", "\"left|outside\", \"right|outside\"");
+    let config = repository_text("tests/config/bases/of_file.toml")
+        .replace("\"face\"", "\"left|outside\", \"right|outside\"");
     write(home, "device.toml", config);
     write(home, "device.msh", mesh);
 }
 
-fn check(home: &Path, limit: Option<u64>, further: &[&str]) -> Ended {
+fn check(home: &Path, limit: Option<u64>, further: &[&str]) -> Finished {
     limited(home, limit, &[&["check", "device.toml"], further].concat())
 }
 
@@ -251,7 +253,7 @@ fn damaged_numbers_are_refused() {
 }
 
 /// Checks a mesh that is read to its end, and then refused for a region that it does not have.
-fn read_and_refused(home: &Path, bytes: &[u8], limit: u64) -> Ended {
+fn read_and_refused(home: &Path, bytes: &[u8], limit: u64) -> Finished {
     write_mesh(home, bytes);
     check(home, Some(limit), &["--set", "objective={kind=\"flux_density_squared\", region=\"nowhere\"}"])
 }
@@ -297,7 +299,7 @@ fn files_that_multiply_are_refused_or_read_within_the_promise() {
     refused(&many_pairs, "triangles in physical surfaces");
     // As many names as bytes allow.
     let names: String = (1..60_000).map(|tag| format!("2 {tag} \"s{tag}\"\n3 {tag} \"v{tag}\"\n")).collect();
-    let sound = text("crates/geometry/tests/msh_support/sound_v2.msh");
+    let sound = repository_text("crates/geometry/tests/msh_support/sound_v2.msh");
     let (_, rest) = sound.split_once("$EndPhysicalNames").expect("names");
     let many_names = format!("{head}$PhysicalNames\n119998\n{names}$EndPhysicalNames{rest}");
     refused(&many_names, "there is no region `nowhere`");

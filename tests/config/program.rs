@@ -6,36 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-/// The library of the program: the one place where its crate is named.
-pub(crate) use fluxmorph as app;
+use crate::support::program::{Finished, finish, folder};
+use crate::support::repository_text;
 
 /// Memory that a refusal may take beside that of the program itself and the bytes of a mesh file [bytes].
 pub(crate) const BESIDE: u64 = 64 << 20;
 
 /// Longest computing time of a command [s]: what takes this long hangs. Other load on the machine does not count.
 const LONGEST: u32 = 60;
-
-/// How a command ended, and what it wrote.
-pub(crate) struct Ended {
-    pub(crate) code: Option<i32>,
-    pub(crate) stdout: String,
-    pub(crate) stderr: String,
-}
-
-/// A file of the repository.
-pub(crate) fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
-}
-
-/// A text of the repository.
-pub(crate) fn text(path: &str) -> String {
-    fs::read_to_string(repository(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
-/// A temporary folder of one test.
-pub(crate) fn folder() -> tempfile::TempDir {
-    tempfile::tempdir().expect("a temporary folder")
-}
 
 /// Writes a file into a folder; its path.
 pub(crate) fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
@@ -48,9 +26,10 @@ pub(crate) fn write(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> Pat
 ///
 /// The limit is that on data (`RLIMIT_DATA`): heap, stacks and writable mappings, but not the addresses that the
 /// allocator reserves without using them.
-pub(crate) fn limited(home: &Path, bytes: Option<u64>, arguments: &[impl AsRef<OsStr>]) -> Ended {
+pub(crate) fn limited(home: &Path, bytes: Option<u64>, arguments: &[impl AsRef<OsStr>]) -> Finished {
     let memory = bytes.map_or("unlimited".to_owned(), |bytes| (bytes / 1024).to_string());
-    let output = Command::new("sh")
+    let mut command = Command::new("sh");
+    command
         .args(["-c", "ulimit -d \"$1\" && ulimit -t \"$2\" && shift 2 && exec \"$@\"", "sh", &memory])
         .arg(LONGEST.to_string())
         .arg(env!("CARGO_BIN_EXE_fluxmorph"))
@@ -59,15 +38,12 @@ pub(crate) fn limited(home: &Path, bytes: Option<u64>, arguments: &[impl AsRef<O
         .current_dir(home)
         .env_remove("NO_COLOR")
         .env("RUST_BACKTRACE", "1")
-        .stdin(Stdio::null())
-        .output()
-        .expect("a shell");
-    let utf8 = |bytes| String::from_utf8(bytes).expect("messages are UTF-8, whatever the files hold");
-    Ended { code: output.status.code(), stdout: utf8(output.stdout), stderr: utf8(output.stderr) }
+        .stdin(Stdio::null());
+    finish(&mut command)
 }
 
 /// Runs `check device.toml` in a folder with the memory that a configuration may take, and further arguments.
-pub(crate) fn check(home: &Path, further: &[&str]) -> Ended {
+pub(crate) fn check(home: &Path, further: &[&str]) -> Finished {
     limited(home, Some(baseline() + 4 * BESIDE), &[&["check", "device.toml"], further].concat())
 }
 
@@ -76,11 +52,11 @@ pub(crate) fn baseline() -> u64 {
     static BASELINE: OnceLock<u64> = OnceLock::new();
     *BASELINE.get_or_init(|| {
         let home = folder();
-        write(home.path(), "device.msh", text("crates/geometry/tests/msh_support/sound_v4.msh"));
+        write(home.path(), "device.msh", repository_text("crates/geometry/tests/msh_support/sound_v4.msh"));
         write(
             home.path(),
             "device.toml",
-            text("tests/config/bases/of_file.toml").replace("face", "left|outside"),
+            repository_text("tests/config/bases/of_file.toml").replace("face", "left|outside"),
         );
         least_limit(1 << 30, |limit| {
             limited(home.path(), Some(limit), &["check", "device.toml"]).code == Some(0)
@@ -103,7 +79,7 @@ pub(crate) fn least_limit(most: u64, suffices: impl Fn(u64) -> bool) -> u64 {
     high << 20
 }
 
-impl Ended {
+impl Finished {
     /// What is wrong with a refusal of this exit code that says these words; `None` when it is as it must be.
     pub(crate) fn objection(&self, code: i32, says: &[&str]) -> Option<String> {
         let stderr = &self.stderr;

@@ -1,11 +1,12 @@
 //! Sound configurations: their values in SI with every default filled in, and the resolved form, which reads back the same.
 
+use fluxmorph::build::build_mesh;
+use fluxmorph::config::{Config, MeshConfig, SourceMap, resolved_toml};
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SphereParameters};
 
 use crate::case::{Case, overwrite, read};
-use crate::program::app::build::build_mesh;
-use crate::program::app::config::{Config, MeshConfig, SourceMap, resolved_toml};
-use crate::program::{folder, text};
+use crate::support::program::folder;
+use crate::support::repository_text;
 
 /// The configuration must be that of its resolved form, bit for bit.
 #[track_caller]
@@ -73,7 +74,7 @@ fn values_are_in_si_with_every_default() {
 
 #[test]
 fn a_mesh_left_to_its_defaults_is_that_of_the_generator() {
-    let bare = text("tests/config/bases/bare.toml");
+    let bare = repository_text("tests/config/bases/bare.toml");
     for generator in ["shield", "block", "sphere"] {
         let (config, _) = Config::from_str(&bare.replace("shield", generator), "bare.toml").expect("sound");
         match config.mesh {

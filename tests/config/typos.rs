@@ -5,10 +5,11 @@
 
 use std::collections::BTreeSet;
 
+use fluxmorph::build::build_mesh;
+use fluxmorph::config::Config;
+
 use crate::looks::report;
-use crate::program::app::build::build_mesh;
-use crate::program::app::config::Config;
-use crate::program::repository;
+use crate::support::repository;
 
 /// Least share of typos for which the original is suggested.
 ///

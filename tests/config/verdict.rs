@@ -1,11 +1,11 @@
 //! What the program and the schema say of one configuration, and the sound configurations to begin with.
 
+use fluxmorph::config::{Config, ConfigError};
+use fluxmorph::schema;
 use jsonschema::Validator;
 use serde_json::Value;
 
 use crate::chance::sound;
-use crate::program::app::config::{Config, ConfigError};
-use crate::program::app::schema;
 use crate::sound::assert_reads_back;
 
 /// Both verdicts.

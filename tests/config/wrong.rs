@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::case::{Case, Marked, overwrite, read};
-use crate::program::{check, folder, limited, repository};
+use crate::program::{check, limited};
+use crate::support::program::folder;
+use crate::support::repository;
 
 /// A test for each file of `wrong`.
 macro_rules! groups {

@@ -2,15 +2,15 @@
 
 use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Algorithm, Optimizer};
-use fluxmorph::files::{OverwritePolicy, RunResult, system_disk};
-use fluxmorph::run::{self, Options};
+use fluxmorph::files::{RunResult, system_disk};
+use fluxmorph::run;
 use fluxmorph::show::{Evaluation, Silent};
-use fluxmorph_optimizer::driver::Optimised;
+use fluxmorph_optimizer::driver::{Optimised, optimise};
 use fluxmorph_optimizer::problem::Problem;
 
-use crate::problems::{analysed, initial, objective, optimised, try_optimised};
+use crate::problems::{Rows, analysed, initial, objective, optimised};
 use crate::support::folder::RunFolder;
-use crate::support::{self, config, parsed, repository_text, setup};
+use crate::support::{self, config, options, parsed, repository_text, setup};
 
 /// The plate of the quick shield meshed, instead of an impedance surface.
 const MESHED: [(&str, &str); 4] = [
@@ -39,7 +39,7 @@ fn with(
     settings: impl Fn(Optimizer) -> Optimizer,
 ) -> (Optimised, Vec<Evaluation>) {
     let (mut problem, own) = changed(name, changes);
-    optimised(&mut problem, &settings(own))
+    optimised(&mut problem, &settings(own), &mut Silent)
 }
 
 /// What a constraint measured at the best design.
@@ -162,11 +162,8 @@ fn a_run_at_two_frequencies_writes_both() {
     ];
     let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
     let (config, source) = config("shield_two_frequencies.toml", &overrides);
-    let disk = system_disk();
-    let overwrite_policy = OverwritePolicy::Keep;
-    let options = Options { disk: &disk, overwrite_policy, threads: 1, ranks: None, interrupted: &|| false };
     let result: RunResult =
-        run::run(&config, &source, options, &mut Silent).unwrap_or_else(|e| panic!("{e}"));
+        run::run(&config, &source, options(&system_disk()), &mut Silent).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);
     let frequencies: Vec<f64> = result.states.iter().map(|state| state.frequency_hz).collect();
     assert_eq!(frequencies, result.frequencies_hz);
@@ -224,6 +221,7 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     // Without layers in the plate.
     let changes = [&[("[design]", limit), STATIC, MESHED[0]], &MESHED[2..]].concat();
     let (mut problem, settings) = changed("shield_quick.toml", &changes);
-    let text = try_optimised(&mut problem, &settings).0.expect_err("no share").to_string();
-    assert!(text.contains("field_component_observation") && text.contains("to be a share of"), "{text}");
+    let ended = optimise(&mut problem, &settings.settings(), &mut Silent, &mut Rows::default(), &|| false);
+    let text = ended.expect_err("no share").to_string();
+    assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
 }

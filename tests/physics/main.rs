@@ -3,13 +3,12 @@
 //!
 //! `convergence`: fitted orders, the matrix against its weak form; `verification`: the rows of docs/verification.md;
 //! `gradient`: Taylor remainders of the whole chain; `paper`, `gallery`: the shipped configurations; `constraints`,
-//! `solvers`, `starts`: what must not change a result; `guards`: numerical failures; `optimiser`: the loop itself on a coarse shield.
+//! `solvers`, `starts`: what must not change a result; `optimiser`: the loop itself on a coarse shield, and numerical failures.
 
 mod constraints;
 mod convergence;
 mod gallery;
 mod gradient;
-mod guards;
 mod meshes;
 mod optimiser;
 mod orders;

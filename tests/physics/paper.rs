@@ -143,7 +143,7 @@ fn run(name: &str) -> (Setup, Optimised, Vec<Evaluation>) {
     let (config, _) = config(name, &[]);
     let mut setup = setup(name, &[]);
     let settings = Optimizer { max_evaluations: 13, ..config.optimizer };
-    let (optimised, rows) = problems::optimised(&mut setup.problem, &settings);
+    let (optimised, rows) = problems::optimised(&mut setup.problem, &settings, &mut Silent);
     let path: Vec<String> = rows.iter().map(|r| format!("{:.4}", r.ratio)).collect();
     println!("{name}: F/F0 {}", path.join(" "));
     (setup, optimised, rows)

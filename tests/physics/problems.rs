@@ -1,11 +1,13 @@
 //! What these tests ask of a problem: its value at a design, and where an optimisation ends.
 
+use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Optimizer;
-use fluxmorph::show::{Evaluation, Silent};
+use fluxmorph::show::{Evaluation, Observer};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::Record;
-use fluxmorph_optimizer::driver::{Optimised, Recorder, optimise};
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
+
+use crate::support::config;
 
 /// Number of design variables.
 pub(crate) fn variables(problem: &Problem) -> usize {
@@ -31,29 +33,42 @@ pub(crate) fn objective(problem: &Problem, p: &[f64]) -> f64 {
     analysed(problem, p).objective.expect("an objective")
 }
 
-/// Rows of the history.
+/// The problem of the quick shield with overrides `key=value`, and the settings of its optimiser.
+#[track_caller]
+pub(crate) fn quick(overrides: &[&str]) -> (Problem, Optimizer) {
+    let (config, source) = config("shield_quick.toml", overrides);
+    let setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
+    (setup.problem, config.optimizer)
+}
+
+/// Keeps rows and residuals of the history, and may fail at one of them.
 #[derive(Default)]
-struct Rows(Vec<Evaluation>);
+pub(crate) struct Rows {
+    pub(crate) rows: Vec<Evaluation>,
+    pub(crate) residuals: Vec<f64>,
+    /// Before which evaluation, and with what.
+    pub(crate) fails: Option<(usize, fn() -> Error)>,
+}
 
 impl Recorder for Rows {
     fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        self.0.push(record.row.clone());
+        if let Some((_, error)) = self.fails.filter(|(at, _)| *at == record.row.evaluation) {
+            return Err(error());
+        }
+        self.rows.push(record.row.clone());
+        self.residuals.push(record.worst_residual);
         Ok(())
     }
 }
 
-/// Optimises without writing anything; the rows of the history beside the result, or beside the error.
-pub(crate) fn try_optimised(
+/// Optimises without writing anything; the result, and the rows of the history.
+#[track_caller]
+pub(crate) fn optimised(
     problem: &mut Problem,
     settings: &Optimizer,
-) -> (Result<Optimised, Error>, Vec<Evaluation>) {
+    observer: &mut dyn Observer,
+) -> (Optimised, Vec<Evaluation>) {
     let mut rows = Rows::default();
-    (optimise(problem, &settings.settings(), &mut Silent, &mut rows, &|| false), rows.0)
-}
-
-/// Optimises; the result, and the rows of the history.
-#[track_caller]
-pub(crate) fn optimised(problem: &mut Problem, settings: &Optimizer) -> (Optimised, Vec<Evaluation>) {
-    let (result, rows) = try_optimised(problem, settings);
-    (result.unwrap_or_else(|e| panic!("{e}")), rows)
+    let result = optimise(problem, &settings.settings(), observer, &mut rows, &|| false);
+    (result.unwrap_or_else(|e| panic!("{e}")), rows.rows)
 }

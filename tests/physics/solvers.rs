@@ -1,8 +1,7 @@
 //! All ways to solve the linear systems give one field, one objective and one gradient; so do factors and solutions that
 //! are kept from design to design.
 
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem};
-use fluxmorph_optimizer::problem::{NoProgress, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
 

@@ -8,6 +8,7 @@
 use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::Optimizer;
 use fluxmorph::files::StopReason;
+use fluxmorph::show::Silent;
 
 use crate::problems::{objective, optimised, variables};
 use crate::support::{self, setup};
@@ -52,7 +53,7 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     }
     let mut setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     let settings = Optimizer { max_evaluations: ENOUGH, ..config.optimizer };
-    let (optimised, rows) = optimised(&mut setup.problem, &settings);
+    let (optimised, rows) = optimised(&mut setup.problem, &settings, &mut Silent);
     End {
         stop_reason: optimised.stop_reason,
         evaluations: optimised.evaluations,

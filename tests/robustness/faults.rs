@@ -3,11 +3,10 @@
 
 use std::path::Path;
 
-use fluxmorph::Error;
-use fluxmorph::ExitCode;
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::files::{OutputError, RunResult};
 use fluxmorph::run::RunLimits;
+use fluxmorph::{Error, ExitCode};
 use rayon::prelude::*;
 
 use crate::disk::{Fault, SimulatedDisk};

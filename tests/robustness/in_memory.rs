@@ -47,24 +47,11 @@ pub(crate) fn shipped(name: &str) -> (Config, SourceMap) {
 
 /// Runs a configuration from its start.
 pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) -> Result<RunResult, Error> {
-    let options = Options {
-        disk,
-        overwrite_policy: OverwritePolicy::Replace,
-        threads: 1,
-        ranks: None,
-        interrupted: &|| false,
-    };
+    let options = Options { overwrite_policy: OverwritePolicy::Replace, ..support::options(disk) };
     run::run(config, source, options, &mut Silent)
 }
 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: RunLimits) -> Result<RunResult, Error> {
-    let options = Options {
-        disk,
-        overwrite_policy: OverwritePolicy::Keep,
-        threads: 1,
-        ranks: None,
-        interrupted: &|| false,
-    };
-    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, options, &mut Silent)
+    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, support::options(disk), &mut Silent)
 }

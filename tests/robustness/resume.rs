@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph::config::{Config, SourceMap};
 use fluxmorph::files::Disk;
-use fluxmorph::run::RunLimits;
-use fluxmorph::run::journal;
+use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
 use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, with_rounds};

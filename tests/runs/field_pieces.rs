@@ -4,34 +4,26 @@ use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph::build::{Mode, set_up};
-use fluxmorph::config::Config;
 use fluxmorph::files::fields::{self, FieldData};
-use fluxmorph::files::{Disk, OverwritePolicy, RunDirectory, system_disk};
-use fluxmorph::run::{self, Options};
+use fluxmorph::files::{Disk, RunDirectory, system_disk};
+use fluxmorph::run;
 use fluxmorph::show::Silent;
 use fluxmorph::show::report::ReportedRun;
 use fluxmorph_geometry::io::{VtuArray, join_pieces, pvtu_pieces, vtu_contents};
 use fluxmorph_geometry::{ElementId, Partition};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
+use crate::support::{config, options};
+
 /// Three ranks, and one that owns no element.
 const RANKS: usize = 4;
 
 /// A run of one evaluation at two frequencies in a directory, and that evaluation computed again.
 fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_two_frequencies.toml");
-    let overrides = ["optimizer.max_evaluations=1", "output.verify_refinement=0", "output.fields=every"]
-        .map(str::to_owned);
-    let (mut config, source) = Config::from_file(&path, &overrides).unwrap();
+    let overrides = ["optimizer.max_evaluations=1", "output.verify_refinement=0", "output.fields=every"];
+    let (mut config, source) = config("shield_two_frequencies.toml", &overrides);
     config.output.directory = directory.to_owned();
-    let options = Options {
-        disk,
-        overwrite_policy: OverwritePolicy::Keep,
-        threads: 2,
-        ranks: None,
-        interrupted: &|| false,
-    };
-    run::run(&config, &source, options, &mut Silent).unwrap();
+    run::run(&config, &source, options(disk), &mut Silent).unwrap();
     let problem = set_up(&config, &source, Mode::Optimisation).unwrap().problem;
     let initial = problem.shape().unwrap().initial().to_vec();
     let analysis =

@@ -13,9 +13,12 @@ pub(crate) mod shield;
 pub(crate) mod whole;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::{Config, SourceMap};
+use fluxmorph::files::{Disk, OverwritePolicy};
+use fluxmorph::run::Options;
 
 /// A file of the repository.
 pub(crate) fn repository(path: &str) -> PathBuf {
@@ -76,6 +79,11 @@ pub(crate) fn parsed(text: &str) -> (Config, SourceMap) {
 pub(crate) fn setup_of(text: &str) -> Setup {
     let (config, source) = parsed(text);
     set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A run of the library: on one thread, into a folder without an earlier run, never interrupted.
+pub(crate) fn options(disk: &Arc<dyn Disk>) -> Options<'_> {
+    Options { disk, overwrite_policy: OverwritePolicy::Keep, threads: 1, ranks: None, interrupted: &|| false }
 }
 
 /// Euclidean norm.

@@ -4,13 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
-
-use super::millimetres;
-use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
-use crate::error::Error;
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
 };
+
+use super::millimetres;
+use crate::config::{self, Boundaries, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
+use crate::error::Error;
 
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(
@@ -37,11 +37,7 @@ pub(super) fn surface(
         }
     }
     let mut kept = Vec::new();
-    let applied = config.boundaries.uniform_field.iter().flat_map(|field| &field.surfaces);
-    let conditioned =
-        config.boundaries.flux_parallel.iter().chain(&config.boundaries.flux_normal).chain(applied);
-    let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
-    for name in conditioned.chain(slide).collect::<BTreeSet<_>>() {
+    for name in kept_surfaces(config) {
         kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&face_key(*t))));
     }
     let outer = |t: &[NodeId; 3]| facets.get(&face_key(*t)).is_some_and(|facet| facet.outside.is_none());
@@ -73,6 +69,14 @@ pub(super) fn surface(
         return Err(source.error(vec![fault]).into());
     }
     Ok(surface)
+}
+
+/// Surfaces that stay where they are: with a condition, or listed in `remesh.slide`.
+fn kept_surfaces(config: &Config) -> BTreeSet<&String> {
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
+    let applied = uniform_field.iter().flat_map(|field| &field.surfaces);
+    let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
+    flux_parallel.iter().chain(flux_normal).chain(applied).chain(slide).collect()
 }
 
 /// The triangles of the design surface, each once, on the mesh with all regions.

@@ -2,6 +2,7 @@
 
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{Mesh, Topology};
+use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
 use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
@@ -14,7 +15,6 @@ use crate::config::{
     SolverMethod, SourceMap,
 };
 use crate::error::Error;
-use fluxmorph_optimizer::Error as OptimizerError;
 
 /// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
 pub(super) fn without_impedance_regions(

@@ -3,6 +3,10 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
+use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
+use fluxmorph_optimizer::problem::Shape;
+use fluxmorph_optimizer::{Error as OptimizerError, geometric};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional};
 
@@ -10,11 +14,6 @@ use crate::config::{
     self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, UpperBound,
 };
 use crate::error::Error;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
-use fluxmorph_optimizer::geometric;
-use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
-use fluxmorph_optimizer::problem::Shape;
 
 /// Every functional of the configuration with its key path: terms of the objective, then constraints.
 pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {
@@ -196,24 +195,21 @@ pub(super) fn constraints(
                 add(written.name.clone(), Quantity::Volume(body), upper(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
-                // Both bounds of one entry are two constraints with different names.
-                let name = |suffix: &str| match (minimum, maximum) {
-                    (Some(_), Some(_)) => format!("{}_{suffix}", written.name),
-                    _ => written.name.clone(),
-                };
-                let measure = |bound: geometric::ThicknessLimit| {
-                    geometric::ThicknessBound::new(shape, bound).map_err(|error| {
+                use geometric::ThicknessLimit::{Maximum, Minimum};
+                let bounds = [
+                    minimum.map(|bound| ("minimum", bound, Minimum(bound), Limit::AtLeast(bound))),
+                    maximum.map(|bound| ("maximum", bound, Maximum(bound), Limit::AtMost(bound))),
+                ];
+                let has_both = minimum.is_some() && maximum.is_some();
+                for (suffix, bound, side, limit) in bounds.into_iter().flatten() {
+                    let measure = geometric::ThicknessBound::new(shape, side).map_err(|error| {
                         let fault = source.diagnostic(&format!("constraints[{k}].kind"), error.to_string());
                         source.error(vec![fault.help("limit design.lower and design.upper instead")])
-                    })
-                };
-                if let Some(bound) = *minimum {
-                    let measure = measure(geometric::ThicknessLimit::Minimum(bound))?;
-                    add(name("minimum"), Quantity::Thickness { measure, bound }, Limit::AtLeast(bound));
-                }
-                if let Some(bound) = *maximum {
-                    let measure = measure(geometric::ThicknessLimit::Maximum(bound))?;
-                    add(name("maximum"), Quantity::Thickness { measure, bound }, Limit::AtMost(bound));
+                    })?;
+                    // Both bounds of one entry are two constraints, told apart by their names.
+                    let name =
+                        if has_both { format!("{}_{suffix}", written.name) } else { written.name.clone() };
+                    add(name, Quantity::Thickness { measure, bound }, limit);
                 }
             }
         }
@@ -222,9 +218,8 @@ pub(super) fn constraints(
     let mut names = BTreeSet::new();
     if let Some(twice) = constraints.iter().find(|constraint| !names.insert(constraint.name.as_str())) {
         let message = format!("two constraints are named `{}`", twice.name);
-        return Err(source
-            .error(vec![source.diagnostic("constraints", message).expected("a different name for each")])
-            .into());
+        let fault = source.diagnostic("constraints", message).expected("a different name for each");
+        return Err(source.error(vec![fault]).into());
     }
     Ok(constraints)
 }

@@ -4,6 +4,8 @@
 //! again, so that the error is shown at the key that holds it. Errors that no value is to blame for stay what they are.
 
 use fluxmorph_geometry::MeshError;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::geometric::GeometricError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::coil::{PlaneFault, RegionFault};
 use fluxmorph_solver::{NonConvergence, SolverError};
@@ -12,8 +14,6 @@ use super::functional;
 use super::mesh::surface_names;
 use crate::config::{CoilShape, Config, ConfigError, Diagnostic, RemeshExtent, SourceMap};
 use crate::error::Error;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::geometric::GeometricError;
 
 /// The error at the key that it comes from, where there is one.
 pub(crate) fn attribute_error(error: Error, config: &Config, source: &SourceMap) -> Error {

@@ -10,8 +10,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
 use fluxmorph_geometry::io::msh::{MshError, Place as MshPlace};
 use fluxmorph_geometry::io::read_msh_file;
-use fluxmorph_geometry::topology::OUTSIDE;
-use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::topology::{OUTSIDE, face_key};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use super::locate_error::with_advice;

@@ -5,6 +5,7 @@
 //! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod design;
+mod elastic_body;
 mod field;
 mod functional;
 pub(crate) mod locate_error;
@@ -23,14 +24,15 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
+use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
 
-use crate::config::{self, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap};
+use self::locate_error::DiagnosticSink;
+use crate::config::{
+    self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap,
+};
 use crate::error::Error;
-use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_optimizer::problem::{Progress, Stage};
-use locate_error::DiagnosticSink;
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]
@@ -120,50 +122,27 @@ fn build_problem(
 ) -> Result<Setup, Error> {
     progress.stage(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
-    let mut faults = name_faults(config, source, full_mesh.topology());
-    if let Some(first) = faults.first_mut() {
-        // What was left out of the file is often why a name is not there.
-        let said = first
-            .help
-            .take()
-            .into_iter()
-            .chain(warnings.iter().map(|notice| format!("of the mesh: {notice}")));
-        first.help = Some(said.collect::<Vec<_>>().join("\n")).filter(|help| !help.is_empty());
-    }
-    source.check(faults)?;
-
+    check_names(config, source, &full_mesh, &warnings)?;
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
     let mut sink = DiagnosticSink::new(config, source, probe_faults(config, source, &full_mesh, &mesh));
-    let conditions = &config.boundaries;
-    let free = conditions.flux_parallel.is_empty()
-        && conditions.flux_normal.is_empty()
-        && conditions.uniform_field.is_none();
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
-    if free && conductors.is_empty() && !motion_alone {
-        let fault = source
-            .diagnostic(
-                "boundaries",
-                "no surface has a condition: the potential is known up to a constant only",
-            )
-            .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
-        sink.take::<()>(Err(source.error(vec![fault]).into()))?;
+    if conductors.is_empty() && !motion_alone {
+        sink.take(check_conditions(&config.boundaries, source))?;
     }
     progress.stage(Stage::Unknowns);
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
-    let design = match (&config.design, &config.remesh) {
-        (Some(design), Some(remesh)) => Some(shape::Inputs {
-            source,
-            design,
-            remesh,
-            full_mesh: &full_mesh,
-            mesh: &mesh,
-            share: share.as_ref(),
-        }),
-        _ => None,
-    };
+    let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());
+    let design = config.design.as_ref().zip(config.remesh.as_ref()).map(|(design, remesh)| shape::Inputs {
+        source,
+        design,
+        remesh,
+        full_mesh: full,
+        mesh: remaining,
+        share: owned,
+    });
     let body = match &design {
         Some(inputs) => sink.take(shape::body(inputs, config, &mut warnings))?,
         None => None,
@@ -197,6 +176,35 @@ fn build_problem(
     }
     let problem = Problem::new(mesh, states, objective, constraints, shape).shared_out(share);
     Ok(Setup { problem, audits, warnings, full_mesh })
+}
+
+/// Refuses names that the mesh does not have; what was left out of a mesh file is often why.
+fn check_names(
+    config: &Config,
+    source: &SourceMap,
+    mesh: &Mesh,
+    notices: &[String],
+) -> Result<(), ConfigError> {
+    let mut faults = name_faults(config, source, mesh.topology());
+    if let Some(first) = faults.first_mut() {
+        let notices = notices.iter().map(|notice| format!("of the mesh: {notice}"));
+        let help: Vec<String> = first.help.take().into_iter().chain(notices).collect();
+        first.help = Some(help.join("\n")).filter(|help| !help.is_empty());
+    }
+    source.check(faults)
+}
+
+/// Refuses a field problem whose potential no surface fixes.
+fn check_conditions(conditions: &Boundaries, source: &SourceMap) -> Result<(), Error> {
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = conditions;
+    if !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some() {
+        return Ok(());
+    }
+    let message = "no surface has a condition: the potential is known up to a constant only";
+    let fault = source
+        .diagnostic("boundaries", message)
+        .expected("the outer surfaces in boundaries.flux_parallel, or another condition");
+    Err(source.error(vec![fault]).into())
 }
 
 /// Number of design variables of a configuration.

@@ -9,7 +9,8 @@ use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
-use super::{field, mesh, millimetres, name_faults, shape};
+use super::elastic_body::{guidance, remesh_setup};
+use super::{field, mesh, millimetres, name_faults};
 use crate::config::{
     Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
 };
@@ -75,8 +76,8 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     }
     source.check(faults)?;
     let (nodes, motions): (Vec<_>, Vec<_>) = moved.into_iter().unzip();
-    let guidance = shape::guidance(source, config.design.as_ref(), remesh)?;
-    let setup = shape::remesh_setup(source, remesh, &mesh, &nodes, guidance, &mut warnings)?;
+    let guidance = guidance(source, config.design.as_ref(), remesh)?;
+    let setup = remesh_setup(source, remesh, &mesh, &nodes, guidance, &mut warnings)?;
     let path = Path::new(nodes, motions, transforms);
     if path.at(1.0).iter().all(|u| *u == [0.0; 3]) {
         warnings.push(
@@ -118,39 +119,13 @@ fn nodes_of(
             ("surface", triangles.flatten().copied().collect())
         }
         Target::Line([start, end]) => {
-            let along = sub(*end, *start);
-            let square = dot(along, along);
-            let on_line = |point: Point| {
-                let from = sub(point, *start);
-                let t = if square > 0.0 { (dot(from, along) / square).clamp(0.0, 1.0) } else { 0.0 };
-                norm(std::array::from_fn(|d| from[d] - t * along[d])) <= near
-            };
-            ("line", chosen(&on_line))
+            ("line", chosen(&|point| distance_to_line(point, *start, *end) <= near))
         }
         Target::Box([low, high]) => {
             let inside = |p: Point| (0..3).all(|d| low[d] - near <= p[d] && p[d] <= high[d] + near);
             ("box", chosen(&inside))
         }
-        Target::Nodes(points) => {
-            let mut nodes = Vec::new();
-            let tree = BoxTree::of_points(mesh.points());
-            for (i, &point) in points.iter().enumerate() {
-                let nearest = tree.nearest(point).map(|(i, square)| (NodeId::new(i), square.sqrt()));
-                match nearest.filter(|&(_, distance)| distance <= near).map(|(node, _)| node) {
-                    Some(node) => nodes.push(node),
-                    None => {
-                        let place =
-                            nearest.map_or_else(|| "nowhere".to_owned(), |(n, _)| millimetres(mesh.point(n)));
-                        let message = format!("there is no node at {}", millimetres(point));
-                        let fault = source.diagnostic(&format!("{path}.nodes[{i}]"), message);
-                        return Err(Box::new(
-                            fault.expected(format!("a node of the mesh; the nearest is at {place}")),
-                        ));
-                    }
-                }
-            }
-            ("nodes", nodes)
-        }
+        Target::Nodes(points) => ("nodes", nodes_at(source, path, points, mesh, near)?),
         Target::Design(_) => ("design", Vec::new()),
     };
     if nodes.is_empty() {
@@ -164,6 +139,36 @@ fn nodes_of(
         return Err(Box::new(fault.expected(range)));
     }
     Ok(nodes)
+}
+
+/// Distance of a point from the line between two others.
+fn distance_to_line(point: Point, start: Point, end: Point) -> f64 {
+    let (along, from) = (sub(end, start), sub(point, start));
+    let square = dot(along, along);
+    let t = if square > 0.0 { (dot(from, along) / square).clamp(0.0, 1.0) } else { 0.0 };
+    norm(std::array::from_fn(|d| from[d] - t * along[d]))
+}
+
+/// The nodes nearest to the points of a list; a fault where one is not `near`.
+fn nodes_at(
+    source: &SourceMap,
+    path: &str,
+    points: &[Point],
+    mesh: &Mesh,
+    near: f64,
+) -> Result<Vec<NodeId>, Box<Diagnostic>> {
+    let tree = BoxTree::of_points(mesh.points());
+    let node_at = |(i, &point): (usize, &Point)| {
+        let nearest = tree.nearest(point).map(|(i, square)| (NodeId::new(i), square.sqrt()));
+        if let Some((node, _)) = nearest.filter(|&(_, distance)| distance <= near) {
+            return Ok(node);
+        }
+        let place = nearest.map_or_else(|| "nowhere".to_owned(), |(n, _)| millimetres(mesh.point(n)));
+        let message = format!("there is no node at {}", millimetres(point));
+        let fault = source.diagnostic(&format!("{path}.nodes[{i}]"), message);
+        Err(Box::new(fault.expected(format!("a node of the mesh; the nearest is at {place}"))))
+    };
+    points.iter().enumerate().map(node_at).collect()
 }
 
 /// The nodes of the design surface and where a design moves them.

@@ -5,14 +5,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_remesh::KinematicConstraint;
 
-use super::shape::{regions_at, remesh_setup, thickened_region};
+use super::elastic_body::{regions_at, remesh_setup};
+use super::shape::thickened_region;
 use super::{Audited, audits, design, field, mesh, name_faults};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::geometric::WallThickness;
 
 /// Mesh, design surface and audits of a configuration.
 #[derive(Debug)]

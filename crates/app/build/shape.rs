@@ -5,21 +5,16 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::parallel::{Ownership, Role};
 use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
-use fluxmorph_remesh::{
-    Boundary, BoundaryKind, ElasticMap, KinematicConstraint, Motion, RemeshError, RemeshSetup, SolverChoice,
-    StepLimits, StiffnessPolicy, Subregion,
-};
-use fluxmorph_solver::FieldModel;
-
-use super::millimetres;
-use crate::config::{
-    self, Config, Design, DesignDirection, Diagnostic, DirectionWord, Remesh, RemeshExtent, SourceMap,
-    StiffnessLaw,
-};
-use crate::error::Error;
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::Shape;
+use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits};
+use fluxmorph_solver::FieldModel;
+
+use super::elastic_body::{guidance, regions_at, remesh_setup};
+use super::millimetres;
+use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
+use crate::error::Error;
 
 /// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
 const LEAST_QUALITY_SHARE: f64 = 0.05;
@@ -123,145 +118,6 @@ pub(super) fn shape(
     let shape = Shape::new(surface, motion, limits, bounds).with_thickness(thickness).starting_at(initial);
     check_bounds(source, &shape, inputs.share)?;
     Ok(shape)
-}
-
-/// Subregions, boundary kinds and design nodes (ascending) of the elastic body.
-pub(super) fn remesh_setup(
-    source: &SourceMap,
-    remesh: &Remesh,
-    mesh: &Mesh,
-    design_nodes: &[NodeId],
-    guidance: KinematicConstraint,
-    warnings: &mut Vec<String>,
-) -> Result<RemeshSetup, Error> {
-    let topology = mesh.topology();
-    let mut subregions: Vec<Subregion> = match &remesh.extent {
-        RemeshExtent::Regions(names) => {
-            let mut names: BTreeSet<String> = names.iter().cloned().collect();
-            for region in regions_at(mesh, design_nodes) {
-                let name = &topology.region_names()[region.index()];
-                if names.insert(name.clone()) {
-                    warnings.push(format!(
-                        "the region `{name}` touches the design surface and moves with it: it is taken into the remesh \
-                         region"
-                    ));
-                }
-            }
-            names
-                .iter()
-                .map(|name| Ok(Subregion::new(name, topology.elements_of(topology.region(name)?))))
-                .collect::<Result<_, Error>>()?
-        }
-        RemeshExtent::Box([lower, upper]) => {
-            let inside = |e: &ElementId| {
-                let c = centroid(mesh.vertices(*e));
-                (0..3).all(|d| lower[d] <= c[d] && c[d] <= upper[d])
-            };
-            let mut parts = Vec::new();
-            for (i, name) in topology.region_names().iter().enumerate() {
-                let elements: Vec<ElementId> =
-                    topology.elements_of(RegionId::new(i)).into_iter().filter(inside).collect();
-                if !elements.is_empty() {
-                    parts.push(Subregion::new(name, elements));
-                }
-            }
-            parts
-        }
-    };
-    // A region that an impedance surface replaces has no elements left, and is no part of the body.
-    subregions.retain(|part| !part.elements.is_empty());
-    let outside: Vec<Diagnostic> = remesh
-        .subregions
-        .iter()
-        .enumerate()
-        .filter(|(_, own)| subregions.iter().all(|part| part.name != own.name))
-        .map(|(i, own)| {
-            source
-                .diagnostic(
-                    &format!("remesh.subregions[{i}].name"),
-                    format!("the region `{}` is no part of the remesh region", own.name),
-                )
-                .help("name it in remesh.region too, or take the subregion out")
-        })
-        .collect();
-    source.check(outside)?;
-    if subregions.is_empty() {
-        let (key, expected) = match &remesh.extent {
-            RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
-            RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
-        };
-        let fault =
-            source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
-        return Err(source.error(vec![fault]).into());
-    }
-    for part in &mut subregions {
-        let own = remesh.subregions.iter().find(|own| own.name == part.name);
-        part.young = own.and_then(|own| own.young).unwrap_or(remesh.young);
-        part.poisson = own.and_then(|own| own.poisson).unwrap_or(remesh.poisson);
-        part.force = own.and_then(|own| own.force).unwrap_or(remesh.force);
-    }
-    let mut boundaries = Vec::new();
-    for (names, kind) in [
-        (&remesh.slide, BoundaryKind::Slide),
-        (&remesh.fixed, BoundaryKind::Fixed),
-        (&remesh.free, BoundaryKind::Free),
-    ] {
-        for name in names {
-            boundaries.push(Boundary::of_surface(topology, name, kind)?);
-        }
-    }
-    let policy = match remesh.stiffness {
-        StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
-        StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
-        StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
-        StiffnessLaw::Directional => StiffnessPolicy::Directional,
-    };
-    Ok(RemeshSetup {
-        subregions,
-        policy,
-        kinematic_constraint: guidance,
-        design_nodes: design_nodes.to_vec(),
-        boundaries,
-        fixed_nodes: Vec::new(),
-        solver: SolverChoice::Automatic,
-        ownership: None,
-    })
-}
-
-/// The axis of the design's direction where the motion is to follow it.
-pub(super) fn guidance(
-    source: &SourceMap,
-    design: Option<&Design>,
-    remesh: &Remesh,
-) -> Result<KinematicConstraint, Error> {
-    let axis = match design.map(|design| design.direction) {
-        Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
-        Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
-    };
-    match remesh.motion {
-        config::Motion::Free => Ok(KinematicConstraint::Free),
-        config::Motion::AlongDesign => match axis {
-            Some(axis) => Ok(KinematicConstraint::Axis(axis)),
-            None => {
-                let fault = source
-                    .diagnostic("remesh.motion", "the design does not move along a coordinate axis")
-                    .expected("motion = \"free\", or a design.direction along x, y or z");
-                Err(source.error(vec![fault]).into())
-            }
-        },
-    }
-}
-
-/// Regions with an element that has a face between design nodes, which are ascending.
-pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
-    let topology = mesh.topology();
-    topology
-        .facets()
-        .iter()
-        .filter(|f| f.nodes.iter().all(|n| design_nodes.binary_search(n).is_ok()))
-        .flat_map(|f| std::iter::once(f.inside).chain(f.outside))
-        .map(|e| topology.region_of()[e.index()])
-        .collect()
 }
 
 /// The region that a positive design thickens: behind the design surface, and not air.

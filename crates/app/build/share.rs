@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::Partition;
 use fluxmorph_geometry::parallel::{Ownership, RankGroup};
-use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_geometry::{ElementId, Mesh, Partition};
 
 use super::material;
 use crate::config::{Config, resolved_toml};

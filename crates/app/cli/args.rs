@@ -8,8 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::template::Template;
 use super::{examples, exit};
-use crate::build::memory_limit;
-use crate::build::with_names;
+use crate::build::{memory_limit, with_names};
 use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
 use crate::error::Error;
 use crate::files::OverwritePolicy;

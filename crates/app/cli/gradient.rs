@@ -1,16 +1,16 @@
 //! `fluxmorph gradient`.
 
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::verify::{Certificate, Certificates, Settings, certify};
+
 use super::args::GradientArgs;
 use super::ranks::Ranks;
 use super::{interrupt, observer, stdout, with_threads};
-use crate::build::memory_limit;
-use crate::build::{Mode, set_up_watched};
+use crate::build::{Mode, memory_limit, set_up_watched};
 use crate::config::FactorReuse;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::read_design;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
-use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
 /// Do what the command line says.
 ///
@@ -53,34 +53,37 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
                     direction.error
                 ));
             })?;
-        let constraints =
-            certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
-        let all: Vec<(&Certificate, &str)> =
-            std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
         // No bar may stand where the table goes.
         drop(observer);
-        if args.common.work.json {
-            stdout::print_json(&certificates)?;
-        } else {
-            let tables: Vec<String> =
-                all.iter().map(|(certificate, name)| table(certificate, name, &settings)).collect();
-            stdout::print(&tables.join("\n"))?;
-        }
-        let Some((certificate, name)) = all.into_iter().find(|(certificate, _)| !certificate.holds) else {
-            return Ok(ExitCode::Success);
-        };
-        Err(Error::Certificate {
-            cause: format!(
-                "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} \
-                 allowed)",
-                certificate.least_slope,
-                settings.least_slope,
-                certificate.largest_error,
-                settings.largest_error
-            ),
-        })
+        print(&certificates, &settings, args.common.work.json)
     });
     signal.exit_code_of(outcome)
+}
+
+/// Prints the certificates, as JSON or as tables.
+///
+/// # Errors
+/// When one does not hold.
+fn print(certificates: &Certificates, settings: &Settings, json: bool) -> Result<ExitCode, Error> {
+    let constraints = certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
+    let all: Vec<(&Certificate, &str)> =
+        std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
+    if json {
+        stdout::print_json(certificates)?;
+    } else {
+        let tables: Vec<String> =
+            all.iter().map(|(certificate, name)| table(certificate, name, settings)).collect();
+        stdout::print(&tables.join("\n"))?;
+    }
+    let Some((certificate, name)) = all.into_iter().find(|(certificate, _)| !certificate.holds) else {
+        return Ok(ExitCode::Success);
+    };
+    Err(Error::Certificate {
+        cause: format!(
+            "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} allowed)",
+            certificate.least_slope, settings.least_slope, certificate.largest_error, settings.largest_error
+        ),
+    })
 }
 
 /// The certificate as a table.

@@ -7,16 +7,15 @@ use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use fluxmorph_optimizer::Error as OptimizerError;
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 
-use super::ExitCode;
-use super::launcher;
 use super::ranks::is_worker;
+use super::{ExitCode, launcher};
 use crate::error::Error;
 use crate::show;
-use fluxmorph_optimizer::Error as OptimizerError;
 
 /// What is shown at the first signal of a run.
 pub(super) const FINISHES_EVALUATION: &str =

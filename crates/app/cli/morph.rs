@@ -1,5 +1,7 @@
 //! `fluxmorph morph`.
 
+use fluxmorph_optimizer::driver::StopReason;
+
 use super::args::MorphArgs;
 use super::{interrupt, observer, stdout, with_threads};
 use crate::error::Error;
@@ -7,7 +9,6 @@ use crate::exit_code::ExitCode;
 use crate::files::system_disk;
 use crate::run::Options;
 use crate::run::morph::{self, Parameters};
-use fluxmorph_optimizer::driver::StopReason;
 
 /// Do what the command line says.
 ///

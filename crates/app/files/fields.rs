@@ -6,10 +6,9 @@ use fluxmorph_geometry::io::{ArrayData, Field, VtuPiece, pvtu_text, vtu_bytes};
 use fluxmorph_geometry::quality::qualities_of;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
+use fluxmorph_optimizer::problem::Analysis;
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
-
-use fluxmorph_optimizer::problem::Analysis;
 
 /// What the arrays of a design are made from; a rank has no more of it.
 #[derive(Clone, Copy, Debug)]

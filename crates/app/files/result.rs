@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_optimizer::driver::StopReason;
+use fluxmorph_optimizer::problem::RoundEvent;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory};
-use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::problem::RoundEvent;
 
 /// The content of `result.json`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -9,19 +9,17 @@
 //! Does not live here: whether the gradient is the objective's, which is `verify`.
 
 use fluxmorph_geometry::tet4::Point;
-
-use crate::build::memory_limit;
-use crate::build::{Mode, Setup, design_triangulation, set_up};
-use crate::config::{Config, MeshConfig, SourceMap};
-use crate::error::Error;
-use crate::files::{ObjectiveResult, Verification};
-use crate::show::Observer;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
-use fluxmorph_optimizer::problem::SolverCache;
-use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
+
+use crate::build::{Mode, Setup, design_triangulation, memory_limit, set_up};
+use crate::config::{Config, MeshConfig, SourceMap};
+use crate::error::Error;
+use crate::files::{ObjectiveResult, Verification};
+use crate::show::Observer;
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
 /// alone counts, and not the way to it.

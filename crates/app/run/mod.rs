@@ -23,17 +23,6 @@ use std::time::Instant;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
-
-use crate::build::locate_error::attribute_error;
-use crate::build::{Mode, Setup, set_up_watched};
-use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
-use crate::error::Error;
-use crate::files::exports;
-use crate::files::{
-    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
-    check_finite, peak_memory_bytes, resume_command,
-};
-use crate::show::{RunObserver, Started};
 use fluxmorph_optimizer::problem::RoundEvent;
 use fluxmorph_optimizer::{Error as OptimizerError, driver};
 use journal::{Identity, Journal};
@@ -41,6 +30,16 @@ use mesh_independence::{Check, MeshIndependence, ShapePair};
 use pieces::SharedPieces;
 use prepared::Prepared;
 use recorder::DirectoryRecorder;
+
+use crate::build::locate_error::attribute_error;
+use crate::build::{Mode, Setup, set_up_watched};
+use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
+use crate::error::Error;
+use crate::files::{
+    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
+    check_finite, exports, peak_memory_bytes, resume_command,
+};
+use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
 pub use resume::{RunLimits, SavedRun, resume};
 pub use solve::solve;

@@ -10,12 +10,12 @@ use fluxmorph_geometry::parallel::{
     Command, CommandChannel, CommandHandler, Communicator, Ownership, complex_of, numbers_of,
 };
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use crate::error::Error;
 use crate::files::fields::{self, FieldData};
 use crate::files::{RunDirectory, system_disk};
-use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 /// What all ranks write with.
 #[derive(Debug)]

@@ -4,18 +4,17 @@
 use std::time::Instant;
 
 use fluxmorph_geometry::parallel::RankGroup;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::problem::RoundEvent;
 
 use super::{Options, Session, mesh_hash};
 use crate::build::locate_error::attribute_error;
-use crate::build::memory_limit;
-use crate::build::{Mode, Setup, set_up_watched};
+use crate::build::{Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{LimitsInForce, Manifest, RunDirectory, surface_files};
 use crate::show::RunObserver;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
-use fluxmorph_optimizer::problem::RoundEvent;
 
 /// A problem that is set up, and what its set-up was given.
 pub(super) struct Prepared<'a> {

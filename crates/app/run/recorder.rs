@@ -6,6 +6,9 @@
 use std::collections::VecDeque;
 
 use fluxmorph_geometry::io::pvd_text;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::{Record, Recorder};
+use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 use super::Session;
 use super::pieces::SharedPieces;
@@ -15,9 +18,6 @@ use crate::files::fields::{self, FieldData};
 use crate::files::{History, RunDirectory};
 use crate::run::journal::Journal;
 use crate::show::Evaluation;
-use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver::{Record, Recorder};
-use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 /// Writes journal, history and fields into the run directory.
 pub(super) struct DirectoryRecorder {

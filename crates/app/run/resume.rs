@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph_geometry::parallel::RankGroup;
+use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
@@ -17,7 +18,6 @@ use crate::files::{
 };
 use crate::run::journal::{Contents, Identity, Journal, Rest};
 use crate::show::RunObserver;
-use fluxmorph_optimizer::Error as OptimizerError;
 
 /// Largest configuration and largest result that are read [bytes].
 const LARGEST: [u64; 2] = [1 << 20, 1 << 30];

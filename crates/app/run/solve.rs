@@ -1,5 +1,7 @@
 //! One analysis with its directory: the field of a single design.
 
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
+
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
 use super::summary::{constraints, terms};
@@ -7,12 +9,8 @@ use super::{Options, Session};
 use crate::build::Mode;
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
-use crate::files::exports;
-use crate::files::{ObjectiveResult, RunResult, StopReason};
+use crate::files::{ObjectiveResult, RunResult, StopReason, exports};
 use crate::show::RunObserver;
-use fluxmorph_optimizer::problem::SolverCache;
-use fluxmorph_optimizer::problem::Stage;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem};
 
 /// Analyses one design and writes its field and result.
 ///

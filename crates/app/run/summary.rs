@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::constraint::{Bound, Constraint};
+use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
 use fluxmorph_solver::{SolverError, recovery};
 
 use super::Session;
@@ -13,9 +16,6 @@ use crate::files::{
     StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
-use fluxmorph_optimizer::constraint::{Bound, Constraint};
-use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
 
 impl Session<'_> {
     /// The parts of a result that run and solve share.
@@ -32,19 +32,16 @@ impl Session<'_> {
         let mesh = &analysis.mesh;
         let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
         let located = locate(mesh, &places);
-        let states = (0..problem.states().len())
+        let states: Vec<_> = (0..problem.states().len())
             .map(|index| self.state_result(index, analysis, &located, observer))
-            .collect::<Vec<_>>();
+            .collect();
         let StateResult { probes, losses_w, .. } = states[0].clone();
-        let design = match (problem.shape(), values) {
-            (Some(shape), Some(values)) => Some(DesignResult {
-                values_m: values.to_vec(),
-                lower_m: shape.lower().to_vec(),
-                upper_m: shape.upper().to_vec(),
-                points_m: shape.surface().points().to_vec(),
-            }),
-            _ => None,
-        };
+        let design = problem.shape().zip(values).map(|(shape, values)| DesignResult {
+            values_m: values.to_vec(),
+            lower_m: shape.lower().to_vec(),
+            upper_m: shape.upper().to_vec(),
+            points_m: shape.surface().points().to_vec(),
+        });
         let topology = mesh.topology();
         Ok(RunResult {
             schema_version: 1,
@@ -69,18 +66,26 @@ impl Session<'_> {
             losses_w,
             states: if states.len() > 1 { states } else { Vec::new() },
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
-            timings_s: BTreeMap::from([
-                ("total".to_owned(), self.clock.elapsed().as_secs_f64()),
-                ("setup".to_owned(), self.setup_seconds),
-                ("remesh".to_owned(), timings.remesh),
-                ("assembly".to_owned(), timings.assembly),
-                ("factor".to_owned(), timings.factor),
-                ("state".to_owned(), timings.state),
-                ("adjoint".to_owned(), timings.adjoint),
-                ("gradient".to_owned(), timings.gradient),
-            ]),
+            timings_s: self.timings_result(timings),
             peak_memory_bytes: peak_memory_bytes(),
         })
+    }
+
+    /// Seconds of every stage.
+    fn timings_result(&self, timings: &Timings) -> BTreeMap<String, f64> {
+        BTreeMap::from(
+            [
+                ("total", self.clock.elapsed().as_secs_f64()),
+                ("setup", self.setup_seconds),
+                ("remesh", timings.remesh),
+                ("assembly", timings.assembly),
+                ("factor", timings.factor),
+                ("state", timings.state),
+                ("adjoint", timings.adjoint),
+                ("gradient", timings.gradient),
+            ]
+            .map(|(stage, seconds)| (stage.to_owned(), seconds)),
+        )
     }
 
     /// Losses and probes of one state; `located` has an entry for every point of every probe.

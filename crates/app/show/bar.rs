@@ -7,13 +7,13 @@ use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
+use fluxmorph_optimizer::problem::Stage;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 
 use super::lines::Lines;
 use super::table::Columns;
 use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::files::RunResult;
-use fluxmorph_optimizer::problem::Stage;
 
 /// How often times on the bar move on.
 const TICK: Duration = Duration::from_millis(200);

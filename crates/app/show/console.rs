@@ -3,11 +3,12 @@
 use std::io::Write;
 use std::time::Instant;
 
+use fluxmorph_optimizer::problem::Stage;
+
 use super::lines::Lines;
 use super::table::Columns;
 use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::files::RunResult;
-use fluxmorph_optimizer::problem::Stage;
 
 /// A stage that takes longer [s] is shown with its time, outside of evaluations: people begin to wonder then.
 const LONG_STAGE: f64 = 2.0;

@@ -6,9 +6,8 @@
 //!
 //! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
 
-use fluxmorph_solver::FieldModel;
-use fluxmorph_solver::Order;
 use fluxmorph_solver::linear::{Method, Reuse, TWO_LEVELS_FROM};
+use fluxmorph_solver::{FieldModel, Order};
 
 use crate::problem::Problem;
 

@@ -11,12 +11,11 @@
 
 use std::sync::Arc;
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::{
     Cholesky, CholeskyAnalysis, ComponentAnalysis, ComponentPreconditioner, CsrMatrix, DofMap,
     IterationStatus, conjugate_gradients, csr::CsrStructure,
 };
-
-use fluxmorph_geometry::Mesh;
 
 use crate::distributed::DistributedElastic;
 use crate::error::RemeshError;

@@ -1,49 +1,20 @@
 //! The optimisation loop on a coarse shield: every algorithm, and what happens when a mesh would break.
 
-use std::path::Path;
-
-use fluxmorph::build::{Mode, set_up};
-use fluxmorph::config::{Algorithm, Config, Optimizer};
+use fluxmorph::config::{Algorithm, Optimizer};
 use fluxmorph::files::StopReason;
 use fluxmorph::show::{Evaluation, Observer, Silent};
-use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
-use fluxmorph_optimizer::problem::{Analysis, Problem, Shape};
-use fluxmorph_optimizer::problem::{RoundEvent, RoundKind};
+use fluxmorph_optimizer::driver::Optimised;
+use fluxmorph_optimizer::problem::{Problem, RoundEvent, RoundKind, Shape};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify};
 
-fn quick() -> (Problem, Optimizer) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
-    let (config, source) = Config::from_file(&path, &[]).unwrap();
-    (set_up(&config, &source, Mode::Optimisation).unwrap().problem, config.optimizer)
-}
-
-#[derive(Default)]
-struct Rows(Vec<Evaluation>);
-
-impl Recorder for Rows {
-    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        self.0.push(record.row.clone());
-        Ok(())
-    }
-}
-
-fn run(
-    problem: &mut Problem,
-    settings: &Optimizer,
-    observer: &mut dyn Observer,
-) -> (Optimised, Vec<Evaluation>) {
-    let mut rows = Rows::default();
-    let optimised = optimise(problem, &settings.settings(), observer, &mut rows, &|| false).unwrap();
-    (optimised, rows.0)
-}
+use crate::problems::{optimised, quick};
 
 #[test]
 fn every_algorithm_improves_the_shield_within_its_bounds() {
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     for algorithm in Algorithm::ALL {
         let settings = Optimizer { algorithm, max_evaluations: 8, ..settings.clone() };
-        let (optimised, rows) = run(&mut problem, &settings, &mut Silent);
+        let (optimised, rows) = optimised(&mut problem, &settings, &mut Silent);
         let ratio = optimised.best.objective / optimised.initial;
         println!("{algorithm:?}: F/F0 {ratio:.4} after {} evaluations", rows.len());
         // The slowest, truncated Newton, reaches 0.89: anything that moves at all is below 0.97.
@@ -83,16 +54,16 @@ fn shape(problem: &mut Problem) -> &mut Shape {
 
 #[test]
 fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
-    let (mut problem, settings) = quick();
-    let (free, free_rows) = run(&mut problem, &settings, &mut Silent);
+    let (mut problem, settings) = quick(&[]);
+    let (free, free_rows) = optimised(&mut problem, &settings, &mut Silent);
     assert_eq!(free_rows.last().unwrap().round, 0, "the shipped case needs one reference");
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     let used = free_rows.iter().filter_map(|row| row.step_to_inversion).fold(f64::INFINITY, f64::min);
     // Half of the way that the free run took.
     shape(&mut problem).limits.inversion_share = 0.5 / used;
     let settings = Optimizer { max_evaluations: 60, ..settings };
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &settings, &mut events);
+    let (optimised, rows) = optimised(&mut problem, &settings, &mut events);
     check_rows(&optimised, &rows, 0.0);
     println!("{:?}", events.0.iter().map(RoundEvent::describe).collect::<Vec<_>>());
     let rounds: Vec<_> = events.0.iter().filter(|event| event.kind == RoundKind::Round).collect();
@@ -110,9 +81,9 @@ fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
 
 #[test]
 fn the_gradient_is_exact_in_a_later_round() {
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     shape(&mut problem).limits.inversion_share = 0.3;
-    let (optimised, _) = run(&mut problem, &Optimizer { max_evaluations: 12, ..settings }, &mut Silent);
+    let (optimised, _) = optimised(&mut problem, &Optimizer { max_evaluations: 12, ..settings }, &mut Silent);
     assert!(shape(&mut problem).motion().round() >= 1);
     let certificates =
         certify(&problem, &optimised.best.values, &Settings::default(), &|| false, |_, _, _| {}).unwrap();
@@ -122,11 +93,12 @@ fn the_gradient_is_exact_in_a_later_round() {
 
 #[test]
 fn a_quality_that_stops_the_search_is_never_passed() {
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     // The free run falls to 0.094.
     shape(&mut problem).limits.least_quality = 0.15;
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
     println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), events.0);
     check_rows(&optimised, &rows, 0.15);
     assert!(!events.0.is_empty() && events.0[0].cause.contains("below the minimum"), "{:?}", events.0);
@@ -134,12 +106,13 @@ fn a_quality_that_stops_the_search_is_never_passed() {
 }
 
 #[test]
-fn without_rounds_the_trust_region_shrinks_and_the_reference_stays() {
-    let (mut problem, settings) = quick();
+fn without_rounds_the_box_shrinks_and_the_reference_stays() {
+    let (mut problem, settings) = quick(&[]);
     shape(&mut problem).limits.least_quality = 0.15;
     shape(&mut problem).limits.rounds = 0;
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut events);
     check_rows(&optimised, &rows, 0.15);
     assert!(!events.0.is_empty());
     assert!(
@@ -152,13 +125,14 @@ fn without_rounds_the_trust_region_shrinks_and_the_reference_stays() {
 
 #[test]
 fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     let initial = problem.quality(problem.original()).worst;
     // A millionth below the initial quality: the first real step is refused, and every smaller one of note too.
     let least = initial * (1.0 - 1e-6);
     shape(&mut problem).limits.least_quality = least;
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut events);
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut events);
     println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), events.0);
     check_rows(&optimised, &rows, least);
     assert_eq!(optimised.stop_reason, StopReason::MeshLimit, "{} rows", rows.len());
@@ -169,11 +143,12 @@ fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
 
 #[test]
 fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are_compared() {
-    let (mut problem, settings) = quick();
+    let (mut problem, settings) = quick(&[]);
     let n = shape(&mut problem).surface().variable_count();
     shape(&mut problem).set_bounds([vec![-9e-3; n], vec![35e-3; n]]);
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 150, ..settings }, &mut events);
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 150, ..settings }, &mut events);
     let least = shape(&mut problem).limits.least_quality;
     check_rows(&optimised, &rows, least);
     for event in &events.0 {
@@ -198,13 +173,14 @@ fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are
 }
 
 #[test]
-fn the_mesh_is_continued_to_a_first_design_far_away() {
-    let (mut problem, settings) = quick();
+fn a_first_design_far_away_is_approached_in_steps() {
+    let (mut problem, settings) = quick(&[]);
     let far = shape(&mut problem).upper().to_vec();
     shape(&mut problem).set_initial(far);
     shape(&mut problem).limits.inversion_share = 0.1;
     let mut events = Events::default();
-    let (optimised, rows) = run(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut events);
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 2, ..settings }, &mut events);
     check_rows(&optimised, &rows, 0.0);
     assert!(
         events.0.len() > 1 && events.0.iter().all(|event| event.kind == RoundKind::Continuation),

@@ -1,9 +1,9 @@
 //! What is not finite is refused by name, before an optimiser sees it.
 
-use fluxmorph::build::{Mode, set_up};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::problem::finite;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache, finite};
+
+use crate::problems::{initial, quick};
 
 fn named(error: Result<(), Error>) -> String {
     let error = error.expect_err("it is not finite");
@@ -11,23 +11,17 @@ fn named(error: Result<(), Error>) -> String {
     error.to_string()
 }
 
-fn quick() -> (Problem, Analysis) {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
-    let (config, source) =
-        fluxmorph::config::Config::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-    let problem = set_up(&config, &source, Mode::Optimisation).expect("a sound case").problem;
-    let p = problem.shape().expect("a shape").initial().to_vec();
-    let analysis = problem
+fn evaluated(problem: &Problem) -> Analysis {
+    let p = initial(problem);
+    problem
         .evaluate(&p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
-        .expect("a sound case");
-    (problem, analysis)
+        .expect("a sound case")
 }
 
 #[test]
 fn an_evaluation_with_a_number_that_is_none_is_refused_by_name() {
-    let (_, sound) = quick();
-    assert!(finite::analysis(&sound, &[]).is_ok());
-    let mut damaged = sound;
+    let mut damaged = evaluated(&quick(&[]).0);
+    assert!(finite::analysis(&damaged, &[]).is_ok());
     damaged.objective = Some(f64::INFINITY);
     assert!(named(finite::analysis(&damaged, &[])).starts_with("the objective is inf"));
     damaged.objective = Some(1.0);
@@ -54,13 +48,11 @@ fn an_evaluation_with_a_number_that_is_none_is_refused_by_name() {
 #[test]
 #[ignore = "a measurement: the clock is the process', and other tests run in it"]
 fn the_checks_take_less_than_a_hundredth_of_an_evaluation() {
-    let (problem, analysed) = quick();
-    let p = &problem.shape().expect("a shape").initial();
+    let problem = quick(&[]).0;
+    let analysed = evaluated(&problem);
     let cpu = || cpu_time::ProcessTime::now();
     let start = cpu();
-    problem
-        .evaluate(p, Derivatives::First, &mut SolverCache::default(), &mut NoProgress)
-        .expect("a sound case");
+    evaluated(&problem);
     let evaluation = start.elapsed().as_secs_f64();
     let start = cpu();
     const REPEATS: u32 = 20;

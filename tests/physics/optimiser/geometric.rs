@@ -1,23 +1,19 @@
 //! Volume and thickness of a plate, with their gradients.
 
-use std::path::Path;
-
-use fluxmorph::build::{Mode, Setup, set_up};
-use fluxmorph::config::Config;
+use fluxmorph::build::Setup;
 use fluxmorph_optimizer::geometric::{MARGIN, ThicknessBound, ThicknessLimit, Volume};
 use fluxmorph_optimizer::problem::Problem;
 
+use crate::problems::variables;
+use crate::support::setup;
+
 fn shield(overrides: &[&str]) -> Setup {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-    let (config, source) = Config::from_file(&path, &overrides).unwrap_or_else(|e| panic!("{e}"));
-    set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"))
+    setup("shield_quick.toml", overrides)
 }
 
 /// A design inside the bounds that is flat nowhere.
 fn wavy(problem: &Problem) -> Vec<f64> {
-    let variables = problem.shape().expect("a shape").surface().variable_count();
-    (0..variables).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
+    (0..variables(problem)).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
 }
 
 /// Slope 2 of the Taylor remainder, or a remainder that is rounding alone, in a direction that is flat nowhere.

@@ -4,12 +4,13 @@
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_optimizer::memory_estimate::of_evaluation;
+use fluxmorph_optimizer::problem::Progress;
 use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
-use crate::build::memory_limit;
-use crate::build::{Mode, Setup, set_up_watched};
+use crate::build::{Audited, Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
@@ -18,8 +19,6 @@ use crate::error::Error;
 use crate::files::OverwritePolicy;
 use crate::run::mesh_independence;
 use crate::run::morph::{self, MotionSummary};
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
-use fluxmorph_optimizer::problem::Progress;
 
 /// What `check` found.
 #[derive(Debug, Serialize)]
@@ -120,6 +119,20 @@ pub(super) struct SkinSummary {
     pub(super) thickness_in_skin_depths: f64,
 }
 
+impl SkinSummary {
+    fn of(audited: &Audited) -> Self {
+        let audit = &audited.audit;
+        Self {
+            region: audit.region.clone(),
+            model: model_name(audited.model),
+            skin_depth_m: audit.skin_depth,
+            median_elements_per_skin_depth: audit.median_elements_per_skin_depth,
+            least_elements_per_skin_depth: audit.least_elements_per_skin_depth,
+            thickness_in_skin_depths: audit.thickness_in_skin_depths,
+        }
+    }
+}
+
 fn model_name(model: RegionModel) -> &'static str {
     match model {
         RegionModel::Volume => "volume",
@@ -142,18 +155,7 @@ pub(super) fn summary<'a>(
     let motions = morph::inspect(config, source)?;
     let mesh = &setup.full_mesh;
     let problem = &setup.problem;
-    let skin = setup
-        .audits
-        .iter()
-        .map(|audited| SkinSummary {
-            region: audited.audit.region.clone(),
-            model: model_name(audited.model),
-            skin_depth_m: audited.audit.skin_depth,
-            median_elements_per_skin_depth: audited.audit.median_elements_per_skin_depth,
-            least_elements_per_skin_depth: audited.audit.least_elements_per_skin_depth,
-            thickness_in_skin_depths: audited.audit.thickness_in_skin_depths,
-        })
-        .collect();
+    let skin = setup.audits.iter().map(SkinSummary::of).collect();
     let reference = problem.original().topology();
     let mut warnings = advice(config, &setup);
     warnings.splice(0..0, setup.warnings.iter().cloned());

@@ -4,10 +4,10 @@
 //! of a [`Record`]. The last field, `"sum"`, has the first 32 hexadecimal digits of BLAKE3 over the sum of the line before
 //! (the header: over nothing) and the bytes of its own line before `,"sum"`.
 
+use fluxmorph_optimizer::driver::Record;
 use serde::{Deserialize, Serialize};
 
 use super::{Contents, Identity, JournalError, Rest};
-use fluxmorph_optimizer::driver::Record;
 
 /// How a journal begins.
 const MARK: &str = "{\"fluxmorph_journal\":";

@@ -12,9 +12,10 @@
 mod identity;
 mod line;
 
+use fluxmorph_optimizer::driver::Record;
+
 use crate::error::Error;
 use crate::files::{OutputError, RunDirectory, SyncedLog};
-use fluxmorph_optimizer::driver::Record;
 
 pub use identity::{Identity, configuration_hash, mesh_hash};
 

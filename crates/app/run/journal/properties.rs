@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use fluxmorph_optimizer::problem::Timings;
 use fluxmorph_solver::linear::Method;
 use proptest::collection::{btree_map, vec};
 use proptest::option::of;
@@ -11,7 +12,6 @@ use proptest::sample::{Index, select};
 use super::tests::{Written, record as example_record};
 use super::*;
 use crate::show::Evaluation;
-use fluxmorph_optimizer::problem::Timings;
 
 /// Any number, by its value or its bits.
 fn number() -> impl Strategy<Value = f64> {

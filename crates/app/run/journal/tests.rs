@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_optimizer::problem::Timings;
 use fluxmorph_solver::linear::Method;
 
 use super::*;
 use crate::files::{OverwritePolicy, system_disk};
 use crate::show::Evaluation;
-use fluxmorph_optimizer::problem::Timings;
 
 pub(super) fn identity() -> Identity {
     Identity {

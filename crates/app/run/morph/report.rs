@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, centroid};
+use fluxmorph_optimizer::driver::StopReason;
 use serde::Serialize;
 
 use super::{LoadStepping, TuneReport};
@@ -12,7 +13,6 @@ use crate::config::Paper;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::RunStatus;
-use fluxmorph_optimizer::driver::StopReason;
 
 /// The result of `fluxmorph morph`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -10,7 +10,8 @@ use std::ops::ControlFlow;
 
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, add, norm, volume};
-use fluxmorph_remesh::{ElasticMap, RemeshSetup, StiffnessPolicy};
+use fluxmorph_optimizer::nlopt::{Search, maximise};
+use fluxmorph_remesh::{self as remesh, ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
 use super::table::align;
@@ -18,7 +19,6 @@ use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::show::Observer;
-use fluxmorph_optimizer::nlopt::{Search, maximise};
 
 /// Gain of worst quality for which another policy is taken: on equal cells the isotropic ones are
 /// the same but for rounding.
@@ -69,6 +69,17 @@ pub struct TunedRegion {
     pub poisson: [f64; 2],
     /// Fictitious force.
     pub force: [[f64; 3]; 2],
+}
+
+impl TunedRegion {
+    fn of((was, is): (&remesh::Subregion, &remesh::Subregion)) -> Self {
+        Self {
+            name: is.name.clone(),
+            young: [was.young, is.young],
+            poisson: [was.poisson, is.poisson],
+            force: [was.force, is.force],
+        }
+    }
 }
 
 impl TuneReport {
@@ -134,13 +145,7 @@ pub(super) fn tune(
     let initial = worst_quality(setup, given, &design)?;
     let unit = force_unit(setup, &design);
     let variables = variables(settings, given.subregions.len());
-    let bounds = |v: &Variable| match v.parameter {
-        TunedParameter::Young => settings.log10_young,
-        TunedParameter::Poisson => settings.poisson,
-        TunedParameter::Force => settings.force,
-    };
-    let [lower, upper] = [0, 1].map(|end| variables.iter().map(|v| bounds(v)[end]).collect());
-    let search = Search { lower, upper, evaluations: settings.evaluations };
+    let search = search(settings, &variables);
     let start: Vec<f64> = variables.iter().map(|v| value(given, v, unit)).collect();
 
     let mut best = (given.clone(), initial);
@@ -182,20 +187,25 @@ pub(super) fn tune(
     let (remesh, quality) = best;
     let config = tuned_config(config, &remesh);
     let setup = set_up_motion(&config, source)?;
-    let regions = given.subregions.iter().zip(&remesh.subregions).map(|(was, is)| TunedRegion {
-        name: is.name.clone(),
-        young: [was.young, is.young],
-        poisson: [was.poisson, is.poisson],
-        force: [was.force, is.force],
-    });
     let report = TuneReport {
         evaluations,
         worst_quality: [initial, quality],
         stiffness: [given.policy.name(), remesh.policy.name()],
         policies,
-        regions: regions.collect(),
+        regions: given.subregions.iter().zip(&remesh.subregions).map(TunedRegion::of).collect(),
     };
     Ok(Found { report, config, setup, left_out })
+}
+
+/// The search over these variables.
+fn search(settings: &Tune, variables: &[Variable]) -> Search {
+    let bounds = |v: &Variable| match v.parameter {
+        TunedParameter::Young => settings.log10_young,
+        TunedParameter::Poisson => settings.poisson,
+        TunedParameter::Force => settings.force,
+    };
+    let [lower, upper] = [0, 1].map(|end| variables.iter().map(|v| bounds(v)[end]).collect());
+    Search { lower, upper, evaluations: settings.evaluations }
 }
 
 /// The variables of a search over so many subregions: all motions are the same when every modulus is doubled, so that of

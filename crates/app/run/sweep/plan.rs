@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::state::{fingerprint, mesh_file};
 use super::{Combination, Setting, SweepError, combinations};
-use crate::build::memory_limit;
-use crate::build::with_names;
+use crate::build::{memory_limit, with_names};
 use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};

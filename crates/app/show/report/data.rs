@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::VtuArray;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::driver::Record;
 
 use super::ReportedRun;
 use super::field_file::field_contents;
@@ -13,7 +14,6 @@ use crate::error::Error;
 use crate::files::{Manifest, OutputError, RunDirectory, RunResult};
 use crate::run::journal::Journal;
 use crate::show::Evaluation;
-use fluxmorph_optimizer::driver::Record;
 
 /// Largest result and configuration that are read [bytes].
 const LARGEST_TEXT: u64 = 1 << 28;

@@ -40,11 +40,12 @@ mod words;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use data::RunData;
+
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{Disk, Manifest, RunDirectory};
 use crate::run;
-use data::RunData;
 
 /// A run directory that a page can be made of.
 #[derive(Debug)]

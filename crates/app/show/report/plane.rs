@@ -1,9 +1,9 @@
 //! A plane to draw on: points in space become places in millimetres.
 
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
+use fluxmorph_optimizer::design::Mirror;
 
 use crate::config::{Config, MeshConfig};
-use fluxmorph_optimizer::design::Mirror;
 
 /// A normal this near to a coordinate axis is taken for it.
 const ALIGNED: f64 = 1e-6;

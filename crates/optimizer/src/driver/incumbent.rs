@@ -2,12 +2,11 @@
 
 use std::cmp::Ordering;
 
+use super::replay::ReplayState;
 use crate::constraint::Bound;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::Goal;
 use crate::problem::Analysis;
-
-use super::replay::ReplayState;
 
 /// What the first evaluation fixes for the rest of the run.
 #[derive(Clone, Debug)]

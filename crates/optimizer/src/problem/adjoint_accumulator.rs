@@ -6,10 +6,9 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::linear::PreparedSystem;
 use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue, adjoint};
 
-use super::finite;
 use super::progress::{Progress, Stage};
 use super::stopwatch::Stopwatch;
-use super::{Shape, Timings};
+use super::{Shape, Timings, finite};
 use crate::error::Error;
 use crate::objective::Term;
 

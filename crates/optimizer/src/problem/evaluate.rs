@@ -9,10 +9,9 @@ use fluxmorph_solver::linear::SolverEvent;
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
-use super::finite;
 use super::progress::{Progress, Stage};
 use super::stopwatch::Stopwatch;
-use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings};
+use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings, finite};
 use crate::constraint::{Constraint, Quantity};
 use crate::error::Error;
 use crate::objective::Term;

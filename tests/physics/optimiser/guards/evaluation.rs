@@ -7,7 +7,8 @@ use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
 use fluxmorph_solver::{FieldModel, Functional, SolverError};
 
-use super::{initial, quick, with_field};
+use super::with_field;
+use crate::problems::{initial, quick};
 
 fn evaluate(problem: &Problem, p: &[f64], derivatives: Derivatives) -> Result<Analysis, Error> {
     problem.evaluate(p, derivatives, &mut SolverCache::default(), &mut NoProgress)
@@ -52,16 +53,21 @@ fn a_conductivity_that_overflows_leaves_no_factor() {
     assert!(text.starts_with("the state at 60 Hz: ") && text.contains("diagonal entry"), "{text}");
 }
 
-#[test]
-fn a_solver_that_is_cut_short_names_residual_and_state() {
-    let problem = with_field(quick(&[]).0, |setup| {
+/// The quick shield with a solver of one iteration, and room for a factor of so many bytes.
+fn cut_short(factor_bytes: usize) -> Problem {
+    with_field(quick(&[]).0, |setup| {
         setup.linear_solver = LinearSolverSettings {
             method: LinearSolver::Fixed(Method::Incomplete),
             max_iterations: Some(1),
-            factor_bytes: 0,
+            factor_bytes,
             ..LinearSolverSettings::default()
         }
-    });
+    })
+}
+
+#[test]
+fn a_solver_that_is_cut_short_names_residual_and_state() {
+    let problem = cut_short(0);
     let error = refused(&problem, Derivatives::None);
     let Error::Field { problem: name, cause } = &error else { panic!("{error}") };
     let SolverError::NotConverged { residual, .. } = **cause else { panic!("{error}") };
@@ -71,13 +77,7 @@ fn a_solver_that_is_cut_short_names_residual_and_state() {
 /// With a factor to fall back to the same case is solved, and says how.
 #[test]
 fn a_solver_that_is_cut_short_is_followed_by_a_factor() {
-    let problem = with_field(quick(&[]).0, |setup| {
-        setup.linear_solver = LinearSolverSettings {
-            method: LinearSolver::Fixed(Method::Incomplete),
-            max_iterations: Some(1),
-            ..LinearSolverSettings::default()
-        }
-    });
+    let problem = cut_short(LinearSolverSettings::default().factor_bytes);
     let analysis = evaluate(&problem, &initial(&problem), Derivatives::None).unwrap();
     let sound = quick(&[]).0;
     let expected = evaluate(&sound, &initial(&sound), Derivatives::None).unwrap().objective.unwrap();

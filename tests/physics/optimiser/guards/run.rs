@@ -9,32 +9,13 @@ use fluxmorph::files::{OutputError, RunStatus, StopReason};
 use fluxmorph::show::{Evaluation, Observer, Silent};
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, optimise};
-use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_optimizer::driver::{Optimised, optimise};
+use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::SolverError;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method, Reuse};
 
-use super::{overflowing, quick, with_field};
-
-/// Keeps the rows and residuals, and may fail at one of them.
-#[derive(Default)]
-struct Rows {
-    rows: Vec<Evaluation>,
-    residuals: Vec<f64>,
-    /// Before which evaluation, and with what.
-    fails: Option<(usize, fn() -> Error)>,
-}
-
-impl Recorder for Rows {
-    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
-        if let Some((_, error)) = self.fails.filter(|(at, _)| *at == record.row.evaluation) {
-            return Err(error());
-        }
-        self.rows.push(record.row.clone());
-        self.residuals.push(record.worst_residual);
-        Ok(())
-    }
-}
+use super::{overflowing, with_field};
+use crate::problems::{Rows, quick};
 
 /// What a run warns of.
 #[derive(Default)]

@@ -3,13 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use fluxmorph::config::Config;
-use fluxmorph::files::{OverwritePolicy, system_disk};
-use fluxmorph::run::{self, Options, RunLimits, SavedRun};
+use fluxmorph::files::system_disk;
+use fluxmorph::run::{self, RunLimits, SavedRun};
 use fluxmorph::show::{Evaluation, Observer, RunObserver, Silent};
-use serde_json::Value;
 
-use super::quick_path;
+use crate::support::folder::read_json;
+use crate::support::{config, options};
 
 /// Panics when it is told of an evaluation.
 struct Faulty {
@@ -24,24 +23,12 @@ impl Observer for Faulty {
 
 impl RunObserver for Faulty {}
 
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
 /// A run of a few evaluations in a directory, with an observer.
 fn run(directory: &Path, observer: &mut dyn RunObserver) -> Result<(), fluxmorph::Error> {
-    let overrides = ["output.verify_refinement=0".to_owned(), "output.fields=every".to_owned()];
-    let (mut config, source) = Config::from_file(&quick_path(), &overrides).unwrap();
+    let overrides = ["output.verify_refinement=0", "output.fields=every"];
+    let (mut config, source) = config("shield_quick.toml", &overrides);
     config.output.directory = directory.to_owned();
-    let disk = system_disk();
-    let options = Options {
-        disk: &disk,
-        overwrite_policy: OverwritePolicy::Keep,
-        threads: 1,
-        ranks: None,
-        interrupted: &|| false,
-    };
-    run::run(&config, &source, options, observer).map(drop)
+    run::run(&config, &source, options(&system_disk()), observer).map(drop)
 }
 
 #[test]
@@ -50,7 +37,7 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     let [broken, sound] = ["broken", "sound"].map(|name| folder.path().join(name));
     let caught = catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 2 })));
     assert!(caught.is_err(), "the panic is not swallowed");
-    assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
+    assert_eq!(read_json(&broken.join("manifest.json"))["status"], "failed");
     assert!(!broken.join("result.json").exists());
     let history = std::fs::read_to_string(broken.join("history.csv")).unwrap();
     assert_eq!(history.lines().count(), 4);
@@ -59,18 +46,12 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     }
     // Its evaluations are not lost.
     let disk = system_disk();
-    let options = Options {
-        disk: &disk,
-        overwrite_policy: OverwritePolicy::Keep,
-        threads: 1,
-        ranks: None,
-        interrupted: &|| false,
-    };
     let limits = RunLimits { max_evaluations: None, max_time: None };
-    let resumed = run::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options, &mut Silent).unwrap();
+    let resumed =
+        run::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options(&disk), &mut Silent).unwrap();
     run(&sound, &mut Silent).unwrap();
-    let expected = json(&sound.join("result.json"));
-    assert_eq!(expected["objective"], json(&broken.join("result.json"))["objective"]);
+    let expected = read_json(&sound.join("result.json"));
+    assert_eq!(expected["objective"], read_json(&broken.join("result.json"))["objective"]);
     assert_eq!(Some(resumed.evaluations as u64), expected["evaluations"].as_u64());
 }
 
@@ -79,5 +60,5 @@ fn a_panic_before_the_first_evaluation_is_kept_leaves_a_failed_manifest() {
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("broken");
     assert!(catch_unwind(AssertUnwindSafe(|| run(&broken, &mut Faulty { at: 0 }))).is_err());
-    assert_eq!(json(&broken.join("manifest.json"))["status"], "failed");
+    assert_eq!(read_json(&broken.join("manifest.json"))["status"], "failed");
 }

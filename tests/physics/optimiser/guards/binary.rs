@@ -2,29 +2,13 @@
 
 use std::path::Path;
 
-use fluxmorph_geometry::fem::{c64, norm};
 use serde_json::Value;
 
-use crate::support;
+use super::weight;
+use crate::problems::quick;
 use crate::support::folder::{files_below, read_json, read_text};
 use crate::support::program::folder;
 use crate::support::shield::on_quick;
-
-/// Norm beyond which the right side of a linear system is refused.
-const LARGEST_NORM: f64 = 1e130;
-
-/// A weight of the objective at which the adjoint of the initial design can be solved for, and no longer once the
-/// objective has grown by a factor.
-fn weight(growth: f64) -> f64 {
-    let problem = support::setup("shield_quick.toml", &[]).problem;
-    let shape = problem.shape().expect("a shape");
-    let mesh = problem.moved(shape.initial()).expect("the initial design has a mesh").mesh;
-    let model = &problem.states()[0];
-    let state = model.solve(&mesh).expect("a sound case").0;
-    let functional = &problem.objective().expect("an objective").terms[0].functional;
-    let derivative = functional.evaluate(model, &mesh, &state).expect("a sound case").derivative;
-    LARGEST_NORM / (norm::<c64>(&derivative) * growth.sqrt())
-}
 
 /// Keys whose value may be missing: everything else in a published file is a number, a text, a list or a table of these.
 const MAY_BE_NULL: &str = "verified_ratio region frequency frequency_hz admitted min_thickness_m max_thickness_m \
@@ -61,7 +45,7 @@ fn holds_numbers_alone(out: &Path) {
 fn a_run_that_overflows_after_some_evaluations_exits_with_4_and_saves_its_best_design() {
     let folder = folder();
     let out = folder.path().join("run");
-    let weight = format!("objective.weight={:e}", weight(1.1));
+    let weight = format!("objective.weight={:e}", weight(&quick(&[]).0, 1.1));
     let arguments = ["--set", &weight, "--set", "objective.goal=maximise", "--max-evaluations", "40"];
     on_quick("run", &out, &arguments).exits_with(4).says(&[
         "the adjoint of the objective at 60 Hz",

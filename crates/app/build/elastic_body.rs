@@ -1,0 +1,158 @@
+//! The elastic body of a configuration: its subregions, boundary kinds and design nodes.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::centroid;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_remesh::{
+    Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion,
+};
+
+use crate::config::{
+    self, Design, DesignDirection, Diagnostic, DirectionWord, Remesh, RemeshExtent, SourceMap, StiffnessLaw,
+};
+use crate::error::Error;
+
+/// Subregions, boundary kinds and design nodes (ascending) of the elastic body.
+pub(super) fn remesh_setup(
+    source: &SourceMap,
+    remesh: &Remesh,
+    mesh: &Mesh,
+    design_nodes: &[NodeId],
+    kinematic_constraint: KinematicConstraint,
+    warnings: &mut Vec<String>,
+) -> Result<RemeshSetup, Error> {
+    let mut subregions = subregions(remesh, mesh, design_nodes, warnings)?;
+    // A region that an impedance surface replaces has no elements left, and is no part of the body.
+    subregions.retain(|part| !part.elements.is_empty());
+    check_subregions(source, remesh, &subregions)?;
+    for part in &mut subregions {
+        let own = remesh.subregions.iter().find(|own| own.name == part.name);
+        part.young = own.and_then(|own| own.young).unwrap_or(remesh.young);
+        part.poisson = own.and_then(|own| own.poisson).unwrap_or(remesh.poisson);
+        part.force = own.and_then(|own| own.force).unwrap_or(remesh.force);
+    }
+    let mut boundaries = Vec::new();
+    for (names, kind) in [
+        (&remesh.slide, BoundaryKind::Slide),
+        (&remesh.fixed, BoundaryKind::Fixed),
+        (&remesh.free, BoundaryKind::Free),
+    ] {
+        for name in names {
+            boundaries.push(Boundary::of_surface(mesh.topology(), name, kind)?);
+        }
+    }
+    let policy = match remesh.stiffness {
+        StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
+        StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
+        StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
+        StiffnessLaw::Directional => StiffnessPolicy::Directional,
+    };
+    Ok(RemeshSetup {
+        subregions,
+        policy,
+        kinematic_constraint,
+        design_nodes: design_nodes.to_vec(),
+        boundaries,
+        fixed_nodes: Vec::new(),
+        solver: SolverChoice::Automatic,
+        ownership: None,
+    })
+}
+
+/// The parts of the body with their elements: the regions named and those at the design surface, or what a box holds of
+/// each region.
+fn subregions(
+    remesh: &Remesh,
+    mesh: &Mesh,
+    design_nodes: &[NodeId],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Subregion>, Error> {
+    let topology = mesh.topology();
+    match &remesh.extent {
+        RemeshExtent::Regions(names) => {
+            let mut names: BTreeSet<&str> = names.iter().map(String::as_str).collect();
+            for region in regions_at(mesh, design_nodes) {
+                let name = &topology.region_names()[region.index()];
+                if names.insert(name) {
+                    warnings.push(format!(
+                        "the region `{name}` touches the design surface and moves with it: it is taken into the remesh \
+                         region"
+                    ));
+                }
+            }
+            names.into_iter().map(|name| Ok(Subregion::of_region(topology, name)?)).collect()
+        }
+        RemeshExtent::Box([lower, upper]) => {
+            let inside = |e: &ElementId| {
+                let c = centroid(mesh.vertices(*e));
+                (0..3).all(|d| lower[d] <= c[d] && c[d] <= upper[d])
+            };
+            let elements = |i| topology.elements_of(RegionId::new(i)).into_iter().filter(inside);
+            let parts = topology.region_names().iter().enumerate();
+            Ok(parts.map(|(i, name)| Subregion::new(name, elements(i).collect())).collect())
+        }
+    }
+}
+
+/// Refuses an entry for a region that is no part of the body, and a body without elements.
+fn check_subregions(source: &SourceMap, remesh: &Remesh, subregions: &[Subregion]) -> Result<(), Error> {
+    let outside: Vec<Diagnostic> = remesh
+        .subregions
+        .iter()
+        .enumerate()
+        .filter(|(_, own)| subregions.iter().all(|part| part.name != own.name))
+        .map(|(i, own)| {
+            let message = format!("the region `{}` is no part of the remesh region", own.name);
+            source
+                .diagnostic(&format!("remesh.subregions[{i}].name"), message)
+                .help("name it in remesh.region too, or take the subregion out")
+        })
+        .collect();
+    source.check(outside)?;
+    if !subregions.is_empty() {
+        return Ok(());
+    }
+    let (key, expected) = match &remesh.extent {
+        RemeshExtent::Regions(_) => ("remesh.region", "at least one region that is meshed"),
+        RemeshExtent::Box(_) => ("remesh.box", "a box that holds the centroid of some element"),
+    };
+    let fault = source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
+    Err(source.error(vec![fault]).into())
+}
+
+/// The axis of the design's direction where the motion is to follow it.
+pub(super) fn guidance(
+    source: &SourceMap,
+    design: Option<&Design>,
+    remesh: &Remesh,
+) -> Result<KinematicConstraint, Error> {
+    let axis = match design.map(|design| design.direction) {
+        Some(DesignDirection::Vector(direction)) => (0..3).find(|&d| direction[d].abs() == 1.0),
+        Some(DesignDirection::Word(DirectionWord::Normal)) | None => None,
+    };
+    match remesh.motion {
+        config::Motion::Free => Ok(KinematicConstraint::Free),
+        config::Motion::AlongDesign => match axis {
+            Some(axis) => Ok(KinematicConstraint::Axis(axis)),
+            None => {
+                let fault = source
+                    .diagnostic("remesh.motion", "the design does not move along a coordinate axis")
+                    .expected("motion = \"free\", or a design.direction along x, y or z");
+                Err(source.error(vec![fault]).into())
+            }
+        },
+    }
+}
+
+/// Regions with an element that has a face between design nodes, which are ascending.
+pub(super) fn regions_at(mesh: &Mesh, design_nodes: &[NodeId]) -> BTreeSet<RegionId> {
+    let topology = mesh.topology();
+    topology
+        .facets()
+        .iter()
+        .filter(|f| f.nodes.iter().all(|n| design_nodes.binary_search(n).is_ok()))
+        .flat_map(|f| std::iter::once(f.inside).chain(f.outside))
+        .map(|e| topology.region_of()[e.index()])
+        .collect()
+}
