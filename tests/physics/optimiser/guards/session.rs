@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use super::quick_path;
 
-/// Panics when it is told of an evaluation.
+/// Panics at a given evaluation.
 struct Faulty {
     at: usize,
 }
