@@ -5,9 +5,9 @@
 
 #![no_main]
 
+use fluxmorph::run::journal::parse;
 use fluxmorph_fuzz::in_time;
 use fluxmorph_fuzz::journal::sign;
-use fluxmorph_optimizer::journal::parse;
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| in_time(|| check(data)));

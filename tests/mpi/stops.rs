@@ -17,14 +17,14 @@ fn stopped(out: &Path, rank: Option<usize>, signal: &str) -> Output {
     child.wait_with_output().expect("it ends")
 }
 
-/// The process of a rank: the child of mpirun that was told so.
+/// The process of a rank: the child of mpirun with that number.
 fn process_of(mpirun: &Child, rank: usize) -> u32 {
     let id = mpirun.id().to_string();
     let children = std::fs::read_to_string(format!("/proc/{id}/task/{id}/children")).expect("Linux has it");
-    let told = format!("OMPI_COMM_WORLD_RANK={rank}");
+    let variable_of_rank = format!("OMPI_COMM_WORLD_RANK={rank}");
     let is_it = |process: &&str| {
         let environment = std::fs::read(format!("/proc/{process}/environ")).unwrap_or_default();
-        environment.split(|&byte| byte == 0).any(|variable| variable == told.as_bytes())
+        environment.split(|&byte| byte == 0).any(|variable| variable == variable_of_rank.as_bytes())
     };
     children.split_whitespace().find(is_it).expect("mpirun has started it").parse().expect("a number")
 }

@@ -11,7 +11,7 @@ use crate::support::folder::{RunFolder, files};
 use crate::support::program::{finish, folder};
 use crate::support::shield::Model;
 
-/// All that the linear solver can be told; `two_level` is for quadratic elements.
+/// All settings of the linear solver; `two_level` is for quadratic elements.
 const METHODS: [&str; 6] =
     ["direct", "direct_single", "real_factor", "real_factor_single", "incomplete", "two_level"];
 

@@ -1,4 +1,4 @@
-//! A disk in memory that tells what has reached it from what has not, and that fails when it is told to.
+//! A disk in memory that distinguishes what has reached it from what has not, and fails on request.
 //!
 //! Content is durable once its file is synced, names once their folder is. A crash leaves what is durable, and of the rest
 //! nothing, all, or a torn part: file systems promise no more.

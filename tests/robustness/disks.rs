@@ -44,7 +44,7 @@ impl Drop for Mounted {
     }
 }
 
-/// A run that found no room names a file and ends with 5; given room it goes on, and ends as the undisturbed one.
+/// A run that found no room names a file and ends with 5; given room it is resumed, and ends as the undisturbed one.
 fn recovered(
     device: &Device,
     out: &Path,

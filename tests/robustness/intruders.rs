@@ -9,7 +9,7 @@ use crate::support::essence::{assert_same, essence};
 use crate::support::folder::{files, rows};
 use crate::support::program::{end_of, finish, folder, resume, send, wait_until};
 
-/// Waits for some evaluations of a run that goes on.
+/// Waits for some evaluations of a run that is still going.
 fn under_way(out: &Path, child: Child) -> Child {
     wait_until("two evaluations", || rows(out) > 1);
     child

@@ -1,7 +1,7 @@
 //! Nothing is lost: runs that are cut, disks that fail, and the real program under what real machines do to it end up
 //! where a run without a break does, to the last bit.
 //!
-//! On a disk in memory, which fails as it is told to: `algorithms`, `resume`, `faults`. With the system's disks and
+//! On a disk in memory, which fails on request: `algorithms`, `resume`, `faults`. With the system's disks and
 //! processes: `signals`, `kills`, `disks`, `intruders`, `reopened`, `determinism`. Long series are written into
 //! docs/robustness.md: `just torture-runs`.
 #![cfg(unix)]

@@ -1,7 +1,7 @@
-//! Signals: the first is answered at once and obeyed after the evaluation in hand, the second at once.
+//! Signals: the first is answered at once and obeyed after the current evaluation, the second at once.
 //!
-//! "At once" is a claim about the order of things, whatever else the machine does: the answer comes before the evaluation
-//! in hand ends, the end before it has a result. The times themselves are measured by `page`, in long series.
+//! "At once" is a claim about the order of things, whatever else the machine does: the answer comes before the current
+//! evaluation ends, the end before it has a result. The times themselves are measured by `page`, in long series.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

@@ -90,7 +90,7 @@ fn a_motion_that_stops_short_on_a_valid_mesh_has_stopped_and_not_failed() {
         let case = &result["cases"][0];
         assert!(number(case, "/reached") < 1.0 && count(case, "/inverted") == 0, "{case}");
         assert!(case["valid"] == false, "{case}");
-        // The remedy that makes the whole way anew does not look at the least quality; equal increments have no remedies.
+        // The fallback that repeats the whole motion does not check the least quality; equal increments have no fallbacks.
         assert!(increments.is_empty() || number(case, "/after/worst") >= 0.3, "{case}");
     }
     // A single increment is a result, however it leaves the mesh.

@@ -72,7 +72,7 @@ pub(crate) fn shipped(name: &'static str, further: &[&str]) -> Device {
     Device { name, config, further: further.iter().map(|item| (*item).to_owned()).collect() }
 }
 
-/// A run that would go on for hours.
+/// A run that would take hours.
 pub(crate) fn endless() -> Device {
     shipped("shield_quick", &[]).with("optimizer.max_evaluations=1000000").with("optimizer.ftol_rel=0")
 }

@@ -98,7 +98,7 @@ impl<'a> DiagnosticSink<'a> {
                 }
                 Ok(None)
             }
-            // It may follow from the faults that are known, which are to be mended first.
+            // It may follow from the faults that are known, which come first.
             Err(_) if !self.faults.is_empty() => Ok(None),
             Err(other) => Err(other),
         }

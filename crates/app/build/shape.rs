@@ -51,8 +51,8 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     let idle = weights.iter().filter(|&&weight| weight == 0.0).count();
     if idle > 0 {
         warnings.push(format!(
-            "{idle} of {} design variables move no node: the control grid is finer than the mesh, or lies on a rim that is \
-             held; refine the mesh, or take a smaller design.grid",
+            "{idle} of {} design variables move no node: the control grid is finer than the mesh, or lies on a fixed rim; \
+             refine the mesh, or take a smaller design.grid",
             surface.variable_count()
         ));
     }

@@ -74,8 +74,8 @@ fn left_to_do(states: &mut States<'_>, sweep: &Sweep, index: usize) -> Result<Le
     let planned = &sweep.combinations[index];
     Ok(match states.of(planned)? {
         State::Missing => Left::Task(Task::Begin(OverwritePolicy::Keep)),
-        State::Unborn => Left::Task(Task::Begin(OverwritePolicy::Replace)),
-        State::Broken => Left::Task(Task::Resume),
+        State::Unstarted => Left::Task(Task::Begin(OverwritePolicy::Replace)),
+        State::Resumable => Left::Task(Task::Resume),
         State::Finished(reason) => Left::Finished(reason.into()),
         State::InUse => Left::InUse,
         State::Other(_) if sweep.overwrite == OverwritePolicy::Replace => {
@@ -231,7 +231,7 @@ impl<'a> Session<'a> {
             self.warning(index, &format!("{how}{error}; see {}", log.display()));
         };
         match ending {
-            Ending::Broken(how) => broken(&format!("failed: {how}")),
+            Ending::Failed(how) => broken(&format!("failed: {how}")),
             Ending::Code(ExitCode::Interrupted | ExitCode::Terminated) => {
                 let outcome = match self.row(index)?.evaluations {
                     Some(count) => format!("interrupted, {count} evaluations are saved, {seconds:.1} s"),

@@ -103,7 +103,7 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
 
 fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
     let ConstraintResult { name, value, bound, satisfied } = constraint;
-    let verdict = if *satisfied { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
+    let verdict = if *satisfied { "satisfied".to_owned() } else { styled(styles.bad, "VIOLATED") };
     ("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"))
 }
 

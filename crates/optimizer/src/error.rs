@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// The mesh of the first design is refused.
     #[error(
-        "the first design has no mesh to compute on: {cause}; begin elsewhere, or loosen the limit named"
+        "the first design has no mesh to compute on: {cause}; start from another design, or loosen the limit named"
     )]
     FirstDesign {
         /// Why.

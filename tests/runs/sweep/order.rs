@@ -76,7 +76,7 @@ fn all_faults_are_told_before_anything_runs() {
             "3 of 4 combinations cannot be read, and nothing was run",
         ],
     );
-    // The last combination has both faults, and they have been told.
+    // The last combination has both faults, and they have been reported.
     assert_eq!((refused.count("combination `"), home.path("out").exists()), (2, false), "{}", refused.stderr);
     // A fault of the configuration itself stands once, however many combinations have it.
     let broken = Home::with(&[("frequency = \"50 Hz\"", "freqency = \"50 Hz\"")]);

@@ -49,7 +49,7 @@ fn finished_runs_are_skipped_and_further_values_begun() {
     assert_eq!(counts, (2, 1), "{}", again.stderr);
     assert_eq!(std::fs::metadata(&journal).and_then(|file| file.modified()).expect("a file"), before);
     assert_eq!(home.runs("out"), RUNS);
-    // Wider limits go on from where the narrow ones ended.
+    // Runs with wider limits continue from where the narrower ones ended.
     let wider = home.sweep("out", &[SET, ["--max-evaluations", "3"]].concat());
     assert_eq!(wider.with(1, &[]).count("resumed"), 3);
     assert_eq!(home.rows("out/design.upper=4mm"), 3);

@@ -1,6 +1,6 @@
 //! Advice from the sizes before anything is solved: what is allowed, but rarely intended.
 //!
-//! Does not live here: what is wrong (`setup`), and the audit of skin depths (`fluxmorph_solver::audit`).
+//! Does not live here: what is wrong (`build`), and the audit of skin depths (`fluxmorph_solver::audit`).
 
 use fluxmorph_geometry::tet4::{norm, sub};
 

@@ -56,7 +56,7 @@ pub enum SweepError {
     },
     /// Some configurations are wrong.
     #[error(
-        "{faulty} of {of} combinations cannot be read, and nothing was run: mend the configuration or the values of --set"
+        "{faulty} of {of} combinations cannot be read, and nothing was run: correct the configuration or the values of --set"
     )]
     Faults {
         /// How many.

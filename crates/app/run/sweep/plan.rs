@@ -86,7 +86,7 @@ impl Sweep {
         let settings =
             request.set.iter().map(|typed| Setting::parse(typed)).collect::<Result<Vec<_>, _>>()?;
         let mut planned = Vec::new();
-        let mut faulty = Subject::default();
+        let mut faulty = FaultyCombinations::default();
         let mut known: BTreeMap<String, usize> = BTreeMap::new();
         let mut first = None;
         for combination in combinations(&settings)? {
@@ -172,7 +172,7 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMa
 
 /// Combinations that cannot be read.
 #[derive(Default)]
-struct Subject {
+struct FaultyCombinations {
     count: usize,
     /// Key and message of every fault so far.
     known: BTreeSet<(String, String)>,
@@ -180,7 +180,7 @@ struct Subject {
     reports: Vec<(String, Box<DiagnosticReport>)>,
 }
 
-impl Subject {
+impl FaultyCombinations {
     fn push(&mut self, name: &str, report: Box<DiagnosticReport>) {
         self.count += 1;
         let before = self.known.len();

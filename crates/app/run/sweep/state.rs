@@ -20,9 +20,9 @@ pub enum State {
     /// Nothing is there.
     Missing,
     /// It was interrupted before there was anything to keep.
-    Unborn,
+    Unstarted,
     /// It was interrupted, or its limits are wider now: it can be resumed.
-    Broken,
+    Resumable,
     /// It has ended, for this reason.
     Finished(StopReason),
     /// Another process is working on it.
@@ -80,7 +80,7 @@ impl<'a> States<'a> {
             return Ok(State::Other(format!("it holds a `{}`", manifest.command)));
         }
         if !run.holds_configuration() && !names.iter().any(|name| run.journal().ends_with(name)) {
-            return Ok(State::Unborn);
+            return Ok(State::Unstarted);
         }
         let (config, source) = match run::configuration(&run, &manifest) {
             Ok(read) => read,
@@ -99,7 +99,7 @@ impl<'a> States<'a> {
                 }
             }
             // Whether the file has changed is checked by the run that is resumed.
-            _ if is_here => State::Broken,
+            _ if is_here => State::Resumable,
             _ => other_mesh(),
         })
     }

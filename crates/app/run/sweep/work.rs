@@ -35,7 +35,7 @@ pub enum Ending {
     /// By itself, with a code of the documentation.
     Code(ExitCode),
     /// In another way, described in words.
-    Broken(String),
+    Failed(String),
 }
 
 /// What happens to a combination, by its number.
@@ -78,7 +78,7 @@ impl Workers {
         let mut running: Vec<Running> = Vec::new();
         let mut is_interrupted = false;
         let mut outcome = Ok(());
-        let mut reports = |event| {
+        let mut deliver = |event| {
             let answer = report(event);
             if outcome.is_ok() {
                 outcome = answer;
@@ -95,11 +95,11 @@ impl Workers {
             }
             while continues && !is_interrupted && running.len() < self.jobs {
                 let Some((index, task)) = waiting.next() else { break };
-                continues &= reports(Event::Begun(index, task));
+                continues &= deliver(Event::Begun(index, task));
                 match self.start(sweep, layout, &sweep.combinations[index], task) {
                     Ok(child) => running.push(Running { index, child }),
                     Err(error) => {
-                        continues &= reports(Event::Ended(index, Ending::Broken(error.to_string())));
+                        continues &= deliver(Event::Ended(index, Ending::Failed(error.to_string())));
                     }
                 }
             }
@@ -107,9 +107,9 @@ impl Workers {
             for mut one in running {
                 match one.child.try_wait() {
                     Ok(None) => still.push(one),
-                    Ok(Some(status)) => continues &= reports(Event::Ended(one.index, Ending::of(status))),
+                    Ok(Some(status)) => continues &= deliver(Event::Ended(one.index, Ending::of(status))),
                     Err(error) => {
-                        continues &= reports(Event::Ended(one.index, Ending::Broken(error.to_string())))
+                        continues &= deliver(Event::Ended(one.index, Ending::Failed(error.to_string())))
                     }
                 }
             }
@@ -174,14 +174,14 @@ impl Ending {
         use ExitCode::*;
         let codes = [Success, Stopped, Usage, Configuration, Numerical, Files, Interrupted, Terminated];
         let code = codes.into_iter().find(|code| status.code() == Some(*code as i32));
-        code.map_or_else(|| Self::Broken(status.to_string()), Self::Code)
+        code.map_or_else(|| Self::Failed(status.to_string()), Self::Code)
     }
 
     /// The code it stands for: what ended in no known way counts as a failure.
     pub fn code(&self) -> ExitCode {
         match self {
             Self::Code(code) => *code,
-            Self::Broken(_) => ExitCode::Numerical,
+            Self::Failed(_) => ExitCode::Numerical,
         }
     }
 }

@@ -137,7 +137,7 @@ impl Series<'_> {
             text += &format!("; best design (ring): evaluation {}, {}", row.evaluation, number(*value, 4));
         }
         if self.bound.is_some() {
-            text += "; kept where it is not above zero (dashed line)";
+            text += "; satisfied where it is not above zero (dashed line)";
         }
         if self.rows.iter().any(|row| row.round > 0) {
             text += "; dotted lines: the mesh got a new reference";

@@ -59,7 +59,7 @@ impl Plane {
     }
 }
 
-/// Planes over which the device goes on, where the configuration leaves no doubt: the generator of the shield makes a
+/// Planes across which the device continues, where the configuration leaves no doubt: the generator of the shield makes a
 /// quarter, `x ≥ 0` and `y ≥ 0`.
 pub(super) fn mirrors(config: &Config) -> Vec<Mirror> {
     match config.mesh {

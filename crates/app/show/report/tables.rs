@@ -126,7 +126,7 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
 
 fn constraints(constraints: &[ConstraintResult]) -> Markup {
     let row = |c: &ConstraintResult| {
-        let verdict = if c.satisfied { "kept" } else { "broken" };
+        let verdict = if c.satisfied { "satisfied" } else { "violated" };
         vec![c.name.clone(), number(c.value, 5), number(c.bound, 5), verdict.to_owned()]
     };
     let rows: Vec<Vec<String>> = constraints.iter().map(row).collect();
@@ -222,7 +222,7 @@ pub(super) fn skin(outline: &Outline) -> Markup {
     let warnings: Vec<String> = outline.audits.iter().filter_map(|a| a.warning()).collect();
     html! {
         (table(&head, &rows, None))
-        @if warnings.is_empty() { (note("The audit has no objections.")) }
+        @if warnings.is_empty() { (note("The skin-depth audit found nothing to warn about.")) }
         @for warning in warnings { p class="warning" { (warning) } }
     }
 }

@@ -6,8 +6,8 @@
 //! terms, each constraint of the field another.
 //!
 //! Here: what is moved and solved (`mod`, `shape`), one evaluation (`evaluate`) with its sums (`adjoint_accumulator`) and
-//! result (`analysis`), the continuation to a design far away (`continuation`), and the check of what is computed (`finite`). Nothing here
-//! knows an optimiser, a file or a terminal.
+//! result (`analysis`), the continuation to a design far away (`continuation`), and the check of what is computed (`finite`).
+//! Nothing here knows an optimiser, a file or a terminal.
 
 mod adjoint_accumulator;
 mod analysis;

@@ -86,7 +86,7 @@ impl RoundEvent {
     pub fn describe(&self) -> String {
         let Self { round, worst_quality: [before, after], reach: [down, up], cause, .. } = self;
         let reference = match self.evaluation {
-            Some(evaluation) => format!("reference: evaluation {evaluation}"),
+            Some(evaluation) => format!("reference mesh of evaluation {evaluation}"),
             None => "before the first evaluation".to_owned(),
         };
         let percent = |share: &f64| 100.0 * share;

@@ -10,7 +10,7 @@ use fluxmorph::show::{Evaluation, Observer, RunObserver, Silent};
 use crate::support::folder::read_json;
 use crate::support::{config, options};
 
-/// Panics when it is told of an evaluation.
+/// Panics at a given evaluation.
 struct Faulty {
     at: usize,
 }
