@@ -7,6 +7,8 @@
 //! share, as the paper's appendix suggests.
 
 pub mod box_tree;
+#[cfg(test)]
+mod determinism;
 pub mod error;
 mod facets;
 pub mod fem;

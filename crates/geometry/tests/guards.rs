@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{
     Cholesky, CholeskyAnalysis, ComponentAnalysis, ComponentPreconditioner, CsrMatrix, DofMap, Incomplete,
     IncompleteAnalysis, IterationStatus, Ldlt, LdltAnalysis, c32, conjugate_gradients, ordering,
@@ -12,15 +11,9 @@ use fluxmorph_geometry::{Mesh, MeshError};
 
 /// Springs along a chain of `n`, each end held: tridiagonal.
 fn chain(n: usize) -> CsrMatrix<f64> {
-    let (mut row_starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
-    for i in 0..n {
-        for j in i.saturating_sub(1)..(i + 2).min(n) {
-            columns.push(j as u32);
-            values.push(if i == j { 2.0 } else { -1.0 });
-        }
-        row_starts.push(columns.len() as u32);
-    }
-    CsrMatrix { structure: Arc::new(CsrStructure { column_count: n, row_starts, columns }), values }
+    let entry = |i, j| (j, if i == j { 2.0 } else { -1.0 });
+    let row = |i: usize| (i.saturating_sub(1)..(i + 2).min(n)).map(|j| entry(i, j)).collect();
+    CsrMatrix::from_rows(n, (0..n).map(row))
 }
 
 /// The chain with one stored entry, and its mirror image, replaced.
@@ -32,6 +25,15 @@ fn damaged(row: usize, column: usize, value: f64) -> CsrMatrix<f64> {
         matrix.values[place.expect("a stored entry")] = value;
     }
     matrix
+}
+
+fn in_single_precision(matrix: &CsrMatrix<f64>) -> CsrMatrix<f32> {
+    let values = matrix.values.iter().map(|&v| v as f32).collect();
+    CsrMatrix { structure: Arc::clone(&matrix.structure), values }
+}
+
+fn symmetric_analysis(matrix: &CsrMatrix<f64>) -> Arc<LdltAnalysis> {
+    LdltAnalysis::new(&matrix.structure, ordering::dissection(&matrix.structure)).expect("a pattern")
 }
 
 /// Entries that no factor can be made of: on the diagonal and beside it.
@@ -57,9 +59,10 @@ fn a_cholesky_factor_of_what_is_no_number_is_refused_in_both_precisions() {
     for (k, matrix) in damages().into_iter().enumerate() {
         let analysis = CholeskyAnalysis::new(&matrix.structure).expect("a pattern");
         is_refused(Cholesky::new(&analysis, &matrix), &format!("double precision, damage {k}"));
-        let values = matrix.values.iter().map(|&v| v as f32).collect();
-        let single = CsrMatrix { structure: Arc::clone(&matrix.structure), values };
-        is_refused(Cholesky::new(&analysis, &single), &format!("single precision, damage {k}"));
+        is_refused(
+            Cholesky::new(&analysis, &in_single_precision(&matrix)),
+            &format!("single precision, damage {k}"),
+        );
     }
 }
 
@@ -78,11 +81,7 @@ fn values_beyond_single_precision_have_no_single_factor_and_a_double_one() {
     let mut matrix = chain(200);
     matrix.values.iter_mut().for_each(|value| *value *= 1e60);
     let analysis = CholeskyAnalysis::new(&matrix.structure).expect("a pattern");
-    let values = matrix.values.iter().map(|&v| v as f32).collect();
-    is_refused(
-        Cholesky::new(&analysis, &CsrMatrix { structure: Arc::clone(&matrix.structure), values }),
-        "f32",
-    );
+    is_refused(Cholesky::new(&analysis, &in_single_precision(&matrix)), "f32");
     let factor = Cholesky::new(&analysis, &matrix).expect("it is in the range of double precision");
     let mut x = vec![1e60; 200];
     factor.solve_in_place(&mut x);
@@ -93,8 +92,7 @@ fn values_beyond_single_precision_have_no_single_factor_and_a_double_one() {
 #[test]
 fn a_symmetric_factor_of_what_is_no_number_is_refused_in_all_number_types() {
     for (k, matrix) in damages().into_iter().enumerate() {
-        let analysis = LdltAnalysis::new(&matrix.structure, ordering::dissection(&matrix.structure));
-        let analysis = analysis.expect("a pattern");
+        let analysis = symmetric_analysis(&matrix);
         is_refused(Ldlt::new(&analysis, |_, k| matrix.values[k]), &format!("f64, damage {k}"));
         is_refused(Ldlt::new(&analysis, |_, k| matrix.values[k] as f32), &format!("f32, damage {k}"));
         let complex = |_: usize, k: usize| c32::new(1.0, matrix.values[k] as f32);
@@ -105,8 +103,7 @@ fn a_symmetric_factor_of_what_is_no_number_is_refused_in_all_number_types() {
 #[test]
 fn a_symmetric_factor_that_overflows_single_precision_is_refused() {
     let matrix = damaged(100, 101, 1e30);
-    let analysis = LdltAnalysis::new(&matrix.structure, ordering::dissection(&matrix.structure));
-    let analysis = analysis.expect("a pattern");
+    let analysis = symmetric_analysis(&matrix);
     // The square of the coupling, 1e60, is the change of a pivot.
     is_refused(Ldlt::new(&analysis, |_, k| matrix.values[k] as f32), "f32");
     Ldlt::new(&analysis, |_, k| matrix.values[k]).expect("double precision holds it");
@@ -136,21 +133,18 @@ fn component_blocks_of_what_is_no_number_are_refused() {
 #[test]
 fn conjugate_gradients_on_damaged_parts_stop_and_say_so() {
     let b: Vec<f64> = (0..200).map(|i| (0.37 * f64::from(i)).sin()).collect();
-    let plain = |r: &[f64], z: &mut [f64]| z.copy_from_slice(r);
+    let plain: fn(&[f64], &mut [f64]) = |r, z| z.copy_from_slice(r);
     for matrix in damages() {
         let (_, report) = conjugate_gradients(&matrix, plain, &b, 1e-12, 500);
         assert_eq!(report.status, IterationStatus::Stopped, "{report:?}");
     }
-    let nothing = |_: &[f64], z: &mut [f64]| z.fill(f64::NAN);
-    assert_eq!(conjugate_gradients(&chain(200), nothing, &b, 1e-12, 500).1.status, IterationStatus::Stopped);
-    let vanishing = |_: &[f64], z: &mut [f64]| z.fill(0.0);
-    assert_eq!(
-        conjugate_gradients(&chain(200), vanishing, &b, 1e-12, 500).1.status,
-        IterationStatus::Stopped
-    );
+    let status = |apply: fn(&[f64], &mut [f64]), b: &[f64]| {
+        conjugate_gradients(&chain(200), apply, b, 1e-12, 500).1.status
+    };
+    assert_eq!(status(|_, z| z.fill(f64::NAN), &b), IterationStatus::Stopped);
+    assert_eq!(status(|_, z| z.fill(0.0), &b), IterationStatus::Stopped);
     // Squares of the right side overflow.
-    let huge = vec![1e200; 200];
-    assert_eq!(conjugate_gradients(&chain(200), plain, &huge, 1e-12, 500).1.status, IterationStatus::Stopped);
+    assert_eq!(status(plain, &[1e200; 200]), IterationStatus::Stopped);
 }
 
 fn cube() -> Mesh {

@@ -175,31 +175,20 @@ fn symbolic_matrix(structure: &CsrStructure) -> SymbolicSparseColMatRef<'_, u32>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::determinism::same_on_any_threads;
 
     /// The seven-point Laplacian on an `m³` grid plus a shift.
     fn laplacian(m: usize) -> CsrMatrix<f64> {
-        let index = |x: usize, y: usize, z: usize| (x * m + y) * m + z;
-        let mut row_starts = vec![0];
-        let mut columns = Vec::new();
-        let mut values = Vec::new();
-        for (x, y, z) in (0..m * m * m).map(|i| (i / m / m, i / m % m, i % m)) {
-            let mut row = vec![(index(x, y, z), 6.5)];
-            for (axis, at) in [x, y, z].into_iter().enumerate() {
-                let stride = [m * m, m, 1][axis];
-                if at > 0 {
-                    row.push((index(x, y, z) - stride, -1.0));
-                }
-                if at + 1 < m {
-                    row.push((index(x, y, z) + stride, -1.0));
-                }
+        let row = |i: usize| {
+            let mut row = vec![(i, 6.5)];
+            for stride in [m * m, m, 1] {
+                let at = i / stride % m;
+                row.extend((at > 0).then(|| (i - stride, -1.0)));
+                row.extend((at + 1 < m).then(|| (i + stride, -1.0)));
             }
-            row.sort_unstable_by_key(|e| e.0);
-            columns.extend(row.iter().map(|e| e.0 as u32));
-            values.extend(row.iter().map(|e| e.1));
-            row_starts.push(columns.len() as u32);
-        }
-        let structure = CsrStructure { column_count: m * m * m, row_starts, columns };
-        CsrMatrix { structure: Arc::new(structure), values }
+            row
+        };
+        CsrMatrix::from_rows(m * m * m, (0..m * m * m).map(row))
     }
 
     #[test]
@@ -221,18 +210,12 @@ mod tests {
     #[test]
     fn the_bits_do_not_depend_on_the_threads() {
         let a = laplacian(16);
-        let solve = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| {
-                let analysis = CholeskyAnalysis::new(&a.structure).expect("a pattern");
-                let mut x: Vec<f64> = (0..a.structure.row_count()).map(|i| (i as f64).cos()).collect();
-                Cholesky::new(&analysis, &a).expect("positive definite").solve_in_place(&mut x);
-                x.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
-            })
-        };
-        let one = solve(1);
-        assert_eq!(one, solve(2));
-        assert_eq!(one, solve(4));
+        same_on_any_threads(|| {
+            let analysis = CholeskyAnalysis::new(&a.structure).expect("a pattern");
+            let mut x: Vec<f64> = (0..a.structure.row_count()).map(|i| (i as f64).cos()).collect();
+            Cholesky::new(&analysis, &a).expect("positive definite").solve_in_place(&mut x);
+            x.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        });
     }
 
     #[test]

@@ -132,30 +132,20 @@ fn descend(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::fem::csr::CsrStructure;
 
     /// A chain of `n` springs of 1, held by half a spring at one end: tridiagonal, with an exact inverse.
     fn chain(n: usize) -> CsrMatrix<f64> {
-        let (mut row_starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
-        for i in 0..n {
-            let diagonal = if i == 0 {
-                1.5
-            } else if i + 1 == n {
-                1.0
-            } else {
-                2.0
+        let row = |i: usize| {
+            let diagonal = match i {
+                0 => 1.5,
+                i if i + 1 == n => 1.0,
+                _ => 2.0,
             };
-            let row = [(i.wrapping_sub(1), -1.0), (i, diagonal), (i + 1, -1.0)];
-            for (column, value) in row.into_iter().filter(|entry| entry.0 < n) {
-                columns.push(column as u32);
-                values.push(value);
-            }
-            row_starts.push(columns.len() as u32);
-        }
-        CsrMatrix { structure: Arc::new(CsrStructure { column_count: n, row_starts, columns }), values }
+            let entry = |j| (j, if j == i { diagonal } else { -1.0 });
+            (i.saturating_sub(1)..(i + 2).min(n)).map(entry).collect()
+        };
+        CsrMatrix::from_rows(n, (0..n).map(row))
     }
 
     fn solve(n: usize, b: &[f64], tolerance: f64, iterations: usize) -> (Vec<f64>, IterationReport) {

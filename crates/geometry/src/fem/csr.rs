@@ -83,6 +83,18 @@ impl<T: Scalar> CsrMatrix<T> {
         Self { structure: Arc::clone(structure), values: vec![T::default(); structure.columns.len()] }
     }
 
+    /// The matrix of rows of `(column, value)`, in any order within a row.
+    pub fn from_rows(column_count: usize, rows: impl IntoIterator<Item = Vec<(usize, T)>>) -> Self {
+        let (mut row_starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+        for mut row in rows {
+            row.sort_unstable_by_key(|entry| entry.0);
+            columns.extend(row.iter().map(|entry| entry.0 as u32));
+            values.extend(row.iter().map(|entry| entry.1));
+            row_starts.push(columns.len() as u32);
+        }
+        Self { structure: Arc::new(CsrStructure { column_count, row_starts, columns }), values }
+    }
+
     /// `A x`, overwriting `y`.
     ///
     /// # Panics

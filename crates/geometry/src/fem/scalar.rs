@@ -161,16 +161,12 @@ pub fn advance<T: Scalar>(a: T, (x, p): (&mut [T], &[T]), (r, q): (&mut [T], &[T
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::determinism::same_on_any_threads;
 
     #[test]
     fn sums_have_the_same_bits_for_any_number_of_threads() {
         let x: Vec<f64> = (0..50_000).map(|i| (f64::from(i) * 0.7).sin() * 1e3_f64.powi(i % 7)).collect();
-        let with_threads = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| dot(&x, &x)).to_bits()
-        };
-        assert_eq!(with_threads(1), with_threads(2));
-        assert_eq!(with_threads(1), with_threads(4));
+        same_on_any_threads(|| dot(&x, &x).to_bits());
     }
 
     #[test]
@@ -188,24 +184,18 @@ mod tests {
             (0..n).map(|i| c64::new((s * i as f64).sin(), (s + i as f64).cos())).collect()
         };
         let a = c64::new(0.3, -1.1);
-        let with_threads = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-            pool.install(|| {
-                let (mut x, p, mut r, q) = (vector(0.1), vector(0.2), vector(0.3), vector(0.4));
-                let length = advance(a, (&mut x, &p), (&mut r, &q));
-                assert_eq!(length.to_bits(), norm(&r).to_bits());
-                axpy(a, &q, &mut x);
-                scale_add(a, &mut r, &p);
-                (x, r, length)
-            })
-        };
-        let (x, r, _) = with_threads(1);
+        let (x, r, _) = same_on_any_threads(|| {
+            let (mut x, p, mut r, q) = (vector(0.1), vector(0.2), vector(0.3), vector(0.4));
+            let length = advance(a, (&mut x, &p), (&mut r, &q));
+            assert_eq!(length.to_bits(), norm(&r).to_bits());
+            axpy(a, &q, &mut x);
+            scale_add(a, &mut r, &p);
+            (x, r, length)
+        });
         let (x0, p, r0, q) = (vector(0.1), vector(0.2), vector(0.3), vector(0.4));
         for i in [0, CHUNK - 1, CHUNK, n - 1] {
             assert_eq!(x[i], x0[i] + a * p[i] + a * q[i]);
             assert_eq!(r[i], p[i] + a * (r0[i] - a * q[i]));
         }
-        assert_eq!(with_threads(1), with_threads(2));
-        assert_eq!(with_threads(1), with_threads(4));
     }
 }

@@ -154,52 +154,33 @@ pub fn surface_loss<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::volume::tests::{SKEW, noise};
+    use super::super::differences::{SKEW, assert_shape_derivative, central_difference, values};
     use super::*;
-
-    type Components<const N: usize> = [[c64; 4]; N];
-
-    fn values<const N: usize>(seed: u32) -> Components<N> {
-        std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (4 * a + c) as u32)))
-    }
 
     /// Both derivatives of an element integral against central differences.
     fn derivatives_hold<const N: usize, const M: usize>(
         vertices: [Point; M],
-        integral: impl Fn([Point; M], Components<N>) -> ElementIntegral<N, M>,
+        integral: impl Fn([Point; M], [[c64; 4]; N]) -> ElementIntegral<N, M>,
     ) {
-        let field = values::<N>(11);
+        let field = values(11);
         let exact = integral(vertices, field);
         // Truncation and rounding of a central difference of values of order one balance near 1e-5.
         let (h, tolerance) = (1e-5, 1e-8 * (1.0 + exact.value.abs()));
         for a in 0..N {
             for c in 0..4 {
                 for direction in [c64::new(1.0, 0.0), c64::new(0.0, 1.0)] {
-                    let at = |s: f64| {
+                    let difference = central_difference(h, |s| {
                         let mut moved = field;
                         moved[a][c] += s * direction;
-                        integral(vertices, moved).value
-                    };
-                    let difference = (at(h) - at(-h)) / (2.0 * h);
+                        integral(vertices, moved).value.into()
+                    });
                     let derivative = 2.0 * (exact.potentials[a][c] * direction).re;
-                    assert!((difference - derivative).abs() < tolerance, "potential {c} of node {a}");
+                    assert!((difference - derivative).norm() < tolerance, "potential {c} of node {a}");
                 }
             }
         }
-        for k in 0..M {
-            for d in 0..3 {
-                let at = |s: f64| {
-                    let mut moved = vertices;
-                    moved[k][d] += s;
-                    integral(moved, field).value
-                };
-                let difference = (at(h) - at(-h)) / (2.0 * h);
-                assert!(
-                    (difference - exact.positions[k][d]).abs() < tolerance,
-                    "direction {d} of vertex {k}"
-                );
-            }
-        }
+        let value = |moved| integral(moved, field).value.into();
+        assert_shape_derivative([h, tolerance], vertices, value, &exact.positions.map(|p| p.map(c64::from)));
     }
 
     const REMANENCE: Point = [0.4, -0.2, 0.9];

@@ -128,43 +128,19 @@ pub fn loss<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::volume::tests::noise;
+    use super::super::differences::{assert_shape_derivative, bilinear, values};
     use super::*;
 
     const TRIANGLE: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
 
     fn check<const N: usize>(shape: &'static Lagrange<N, 3>) {
-        let values = |seed: u32| -> [Complex3; N] {
-            std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (3 * a + c) as u32)))
-        };
         let (l, u, coefficient) = (values(5), values(60), c64::new(0.7, 0.7));
-        let bilinear = |vertices: [Point; 3]| {
+        let value = |vertices: [Point; 3]| {
             let triangle = ImpedanceTriangle::new(shape, vertices, coefficient);
-            let mut s = c64::default();
-            for a in 0..N {
-                for b in 0..N {
-                    for i in 0..3 {
-                        for j in 0..3 {
-                            s += l[a][i] * triangle.block(a, b)[i][j] * u[b][j];
-                        }
-                    }
-                }
-            }
-            s
+            bilinear(&l, |a, b| triangle.block(a, b), &u)
         };
         let exact = shape_derivative(shape, TRIANGLE, coefficient, &l, &u);
-        let h = 1e-5;
-        for k in 0..3 {
-            for d in 0..3 {
-                let at = |s: f64| {
-                    let mut vertices = TRIANGLE;
-                    vertices[k][d] += s;
-                    bilinear(vertices)
-                };
-                let difference = (at(h) - at(-h)) / (2.0 * h);
-                assert!((difference - exact[k][d]).norm() < 1e-9);
-            }
-        }
+        assert_shape_derivative([1e-5, 1e-9], TRIANGLE, value, &exact);
     }
 
     #[test]

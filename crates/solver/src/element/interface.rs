@@ -95,8 +95,9 @@ pub fn shape_derivative<const N: usize>(
 
 #[cfg(test)]
 mod tests {
+    use super::super::differences::{SKEW, assert_shape_derivative, bilinear, values};
     use super::super::lagrange::TRIANGLE_EDGES;
-    use super::super::volume::tests::{SKEW, noise};
+
     use super::*;
     use fluxmorph_geometry::tet4::{EDGES, FACES, Tet4};
 
@@ -157,37 +158,14 @@ mod tests {
     }
 
     fn check_derivative<const N: usize>(shape: &'static Lagrange<N, 3>) {
-        let values = |seed: u32| -> [Complex3; N] {
-            std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (3 * a + c) as u32)))
-        };
         let (l, u) = (values(3), values(31));
-        let bilinear = |vertices: [Point; 3]| {
+        let value = |vertices: [Point; 3]| {
             let triangle = InterfaceTriangle::new(shape, vertices, 1.3);
-            let mut s = c64::default();
-            for a in 0..N {
-                for b in 0..N {
-                    for i in 0..3 {
-                        for j in 0..3 {
-                            s += l[a][i] * triangle.block(a, b)[i][j] * u[b][j];
-                        }
-                    }
-                }
-            }
-            s
+            bilinear(&l, |a, b| triangle.block(a, b), &u)
         };
+        // Linear in each coordinate: exact at any step.
         let exact = shape_derivative(shape, 1.3, &l, &u);
-        let base = [SKEW[0], SKEW[1], SKEW[2]];
-        for k in 0..3 {
-            for d in 0..3 {
-                let at = |s: f64| {
-                    let mut vertices = base;
-                    vertices[k][d] += s;
-                    bilinear(vertices)
-                };
-                let difference = (at(0.5) - at(-0.5)) / 1.0;
-                assert!((difference - exact[k][d]).norm() < 1e-13, "linear: exact at any step");
-            }
-        }
+        assert_shape_derivative([0.5, 1e-13], [SKEW[0], SKEW[1], SKEW[2]], value, &exact);
     }
 
     #[test]

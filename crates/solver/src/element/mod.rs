@@ -12,6 +12,8 @@
 //! [`density`] integrals of energy and loss with their derivatives.
 
 pub mod density;
+#[cfg(test)]
+mod differences;
 pub mod impedance;
 pub mod interface;
 pub mod lagrange;

@@ -94,43 +94,14 @@ impl<const N: usize> LocalMatrix<c64, N, 4> for LagrangeTet<N> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::differences::{SKEW, assert_shape_derivative, bilinear, values};
     use super::super::point::{self, PointField};
-    use super::super::volume::tests::{SKEW, noise};
     use super::super::volume::{AphiTet, NodalField};
     use super::super::{Complex3, dot3, quadrature};
     use super::*;
     use fluxmorph_geometry::tet4::Point;
 
     const LAW: Coefficients = Coefficients { reluctivity: 1.7, extra_penalty: 0.6, eddy: c64::new(0.0, 2.3) };
-
-    fn field<const N: usize>(seed: u32) -> NodalField<N> {
-        NodalField::new(std::array::from_fn(|a| std::array::from_fn(|c| noise(seed + (4 * a + c) as u32))))
-    }
-
-    fn bilinear<const N: usize>(
-        shape: &'static Lagrange<N, 4>,
-        vertices: [Point; 4],
-        l: &NodalField<N>,
-        u: &NodalField<N>,
-    ) -> c64 {
-        let matrix = LagrangeTet::new(shape, Tet4::new(vertices), LAW);
-        let all = |f: &NodalField<N>, a: usize| {
-            let v = f.vector_potential[a];
-            [v[0], v[1], v[2], f.scalar_potential[a]]
-        };
-        let mut sum = c64::default();
-        for a in 0..N {
-            for b in 0..N {
-                let block = matrix.block(a, b);
-                for i in 0..4 {
-                    for j in 0..4 {
-                        sum += all(l, a)[i] * block[i][j] * all(u, b)[j];
-                    }
-                }
-            }
-        }
-        sum
-    }
 
     #[test]
     fn of_first_order_it_is_the_closed_form() {
@@ -154,7 +125,8 @@ mod tests {
     #[test]
     fn the_quadratic_matrix_is_the_weak_form_by_quadrature() {
         let shape = Lagrange::<10, 4>::tet();
-        let (l, u) = (field::<10>(1), field::<10>(90));
+        let components = [values(1), values(90)];
+        let [l, u] = components.map(NodalField::new);
         let tet = Tet4::new(SKEW);
         let mut sum = c64::default();
         for (lambda, weight) in quadrature::degree_5() {
@@ -167,25 +139,20 @@ mod tests {
                     + LAW.extra_penalty * trace(&l.gradient) * trace(&u.gradient)
                     + LAW.eddy * dot3(l.electric_potential(), u.electric_potential()));
         }
-        let exact = bilinear(shape, SKEW, &l, &u);
+        let matrix = LagrangeTet::new(shape, tet, LAW);
+        let exact = bilinear(&components[0], |a, b| matrix.block(a, b), &components[1]);
         assert!((sum - exact).norm() < 1e-13 * exact.norm(), "{sum} {exact}");
     }
 
     fn check_derivative<const N: usize>(shape: &'static Lagrange<N, 4>) {
-        let (l, u) = (field::<N>(1), field::<N>(140));
-        let exact = point::shape_derivative(shape, &Tet4::new(SKEW), &LAW, &l, &u);
-        let h = 1e-5;
-        for k in 0..4 {
-            for d in 0..3 {
-                let at = |s: f64| {
-                    let mut vertices = SKEW;
-                    vertices[k][d] += s;
-                    bilinear(shape, vertices, &l, &u)
-                };
-                let difference = (at(h) - at(-h)) / (2.0 * h);
-                assert!((difference - exact[k][d]).norm() < 1e-8 * (1.0 + difference.norm()));
-            }
-        }
+        let (l, u) = (values(1), values(140));
+        let value = |vertices: [Point; 4]| {
+            let matrix = LagrangeTet::new(shape, Tet4::new(vertices), LAW);
+            bilinear(&l, |a, b| matrix.block(a, b), &u)
+        };
+        let fields = [l, u].map(NodalField::new);
+        let exact = point::shape_derivative(shape, &Tet4::new(SKEW), &LAW, &fields[0], &fields[1]);
+        assert_shape_derivative([1e-5, 1e-8], SKEW, value, &exact);
     }
 
     #[test]
@@ -211,7 +178,7 @@ mod tests {
     #[test]
     fn the_load_of_a_magnet_and_its_derivative() {
         let shape = Lagrange::<10, 4>::tet();
-        let l = field::<10>(7);
+        let l = NodalField::<10>::new(values(7));
         let source = [0.3, -1.2, 0.8];
         let value = |vertices: [Point; 4]| -> c64 {
             let tet = Tet4::new(vertices);
@@ -230,17 +197,6 @@ mod tests {
             .sum();
         assert!((value(SKEW) - integral).norm() < 1e-14);
         let exact = point::magnet_shape_derivative(shape, &tet, source, &l);
-        let h = 1e-5;
-        for k in 0..4 {
-            for d in 0..3 {
-                let at = |s: f64| {
-                    let mut vertices = SKEW;
-                    vertices[k][d] += s;
-                    value(vertices)
-                };
-                let difference = (at(h) - at(-h)) / (2.0 * h);
-                assert!((difference - exact[k][d]).norm() < 1e-9);
-            }
-        }
+        assert_shape_derivative([1e-5, 1e-9], SKEW, value, &exact);
     }
 }

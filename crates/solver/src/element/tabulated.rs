@@ -60,9 +60,9 @@ impl<const N: usize> Tabulated<N> {
 mod tests {
     use fluxmorph_geometry::tet4::Tet4;
 
+    use super::super::differences::SKEW;
     use super::super::lagrange::Lagrange;
     use super::super::point;
-    use super::super::volume::tests::SKEW;
     use super::*;
 
     fn check<const N: usize>(shape: &'static Lagrange<N, 4>) {

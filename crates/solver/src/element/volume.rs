@@ -112,19 +112,11 @@ impl<const N: usize> NodalField<N> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-
+mod tests {
+    use super::super::differences::SKEW;
     use super::super::lagrange::Lagrange;
     use super::super::point::PointField;
-    use fluxmorph_geometry::tet4::Point;
-
-    pub(crate) const SKEW: [Point; 4] = [[0.1, 0.2, -0.1], [1.3, 0.1, 0.2], [0.3, 0.9, 0.1], [0.2, 0.3, 1.4]];
-
-    pub(crate) fn noise(seed: u32) -> c64 {
-        let x = f64::from(seed);
-        c64::new((12.9898 * x + 1.0).sin(), (78.233 * x + 2.0).sin())
-    }
+    use super::*;
 
     const LAW: Coefficients = Coefficients { reluctivity: 1.7, extra_penalty: 0.6, eddy: c64::new(0.0, 2.3) };
 

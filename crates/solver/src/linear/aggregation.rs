@@ -140,16 +140,10 @@ mod tests {
     fn neighbours_are_joined_and_kept_nodes_stay() {
         let n = 16usize;
         let dofs = DofMap::<4>::new(n, |_, c| c == 0);
-        let (mut row_starts, mut columns, mut values) = (vec![0u32], Vec::new(), Vec::new());
-        for i in 0..n {
-            for c in [i.wrapping_sub(1), i, i + 1].into_iter().filter(|&c| c < n) {
-                columns.push(c as u32);
-                values.push(c64::new(if c == i { 2.0 } else { -1.0 }, 0.0));
-            }
-            row_starts.push(columns.len() as u32);
-        }
-        let structure = Arc::new(CsrStructure { column_count: n, row_starts, columns });
-        let p = prolongation(&dofs, &CsrMatrix { structure, values }, |node| node.index() >= 12, 2);
+        let entry = |i, c| (c, c64::new(if c == i { 2.0 } else { -1.0 }, 0.0));
+        let row = |i: usize| (i.saturating_sub(1)..(i + 2).min(n)).map(|c| entry(i, c)).collect();
+        let matrix = CsrMatrix::from_rows(n, (0..n).map(row));
+        let p = prolongation(&dofs, &matrix, |node| node.index() >= 12, 2);
         assert_eq!(p.structure.columns, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 4, 5, 6]);
         assert_eq!(p.structure.column_count, 7);
     }

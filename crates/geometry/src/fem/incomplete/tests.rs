@@ -3,30 +3,21 @@
 use num_complex::{Complex32, Complex64};
 
 use super::*;
+use crate::determinism::same_on_any_threads;
 use crate::fem::csr::{CsrMatrix, CsrStructure};
 
 /// The seven-point operator on an `m × m × m` grid with couplings `weights` along the axes, and `j/10` on the diagonal.
 fn grid(m: usize, weights: [f64; 3]) -> CsrMatrix<Complex64> {
-    let strides = [m * m, m, 1];
-    let (mut row_starts, mut columns, mut values) = (vec![0u32], Vec::new(), Vec::new());
-    for i in 0..m * m * m {
+    let row = |i: usize| {
         let mut row = vec![(i, Complex64::new(2.0 * weights.iter().sum::<f64>(), 0.1))];
-        for (stride, weight) in strides.into_iter().zip(weights) {
-            let at = i / stride % m;
-            if at > 0 {
-                row.push((i - stride, Complex64::new(-weight, 0.0)));
-            }
-            if at + 1 < m {
-                row.push((i + stride, Complex64::new(-weight, 0.0)));
-            }
+        for (stride, weight) in [m * m, m, 1].into_iter().zip(weights) {
+            let (at, coupling) = (i / stride % m, Complex64::new(-weight, 0.0));
+            row.extend((at > 0).then(|| (i - stride, coupling)));
+            row.extend((at + 1 < m).then(|| (i + stride, coupling)));
         }
-        row.sort_unstable_by_key(|entry| entry.0);
-        columns.extend(row.iter().map(|entry| entry.0 as u32));
-        values.extend(row.iter().map(|entry| entry.1));
-        row_starts.push(columns.len() as u32);
-    }
-    let structure = CsrStructure { column_count: m * m * m, row_starts, columns };
-    CsrMatrix { structure: Arc::new(structure), values }
+        row
+    };
+    CsrMatrix::from_rows(m * m * m, (0..m * m * m).map(row))
 }
 
 fn strong(matrix: &CsrMatrix<Complex64>) -> impl Fn(usize, usize) -> bool + '_ {
@@ -46,16 +37,9 @@ fn vector(n: usize, step: f64) -> Vec<Complex64> {
 #[test]
 fn without_fill_it_is_the_exact_factor() {
     let n = 20_000_usize;
-    let (mut row_starts, mut columns, mut values) = (vec![0u32], Vec::new(), Vec::new());
-    for i in 0..n {
-        for c in [i.wrapping_sub(1), i, i + 1].into_iter().filter(|&c| c < n) {
-            columns.push(c as u32);
-            values.push(if c == i { Complex64::new(2.2, 0.3) } else { Complex64::new(-1.0, 0.1) });
-        }
-        row_starts.push(columns.len() as u32);
-    }
-    let structure = Arc::new(CsrStructure { column_count: n, row_starts, columns });
-    let a = CsrMatrix { structure, values };
+    let entry = |i, c| if c == i { Complex64::new(2.2, 0.3) } else { Complex64::new(-1.0, 0.1) };
+    let row = |i: usize| (i.saturating_sub(1)..(i + 2).min(n)).map(|c| (c, entry(i, c))).collect();
+    let a = CsrMatrix::from_rows(n, (0..n).map(row));
     let analysis = IncompleteAnalysis::new(&a.structure);
     assert_eq!(analysis.entry_count(), n - 1);
     let factor = Incomplete::new(&analysis, |_, k| a.values[k], 1.0).expect("it is regular");
@@ -114,21 +98,14 @@ fn the_parts_are_independent_and_strong_couplings_are_not_cut() {
 #[test]
 fn the_bits_do_not_depend_on_the_threads() {
     let a = grid(32, [1.0, 2.0, 8.0]);
-    let solve = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let analysis = IncompleteAnalysis::in_parts(&a.structure, strong(&a));
-            let narrow = |v: Complex64| Complex32::new(v.re as f32, v.im as f32);
-            let factor = Incomplete::new(&analysis, |_, k| narrow(a.values[k]), 1.02).expect("it is regular");
-            let mut x: Vec<Complex32> =
-                vector(a.structure.row_count(), 0.3).into_iter().map(narrow).collect();
-            factor.solve_in_place(&mut x);
-            x.iter().map(|v| (v.re.to_bits(), v.im.to_bits())).collect::<Vec<_>>()
-        })
-    };
-    let one = solve(1);
-    assert_eq!(one, solve(2));
-    assert_eq!(one, solve(4));
+    same_on_any_threads(|| {
+        let analysis = IncompleteAnalysis::in_parts(&a.structure, strong(&a));
+        let narrow = |v: Complex64| Complex32::new(v.re as f32, v.im as f32);
+        let factor = Incomplete::new(&analysis, |_, k| narrow(a.values[k]), 1.02).expect("it is regular");
+        let mut x: Vec<Complex32> = vector(a.structure.row_count(), 0.3).into_iter().map(narrow).collect();
+        factor.solve_in_place(&mut x);
+        x.iter().map(|v| (v.re.to_bits(), v.im.to_bits())).collect::<Vec<_>>()
+    });
 }
 
 /// Couplings of 0.9 against a diagonal of 1 on a ring of four: indefinite, until the diagonal is raised.

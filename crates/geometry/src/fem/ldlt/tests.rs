@@ -6,8 +6,9 @@ use num_complex::{Complex32, Complex64};
 
 use super::panels::PANEL_WIDTH;
 use super::{FactorScalar, Ldlt, LdltAnalysis};
+use crate::determinism::same_on_any_threads;
 use crate::error::MeshError;
-use crate::fem::csr::CsrStructure;
+use crate::fem::csr::{CsrMatrix, CsrStructure};
 use crate::fem::ordering;
 
 /// The seven-point pattern on an `m³` grid, `components` unknowns a node that do not know of each other.
@@ -251,39 +252,24 @@ fn the_bits_do_not_depend_on_the_threads() {
     let structure = grid(26, 2);
     let analysis = analysis(&structure);
     assert!(analysis.tasks.tasks.len() >= 2 && analysis.panels.len() > 100);
-    let solve = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| {
-            let factor = factor::<Complex64>(&analysis);
-            let mut x = exact::<Complex64>(2 * analysis.size());
-            factor.solve_in_place(&mut x);
-            let (one, _) = x.split_at_mut(analysis.size());
-            factor.solve_in_place(one);
-            let bits = |z: &Complex64| [z.re.to_bits(), z.im.to_bits()];
-            let factor_bits: Vec<_> = factor.panels.iter().flatten().map(bits).collect();
-            (factor_bits, x.iter().map(bits).collect::<Vec<_>>())
-        })
-    };
-    let one = solve(1);
-    for threads in [1, 2, 4] {
-        let several = solve(threads);
-        assert!(one.0 == several.0, "the factor of {threads} threads has the bits of one");
-        assert!(one.1 == several.1, "the solution of {threads} threads has the bits of one");
-    }
+    same_on_any_threads(|| {
+        let factor = factor::<Complex64>(&analysis);
+        let mut x = exact::<Complex64>(2 * analysis.size());
+        factor.solve_in_place(&mut x);
+        let (one, _) = x.split_at_mut(analysis.size());
+        factor.solve_in_place(one);
+        let bits = |z: &Complex64| [z.re.to_bits(), z.im.to_bits()];
+        let factor_bits: Vec<_> = factor.panels.iter().flatten().map(bits).collect();
+        (factor_bits, x.iter().map(bits).collect::<Vec<_>>())
+    });
 }
 
 #[test]
 fn a_singular_matrix_and_one_that_is_not_finite_are_errors() {
     // A chain of springs without a support: every pivot is one, exactly, and the last is zero.
     let n = 50;
-    let columns = |row: usize| (row.saturating_sub(1)..(row + 2).min(n)).map(|c| c as u32);
-    let mut row_starts = vec![0];
-    let mut all = Vec::new();
-    for row in 0..n {
-        all.extend(columns(row));
-        row_starts.push(all.len() as u32);
-    }
-    let structure = Arc::new(CsrStructure { column_count: n, row_starts, columns: all });
+    let row = |row: usize| (row.saturating_sub(1)..(row + 2).min(n)).map(|c| (c, 0.0)).collect();
+    let structure = CsrMatrix::from_rows(n, (0..n).map(row)).structure;
     let spring = |row: usize, k: usize| match structure.columns[k] as usize {
         column if column != row => -1.0,
         _ if row == 0 || row == n - 1 => 1.0,

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Mesh;
+use crate::determinism::same_on_any_threads;
 use crate::generate::{ShieldParameters, shield};
 
 /// A shield whose plate is one layer of cells: a thin conductor that is a small part of the mesh.
@@ -117,15 +118,11 @@ fn a_large_conductor_is_cut_where_it_is_thin() {
 fn the_same_mesh_is_distributed_alike_for_any_number_of_threads() {
     let mesh = thin();
     let kept = plate(mesh.topology());
-    let with_threads = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| partition(mesh.topology(), 5, &kept))
-    };
-    let first = with_threads(1);
-    assert!([1, 2, 3].into_iter().all(|threads| with_threads(threads) == first));
+    let shared = || partition(mesh.topology(), 5, &kept);
+    let first = same_on_any_threads(shared);
     // METIS was asked for something else in between.
     partition(mesh.topology(), 3, &[]);
-    assert!(with_threads(2) == first);
+    assert!(same_on_any_threads(shared) == first);
 }
 
 #[test]
