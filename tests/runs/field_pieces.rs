@@ -119,7 +119,7 @@ fn fields_in_pieces_are_those_of_the_whole_and_are_reported_alike() {
     std::fs::write(&second, std::fs::read(directory.field_piece(0, 0)).unwrap()).unwrap();
     let text = report().unwrap_err();
     assert!(text.contains("eval_0000.pvtu") && text.contains("`eval_0000/rank_001.vtu`"), "{text}");
-    let header = String::from_utf8(header).unwrap().replace("eval_0000/rank_001", "elsewhere");
+    let header = String::from_utf8(header).unwrap().replace("eval_0000/rank_001", "../../elsewhere");
     std::fs::write(directory.field_header(0), header).unwrap();
     let text = report().unwrap_err();
     assert!(text.contains("`../../elsewhere.vtu`"), "{text}");

@@ -33,7 +33,8 @@ pub(crate) fn document(title: &str, style: &'static str, script: &'static str, c
     // Control characters from a file belong to no document, whatever the form they are written in.
     let is_allowed =
         |c: char| c == '\n' || c == '\t' || !(c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}'));
-    page.into_string().chars().map(|c| if is_allowed(c) { c } else { '\u{fffd}' }).collect()
+    let page = page.into_string() + "\n";
+    page.chars().map(|c| if is_allowed(c) { c } else { '\u{fffd}' }).collect()
 }
 
 /// Data for a script, as JSON: what could end the element is written by its number.
