@@ -1,4 +1,5 @@
 //! Fields that several ranks wrote in pieces are, read back, those of one whole file, and the report shows the same.
+#![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,4 +1,6 @@
 //! The optimiser on small cases of a configuration: driver, guards, geometric functionals, what a set-up refuses.
+#![allow(clippy::unwrap_used)]
+
 mod coils;
 mod design_surface;
 mod driver;

@@ -17,8 +17,8 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 /// The candidates that `name` was probably meant to be: one, or two that are equally near, or none.
 ///
 /// Near means at most one wrong, missing or exchanged letter for every three (two at least for names of four letters or
-/// more), whatever its case and separators, or an abbreviation of each word. Of several equally near the most similar come
-/// first: those that begin alike.
+/// more), whatever its case and separators, or an abbreviation of each word. Of several equally near those come first that
+/// the name contains, then the most similar: those that begin alike.
 pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let wanted = fold(name);
     if wanted.is_empty() || wanted.len() > LONGEST_COMPARED {
@@ -26,7 +26,7 @@ pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>
     }
     let limit = if wanted.len() >= 4 { (wanted.len() / 3).max(2) } else { 1 };
     let candidates = candidates.into_iter().take(MOST_COMPARED).filter(|name| name.len() <= LONGEST_COMPARED);
-    let mut near: Vec<(usize, f64, &str)> = candidates
+    let mut near: Vec<(usize, bool, f64, &str)> = candidates
         .filter_map(|candidate| {
             let folded = fold(candidate);
             let distance = match osa_distance(&wanted, &folded) {
@@ -34,11 +34,11 @@ pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>
                 _ if abbreviates(&wanted, &folded) => limit,
                 _ => return None,
             };
-            Some((distance, jaro_winkler(&wanted, &folded), candidate))
+            Some((distance, !wanted.contains(&folded), jaro_winkler(&wanted, &folded), candidate))
         })
         .collect();
-    near.sort_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    near.dedup_by_key(|(_, _, candidate)| *candidate);
+    near.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(b.2.total_cmp(&a.2)));
+    near.dedup_by_key(|(.., candidate)| *candidate);
     let least = near.first().map_or(0, |(distance, ..)| *distance);
     near.into_iter().take(2).take_while(|(distance, ..)| *distance == least).map(|(.., name)| name).collect()
 }

@@ -30,7 +30,7 @@ pub(crate) struct Scale {
 /// Positive values that differ by more than this factor are drawn by factors.
 pub(super) const WIDE: f64 = 30.0;
 
-/// Ownership of the scale that is added on both sides of the values.
+/// Share of the scale that is added on both sides of the values.
 const ROOM: f64 = 0.06;
 
 impl Scale {
@@ -49,7 +49,7 @@ impl Scale {
         Self { low, high, count, pixels }
     }
 
-    /// Ownership of the scale at a value, 0 to 1 inside.
+    /// Share of the scale at a value, 0 to 1 inside.
     pub(crate) fn share(&self, value: f64) -> f64 {
         let share = match self.count {
             Count::Linear => (value - self.low) / (self.high - self.low),

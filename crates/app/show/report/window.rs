@@ -11,7 +11,7 @@ use super::plane::{Plane, bounds};
 use crate::build::Outline;
 use crate::config::CoilShape;
 
-/// Ownership of the window that is added around what must be seen.
+/// Share of the window that is added around what must be seen.
 const ROOM: f64 = 0.12;
 
 /// A part of a plane across a coordinate axis.

@@ -50,6 +50,7 @@ table! {
         least_quality: f64 = number(QUALITIES) => 0.0;
         /// What moves and how; later entries win at nodes of several.
         #[serde(skip_serializing_if = "Vec::is_empty")]
+        #[also(not_empty)]
         motion: Vec<PrescribedMotion> = TABLES, else Vec::new();
         /// What the tuner may change.
         tune: Tune = TABLE => Tune::default();
@@ -144,11 +145,11 @@ table! {
         worst_quality: Option<f64> = number(Range::closed(-1.0, 1.0));
         /// Number of elements with q ≤ 0.3.
         poor: Option<usize> = integer(0, MOST_COUNTED);
-        /// Ownership of elements with q ≤ 0.3, in per cent.
+        /// Share of elements with q ≤ 0.3, in per cent.
         share_poor_percent: Option<f64> = number(PER_CENT);
-        /// Ownership of elements with 0.3 < q < 0.6, in per cent.
+        /// Share of elements with 0.3 < q < 0.6, in per cent.
         share_fair_percent: Option<f64> = number(PER_CENT);
-        /// Ownership of elements with q ≥ 0.6, in per cent.
+        /// Share of elements with q ≥ 0.6, in per cent.
         share_good_percent: Option<f64> = number(PER_CENT);
         /// Number of equations.
         equations: Option<usize> = integer(0, MOST_COUNTED);
