@@ -66,7 +66,7 @@ mod tests {
             .args([
                 "--exact",
                 "--nocapture",
-                "cli::panic::tests::a_panic_is_told_once_and_ends_with_the_code_of_a_numerical_failure",
+                "cli::panic::tests::a_panic_is_reported_once_and_ends_with_the_code_of_a_numerical_failure",
             ])
             .env(INNER, "1")
             .env_remove("RUST_BACKTRACE")

@@ -197,7 +197,7 @@ fn conditions_on_planes_and_faces_that_cannot_hold_are_refused() {
         (r#"flux_normal = ["z_min"]"#, r#"flux_normal = ["z_min", "block|outside"]"#, "share the face"),
     ] {
         let (config, source) = parsed(&changed(APPLIED, &[(from, to)]));
-        let error = set_up(&config, &source, Mode::Optimisation).err().expect(says).to_string();
+        let error = set_up(&config, &source, Mode::Optimisation).expect_err(says).to_string();
         assert!(error.contains(says), "{error}");
     }
 }

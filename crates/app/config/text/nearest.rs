@@ -18,7 +18,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 ///
 /// Near means at most one wrong, missing or exchanged letter for every three (two at least for names of four letters or
 /// more), whatever its case and separators, or an abbreviation of each word. Of several equally near those come first that
-/// the name contains, then the most similar: those that begin alike.
+/// are as long, then those that the name contains, then the most similar: those that begin alike.
 pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
     let wanted = fold(name);
     if wanted.is_empty() || wanted.len() > LONGEST_COMPARED {
@@ -26,7 +26,7 @@ pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>
     }
     let limit = if wanted.len() >= 4 { (wanted.len() / 3).max(2) } else { 1 };
     let candidates = candidates.into_iter().take(MOST_COMPARED).filter(|name| name.len() <= LONGEST_COMPARED);
-    let mut near: Vec<(usize, bool, f64, &str)> = candidates
+    let mut near: Vec<(usize, [bool; 2], f64, &str)> = candidates
         .filter_map(|candidate| {
             let folded = fold(candidate);
             let distance = match osa_distance(&wanted, &folded) {
@@ -34,7 +34,8 @@ pub fn nearest_two<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>
                 _ if abbreviates(&wanted, &folded) => limit,
                 _ => return None,
             };
-            Some((distance, !wanted.contains(&folded), jaro_winkler(&wanted, &folded), candidate))
+            let is_apart = [wanted.chars().count() != folded.chars().count(), !wanted.contains(&folded)];
+            Some((distance, is_apart, jaro_winkler(&wanted, &folded), candidate))
         })
         .collect();
     near.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(b.2.total_cmp(&a.2)));

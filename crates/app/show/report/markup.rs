@@ -122,7 +122,7 @@ mod tests {
         let escaped = "&quot;&gt;&lt;script&gt;alert('x')&lt;/script&gt;&amp;\u{fffd}\u{fffd}";
         let page = document(hostile, "", "", &html! { p title=(hostile) {} });
         assert!(page.contains(&format!("<title>{escaped}</title>")), "{page}");
-        assert!(page.ends_with(&format!("<p title=\"{escaped}\"></p></main></body></html>")), "{page}");
+        assert!(page.ends_with(&format!("<p title=\"{escaped}\"></p></main></body></html>\n")), "{page}");
         let data = json("d", &serde_json::json!({ "name": "</script><b>&" })).into_string();
         let expected = r#"{"name":"\u003c/script\u003e\u003cb\u003e\u0026"}</script>"#;
         assert_eq!(data, format!(r#"<script type="application/json" id="d">{expected}"#));
