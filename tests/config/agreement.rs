@@ -94,7 +94,8 @@ fn beyond_a_schema(config: &toml::Table, path: &str, message: &str) -> Option<&'
     }
     // The value may stand in a case, where its path does not lead.
     let in_a_case = cases.is_some() && value.is_none();
-    if in_a_case && (holds(&SIZES) || message.contains("is a date")) {
+    if in_a_case && (holds(&SIZES) || message.contains("is a date") || message.contains("not a whole number"))
+    {
         return Some("the form of a value in a case");
     }
     form_of_a_number(value?, message)

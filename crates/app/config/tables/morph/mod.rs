@@ -122,6 +122,7 @@ table! {
         /// Keys of `[design]` that are other than outside of the cases.
         design: Option<Unread> = overlay::<Design>();
         /// What moves in this case, instead of `[[morph.motion]]`.
+        #[also(not_empty)]
         motion: Option<Unread> = unread::<Vec<PrescribedMotion>, _>(TABLES);
         /// As in `[morph]`.
         increments: Option<Unread> = unread::<Increments, _>(ONE_OF);
@@ -165,6 +166,7 @@ impl Morph {
                 "[[morph.motion]] with surface = \"top\" and displacement = [\"0 mm\", \"0 mm\", \"5 mm\"]",
             );
         }
+        section.check_not_empty("motion", "at least one table [[morph.motion]]");
         section.named_twice("case", self.cases.iter().map(|case| &case.name), "cases", "each name once");
     }
 }
