@@ -55,7 +55,7 @@ const SAFE_POTENTIAL: f64 = 1e60;
 
 /// Checks that flux density and loss of every element, and their squares, are finite.
 ///
-/// One pass over the unknowns; over the elements only where a potential is beyond [`SAFE_POTENTIAL`].
+/// One pass over the unknowns; over the elements only where a potential is beyond `SAFE_POTENTIAL`.
 ///
 /// # Errors
 /// [`Error::NotFinite`] names the first element's quantity, region and frequency.
