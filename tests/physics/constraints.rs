@@ -223,5 +223,5 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     let (mut problem, settings) = changed("shield_quick.toml", &changes);
     let ended = optimise(&mut problem, &settings.settings(), &mut Silent, &mut Rows::default(), &|| false);
     let text = ended.expect_err("no share").to_string();
-    assert!(text.contains("field_component_observation") && text.contains("upper_ratio"), "{text}");
+    assert!(text.contains("field_component_observation") && text.contains("to be a share of"), "{text}");
 }
