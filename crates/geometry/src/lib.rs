@@ -9,6 +9,7 @@
 pub mod box_tree;
 #[cfg(test)]
 mod determinism;
+pub mod disjoint_sets;
 pub mod error;
 mod facets;
 pub mod fem;

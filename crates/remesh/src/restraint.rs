@@ -3,6 +3,7 @@
 //! A part is held when no rigid motion `t + r × x` vanishes at all its known components. With `R` the rows of the six
 //! rigid motions at those components, that is: `Rᵀ R`, shape `(6, 6)`, is regular.
 
+use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::DofMap;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
@@ -14,16 +15,12 @@ const SINGULAR: f64 = 1e-10;
 /// Refuses a region of which a part can move as a rigid body.
 pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &DofMap<3>) -> Result<(), RemeshError> {
     let topology = mesh.topology();
-    let mut parent: Vec<u32> = (0..topology.node_count() as u32).collect();
+    let mut sets = DisjointSets::new(topology.node_count());
     for &e in elements {
-        let [first, others @ ..] = topology.tet(e);
-        for other in others {
-            let (a, b) = (root(&mut parent, first.0), root(&mut parent, other.0));
-            parent[a.max(b) as usize] = a.min(b);
-        }
+        sets.join(topology.tet(e).map(NodeId::index));
     }
-    let mut nodes: Vec<(u32, NodeId)> =
-        elements.iter().flat_map(|&e| topology.tet(e)).map(|n| (root(&mut parent, n.0), n)).collect();
+    let mut nodes: Vec<(usize, NodeId)> =
+        elements.iter().flat_map(|&e| topology.tet(e)).map(|n| (sets.root(n.index()), n)).collect();
     nodes.sort_unstable();
     nodes.dedup();
     for part in nodes.chunk_by(|a, b| a.0 == b.0) {
@@ -34,17 +31,7 @@ pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &DofMap<3>) -
     Ok(())
 }
 
-/// The representative of a node's part, with path halving.
-fn root(parent: &mut [u32], mut node: u32) -> u32 {
-    while parent[node as usize] != node {
-        let grandparent = parent[parent[node as usize] as usize];
-        parent[node as usize] = grandparent;
-        node = grandparent;
-    }
-    node
-}
-
-fn is_held(mesh: &Mesh, part: &[(u32, NodeId)], unknowns: &DofMap<3>) -> bool {
+fn is_held(mesh: &Mesh, part: &[(usize, NodeId)], unknowns: &DofMap<3>) -> bool {
     let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for &(_, n) in part {
         let p = mesh.point(n);

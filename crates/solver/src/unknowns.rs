@@ -12,6 +12,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::topology::face_key;
@@ -242,21 +243,9 @@ fn check_agreement(
 
 /// The first node of every connected set of conducting elements in which no node is fixed already.
 fn ground(space: &Space, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId> {
-    let mut root: Vec<u32> = (0..space.node_count() as u32).collect();
-    fn find(root: &mut [u32], mut i: u32) -> u32 {
-        while root[i as usize] != i {
-            root[i as usize] = root[root[i as usize] as usize];
-            i = root[i as usize];
-        }
-        i
-    }
+    let mut sets = DisjointSets::new(space.node_count());
     for &e in conductor {
-        let [first, others @ ..] = space.nodes_of(e) else { continue };
-        for other in others {
-            let (a, b) = (find(&mut root, first.0), find(&mut root, other.0));
-            // The smaller node stays root: the result does not depend on the order of elements.
-            root[a.max(b) as usize] = a.min(b);
-        }
+        sets.join(space.nodes_of(e).iter().map(|n| n.index()));
     }
     let mut nodes: Vec<NodeId> = conductor.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
     nodes.sort_unstable();
@@ -264,8 +253,8 @@ fn ground(space: &Space, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<Node
     let mut is_fixed = vec![false; space.node_count()];
     for n in &nodes {
         if psi_zero[n.index()] {
-            is_fixed[find(&mut root, n.0) as usize] = true;
+            is_fixed[sets.root(n.index())] = true;
         }
     }
-    nodes.into_iter().filter(|n| find(&mut root, n.0) == n.0 && !is_fixed[n.index()]).collect()
+    nodes.into_iter().filter(|n| sets.root(n.index()) == n.index() && !is_fixed[n.index()]).collect()
 }

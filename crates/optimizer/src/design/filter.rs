@@ -19,6 +19,7 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -53,17 +54,14 @@ impl<'a> Surface<'a> {
         directions: &'a [Point],
     ) -> Self {
         let mut areas = vec![0.0; nodes.len()];
-        let mut piece: Vec<usize> = (0..nodes.len()).collect();
+        let mut pieces = DisjointSets::new(nodes.len());
         for triangle in triangles {
             let third = norm(area_vector(triangle.map(|n| mesh.point(n)))) / 3.0;
             let rows: Vec<usize> = triangle.iter().filter_map(|n| nodes.binary_search(n).ok()).collect();
-            for &i in &rows {
-                areas[i] += third;
-                let (a, b) = (root(&mut piece, rows[0]), root(&mut piece, i));
-                piece[a.max(b)] = a.min(b);
-            }
+            rows.iter().for_each(|&i| areas[i] += third);
+            pieces.join(rows);
         }
-        let piece = (0..nodes.len()).map(|i| root(&mut piece, i)).collect();
+        let piece = (0..nodes.len()).map(|i| pieces.root(i)).collect();
         let places = nodes.iter().map(|&n| mesh.point(n)).collect();
         Self { places, directions, areas, piece }
     }
@@ -138,13 +136,4 @@ fn neighbours([x, y, z]: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
     around(x)
         .into_iter()
         .flat_map(move |x| around(y).into_iter().flat_map(move |y| around(z).map(move |z| [x, y, z])))
-}
-
-/// The representative of a node's piece, with path halving.
-fn root(parent: &mut [usize], mut node: usize) -> usize {
-    while parent[node] != node {
-        parent[node] = parent[parent[node]];
-        node = parent[node];
-    }
-    node
 }

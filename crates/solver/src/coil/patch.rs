@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::tet4::{FACES, Point, Tet4, area_vector, dot, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
@@ -135,25 +136,12 @@ fn faces(mesh: &Mesh, elements: &[ElementId]) -> Vec<PatchFace> {
 
 /// Which nodes hang together through elements.
 fn parts(node_count: usize, connectivity: &[[NodeId; 4]]) -> (Vec<usize>, usize) {
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    let mut parent: Vec<usize> = (0..node_count).collect();
-    for [first, others @ ..] in connectivity {
-        for other in others {
-            let (a, b) = (root(&mut parent, first.index()), root(&mut parent, other.index()));
-            // The smaller node stays root: the numbers do not depend on the order of elements.
-            parent[a.max(b)] = a.min(b);
-        }
-    }
+    let mut sets = DisjointSets::new(node_count);
+    connectivity.iter().for_each(|nodes| sets.join(nodes.map(NodeId::index)));
     let mut number = vec![0; node_count];
     let mut count = 0;
     for i in 0..node_count {
-        let r = root(&mut parent, i);
+        let r = sets.root(i);
         if r == i {
             number[i] = count;
             count += 1;
