@@ -54,6 +54,14 @@ fn any_number_of_threads_writes_the_same_bits_on_systems_cut_into_many_tasks() {
 }
 
 #[test]
+fn any_number_of_threads_writes_the_same_bits_of_edge_elements() {
+    let home = folder();
+    let device = slow(home.path()).with("optimizer.max_evaluations=2").with("analysis.elements=edge");
+    same_on_all_threads(&device);
+    same_on_all_threads(&block(home.path(), 6).with("analysis.elements=edge").with("analysis.order=2"));
+}
+
+#[test]
 fn any_number_of_threads_writes_the_same_bits_of_the_shields() {
     for name in ["shield_quick", "shield_two_frequencies"] {
         same_on_all_threads(&shipped(name, &[]).with("output.fields=every"));

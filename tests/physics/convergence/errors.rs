@@ -144,6 +144,8 @@ fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &F
 fn order_of_b(order: Order) -> f64 {
     0.95 * order.degree() as f64
 }
+/// Where the gauge leaves `A` open.
+pub(crate) const ANY_ORDER_OF_A: f64 = f64::NEG_INFINITY;
 pub(crate) const ORDER_OF_A: f64 = 1.9;
 pub(crate) const QUADRATIC_ORDER_OF_A: f64 = 2.9;
 

@@ -9,10 +9,11 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{Boundary, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModelSetup, Material, Order};
 
 use super::errors::{
-    KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Sample, Turned, assert_orders, errors_on, setup,
+    ANY_ORDER_OF_A, KnownField, ORDER_OF_A, QUADRATIC_ORDER_OF_A, Sample, Turned, assert_orders, errors_on,
+    setup,
 };
 use crate::meshes::{Distortion, unit_cube};
 
@@ -32,6 +33,7 @@ const COARSE_CELLS: [usize; 3] = [6, 8, 12];
 struct Smooth {
     faces: Boundary,
     frequency: f64,
+    /// Zero for edge elements, which have none.
     penalty: f64,
     order: Order,
 }
@@ -82,8 +84,12 @@ impl KnownField for Smooth {
     }
 
     fn setup(&self) -> FieldModelSetup {
-        let setup = setup(self.frequency, self.penalty, vec![self.material()], self.faces);
-        FieldModelSetup { order: self.order, ..setup }
+        let (family, penalty) = match self.penalty {
+            0.0 => (ElementFamily::Edge, 1.0),
+            penalty => (ElementFamily::Nodal, penalty),
+        };
+        let setup = setup(self.frequency, penalty, vec![self.material()], self.faces);
+        FieldModelSetup { family, order: self.order, ..setup }
     }
 }
 
@@ -123,6 +129,22 @@ fn quadratic_elements_gain_an_order() {
     ] {
         let field = Smooth { faces, frequency, penalty, order: Order::Quadratic };
         assert_orders(&field, Distortion::Random, &COARSE_CELLS, QUADRATIC_ORDER_OF_A);
+    }
+}
+
+/// `A` is one field of many in statics, so that only `B` and `A + ∇ψ` have orders.
+#[test]
+fn edge_elements_converge_between_faces_of_either_kind() {
+    for (order, cells) in [(Order::Linear, CELLS), (Order::Quadratic, COARSE_CELLS)] {
+        for (faces, frequency) in [
+            (Boundary::FluxParallel, 0.0),
+            (Boundary::FluxParallel, 50.0),
+            (Boundary::FluxNormal, 0.0),
+            (Boundary::FluxNormal, 50.0),
+        ] {
+            let field = Smooth { faces, frequency, penalty: 0.0, order };
+            assert_orders(&field, Distortion::Random, &cells, ANY_ORDER_OF_A);
+        }
     }
 }
 

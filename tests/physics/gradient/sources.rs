@@ -42,8 +42,37 @@ fn the_gradient_of_quadratic_elements_is_exact_in_a_conductor_and_for_its_loss()
     all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..brief() });
 }
 
+/// Of edge elements in five directions for the first order, and two for the second.
+fn edge(order: u8, overrides: &[&str]) -> Setup {
+    let order = format!("analysis.order={order}");
+    setup("shield_quick.toml", &[overrides, &["analysis.elements=\"edge\"", order.as_str()]].concat())
+}
+
+#[test]
+fn the_gradient_of_edge_elements_is_exact_around_an_impedance_surface_and_for_its_loss() {
+    let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]";
+    for (order, settings) in [(1, Settings::default()), (2, brief())] {
+        let setup = edge(order, &["mesh.shield.refinement=0.3", loss]);
+        all_hold(&setup, &wavy(&setup.problem), &settings);
+    }
+}
+
+#[test]
+fn the_gradient_of_edge_elements_is_exact_in_a_conductor_and_for_its_loss() {
+    let mut overrides = MESHED.to_vec();
+    overrides.extend([
+        "mesh.shield.refinement=0.25",
+        "mesh.shield.skin=[\"2 mm\"]",
+        "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]",
+    ]);
+    for (order, settings) in [(1, Settings::default()), (2, brief())] {
+        let setup = edge(order, &overrides);
+        all_hold(&setup, &wavy(&setup.problem), &settings);
+    }
+}
+
 /// A magnet above an iron plate; the magnet's lower face moves, and the field energy of magnet and gap with it.
-fn magnet(order: u8) -> String {
+fn magnet(elements: &str, order: u8) -> String {
     format!(
         r#"
         [mesh]
@@ -69,6 +98,7 @@ fn magnet(order: u8) -> String {
         box = [[0, 0, "-20 mm"], ["20 mm", "20 mm", "-10 mm"]]
         [analysis]
         frequency = 0
+        elements = "{elements}"
         order = {order}
         [materials.iron]
         relative_permeability = 200
@@ -108,8 +138,8 @@ fn magnet(order: u8) -> String {
 
 #[test]
 fn the_gradient_with_a_magnet_that_moves_is_exact() {
-    for order in [1, 2] {
-        let setup = setup_of(&magnet(order));
+    for (elements, order) in [("nodal", 1), ("nodal", 2), ("edge", 1), ("edge", 2)] {
+        let setup = setup_of(&magnet(elements, order));
         let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
         assert_eq!(setup.problem.constraints().len(), 2);
         all_hold(&setup, &p, &brief());
@@ -179,10 +209,12 @@ const APPLIED: &str = r#"
 
 #[test]
 fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
-    let setup = setup_of(APPLIED);
-    let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
-    assert_eq!(setup.problem.constraints().len(), 4);
-    all_hold(&setup, &p, &brief());
+    for elements in ["order = 2", "elements = \"edge\"", "elements = \"edge\"\n    order = 2"] {
+        let setup = setup_of(&changed(APPLIED, &[("order = 2", elements)]));
+        let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
+        assert_eq!(setup.problem.constraints().len(), 4);
+        all_hold(&setup, &p, &brief());
+    }
 }
 
 #[test]

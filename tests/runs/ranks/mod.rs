@@ -80,6 +80,15 @@ fn so_are_those_of_quadratic_elements() {
 }
 
 #[test]
+fn so_are_those_of_edge_elements() {
+    for order in ["analysis.order=1", "analysis.order=2"] {
+        let mut overrides = MESHED.to_vec();
+        overrides.extend(["analysis.elements=\"edge\"", "mesh.shield.refinement=0.25", order]);
+        ranks_agree("shield.toml", &overrides, &[3]);
+    }
+}
+
+#[test]
 fn so_are_those_of_a_magnet_and_of_every_stiffness() {
     for policy in StiffnessPolicy::ALL {
         let stiffness = format!("remesh.stiffness=\"{}\"", policy.name());
