@@ -31,7 +31,7 @@ table! {
         penalty: f64 = number(POSITIVE) => 1.0;
         /// What is continuous from element to element: all of A at the nodes, or its part along the edges. `docs/theory.md`
         /// tells what each is right for.
-        elements: Elements = WORD => Elements::Nodal;
+        elements: Elements = WORD => Elements::Edge;
         /// Polynomial degree of A and ψ in an element. 2 gives about eight times the unknowns, and far smaller errors on the
         /// same mesh.
         order: ElementOrder = integer(1, 2) => ElementOrder::Linear;
