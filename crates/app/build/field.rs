@@ -7,7 +7,9 @@ use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurr
 use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
 };
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Order, SolverError, UniformField};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Order, SolverError, UniformField,
+};
 
 use super::locate_error::DiagnosticSink;
 use crate::config::{
@@ -119,6 +121,7 @@ fn field_model(
     let setup = FieldModelSetup {
         frequency,
         penalty: config.analysis.penalty,
+        family: family(config),
         order: order(config),
         materials,
         remanence: remanences(config, mesh.topology()),
@@ -177,6 +180,14 @@ fn distributed_settings(options: &config::Petsc) -> DistributedSettings {
 
 /// Bytes of a GiB.
 const GIB: f64 = (1u64 << 30) as f64;
+
+/// The family of the elements.
+fn family(config: &Config) -> ElementFamily {
+    match config.analysis.elements {
+        config::Elements::Nodal => ElementFamily::Nodal,
+        config::Elements::Edge => ElementFamily::Edge,
+    }
+}
 
 /// The order of the elements.
 pub(super) fn order(config: &Config) -> Order {

@@ -141,7 +141,7 @@ impl StateArrays {
         nodes: &[NodeId],
         elements: &[ElementId],
     ) -> Self {
-        let potentials: Vec<[c64; 4]> = nodes.par_iter().map(|&n| solution.potentials(model, n)).collect();
+        let potentials = solution.nodal_potentials(model, mesh, nodes);
         let a: Vec<[c64; 3]> = potentials.par_iter().map(|p| [p[0], p[1], p[2]]).collect();
         let b = parts(&solution.flux_densities_of(model, mesh, elements));
         let magnitude = |(re, im): (&Point, &Point)| re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt();

@@ -8,17 +8,15 @@
 //! comes with the functional itself.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use rayon::prelude::*;
 
-use crate::element::lagrange::Lagrange;
-use crate::element::{Complex3, impedance, interface, point};
+use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::linear::{LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::space::Order;
 use crate::surface::SurfaceTerm;
 
 /// Solves the adjoint problem with the state's prepared system for `∂F/∂u` ([`crate::functional`]).
@@ -64,36 +62,16 @@ pub(crate) fn gradient_of(
     mesh: &Mesh,
     state: &FieldSolution,
     adjoint: &FieldSolution,
-    extent: &Extent<'_>,
-) -> Vec<Point> {
-    match model.space().order() {
-        Order::Linear => {
-            let shapes = (Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle());
-            gradient_of_order(shapes, |triangle| triangle, (model, mesh), (state, adjoint), extent)
-        }
-        Order::Quadratic => {
-            let shapes = (Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle());
-            let nodes_of = |triangle| model.space().quadratic_triangle(triangle);
-            gradient_of_order(shapes, nodes_of, (model, mesh), (state, adjoint), extent)
-        }
-    }
-}
-
-/// [`gradient_of`] on elements with `N` and faces with `F` nodes.
-fn gradient_of_order<const N: usize, const F: usize>(
-    (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
-    nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F] + Sync,
-    (model, mesh): (&FieldModel, &Mesh),
-    (state, adjoint): (&FieldSolution, &FieldSolution),
     &Extent { moving, triangles }: &Extent<'_>,
 ) -> Vec<Point> {
-    let topology = model.topology();
+    let (topology, space) = (model.topology(), model.space());
+    let elements = space.elements();
     let contributions: Vec<[Point; 4]> = moving
         .par_iter()
         .map(|&e| {
-            let (tet, law) = (Tet4::new(mesh.vertices(e)), model.coefficients_of(e));
-            let (l, u) = (adjoint.element_field(model, e), state.element_field(model, e));
-            scale(-2.0, &point::shape_derivative(tet_shape, &tet, law, &l, &u))
+            let law = model.coefficients_of(e);
+            let (l, u) = (adjoint.element(model, e), state.element(model, e));
+            scale(-2.0, &elements.shape_derivative(&space.cell(mesh, e), law, l.values(), u.values()))
         })
         .collect();
     let mut gradient = sum_by_node(topology, moving, &contributions);
@@ -104,8 +82,7 @@ fn gradient_of_order<const N: usize, const F: usize>(
             }
         }
     };
-    let magnets =
-        model.sources().shape_derivatives(tet_shape, mesh, moving, |e| adjoint.element_field(model, e));
+    let magnets = model.sources().shape_derivatives(space, mesh, moving, |e| adjoint.element(model, e));
     for (e, terms) in magnets {
         add(&topology.tet(e), &scale(2.0, &terms));
     }
@@ -119,10 +96,10 @@ fn gradient_of_order<const N: usize, const F: usize>(
     let contributions: Vec<[Point; 3]> = surface
         .par_iter()
         .map(|&(triangle, term)| {
-            let nodes = nodes_of(triangle);
-            let field = |s: &FieldSolution| s.nodal_field(model, nodes).vector_potential;
+            let carriers = space.triangle(triangle);
+            let (l, u) = (adjoint.local(model, &carriers), state.local(model, &carriers));
             let vertices = triangle.map(|n| mesh.point(n));
-            scale(-2.0, &surface_derivative(face_shape, vertices, term, &field(adjoint), &field(state)))
+            scale(-2.0, &elements.surface_derivative(vertices, term, l.values(), u.values()))
         })
         .collect();
     for ((triangle, _), terms) in surface.iter().zip(&contributions) {
@@ -166,22 +143,6 @@ fn sum_by_node(topology: &Topology, elements: &[ElementId], contributions: &[[Po
     };
     let nodes: Vec<NodeId> = topology.nodes().collect();
     nodes.into_par_iter().map(sum_at).collect()
-}
-
-/// `∂/∂x_k (λᵀ M u)` of one surface term.
-fn surface_derivative<const N: usize>(
-    shape: &Lagrange<N, 3>,
-    vertices: [Point; 3],
-    term: SurfaceTerm,
-    adjoint: &[Complex3; N],
-    state: &[Complex3; N],
-) -> [Complex3; 3] {
-    match term {
-        SurfaceTerm::Interface(jump) => interface::shape_derivative(shape, jump, adjoint, state),
-        SurfaceTerm::Impedance(coefficient, _) => {
-            impedance::shape_derivative(shape, vertices, coefficient, adjoint, state)
-        }
-    }
 }
 
 #[cfg(test)]

@@ -11,13 +11,13 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
-use crate::element::lagrange::Lagrange;
 use crate::error::SolverError;
+use crate::family::{self, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, prolongation};
 use crate::rotated::RotatedMatrix;
-use crate::space::{Order, Space};
+use crate::space::{Carriers, ElementFamily, Order, Space};
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
 
@@ -28,38 +28,83 @@ pub(crate) struct Discretisation {
     pub(crate) unknowns: Unknowns,
     /// Rows of this rank against all columns; the whole where there is one rank.
     pub(crate) pattern: BlockPattern<4>,
-    groups: Groups,
+    groups: Box<dyn Bound>,
     /// Elements and triangles of the groups, where these are not all.
     pub(crate) local: Option<LocalEntities>,
     /// Elements and surface triangles with a node whose `A` is prescribed.
     lifted: (Vec<ElementId>, Vec<usize>),
 }
 
-/// Elements and surface triangles bound to the pattern, by order.
-#[derive(Debug)]
-enum Groups {
-    Linear { tets: BoundGroup<4>, triangles: BoundGroup<3> },
-    Quadratic { tets: BoundGroup<10>, triangles: BoundGroup<6> },
+/// Elements and surface triangles bound to the pattern: what adds their matrices.
+trait Bound: std::fmt::Debug + Send + Sync {
+    /// Adds the matrices of all elements and triangles of this rank to `values`.
+    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]);
+    /// `f −= K A_prescribed` of the elements and triangles that prescribed values touch.
+    fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]);
+}
+
+/// Groups of elements with `N` and triangles with `F` carriers.
+struct Groups<K: 'static, const N: usize, const F: usize> {
+    matrices: &'static K,
+    tets: BoundGroup<N>,
+    triangles: BoundGroup<F>,
+}
+
+impl<K, const N: usize, const F: usize> std::fmt::Debug for Groups<K, N, F> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Groups").finish_non_exhaustive()
+    }
+}
+
+impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F> {
+    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]) {
+        let local = of.local.as_ref();
+        of.add_group(&self.tets, values, |e| {
+            let e = local.map_or(e, |local| local.elements[e.index()]);
+            weak_form.tet(self.matrices, of.space.cell(mesh, e), e)
+        });
+        of.add_group(&self.triangles, values, |t| {
+            let t = local.map_or(t.index(), |local| local.triangles[t.index()]);
+            weak_form.triangle(self.matrices, mesh, t)
+        });
+    }
+
+    fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
+        let (elements, triangles) = &of.lifted;
+        for &e in elements {
+            let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
+            of.subtract_lift(of.space.nodes_of(e), &matrix, load);
+        }
+        for &t in triangles {
+            let matrix = weak_form.triangle(self.matrices, mesh, t);
+            of.subtract_lift(&of.space.triangle(weak_form.triangles()[t]), &matrix, load);
+        }
+    }
 }
 
 impl Discretisation {
-    /// Numbers the unknowns of the given order and finds their couplings.
+    /// Numbers the unknowns of the given family and order and finds their couplings.
     ///
     /// # Errors
     /// As [`Unknowns::new`].
     pub(crate) fn new(
         mesh: &Mesh,
-        order: Order,
+        (family, order): (ElementFamily, Order),
         weak_form: &WeakForm,
         boundaries: &[(String, Boundary)],
         ownership: Option<&Ownership>,
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
-        let space = Space::new(topology, order);
-        let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), boundaries)?;
+        let space = Space::new(topology, family, order);
+        let impedance = weak_form.impedance_triangles();
+        let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), &impedance, boundaries)?;
         let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
         let local = ownership.map(|own| LocalEntities::new(topology, weak_form.triangles(), own));
         let coupling_of = |e: ElementId| {
+            if family == ElementFamily::Edge {
+                // Gradients have no curl: they couple in conductors alone.
+                return Coupling::full(if weak_form.conducts(e) { 4 } else { 2 });
+            }
             let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
             let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
             if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
@@ -83,7 +128,7 @@ impl Discretisation {
     /// aggregates elsewhere, by the couplings of `matrix`.
     ///
     /// # Errors
-    /// As [`Unknowns::new`].
+    /// As [`Unknowns::new`]; [`SolverError::Parameter`] for edge elements, which have none.
     pub(crate) fn prolongation(
         &self,
         mesh: &Mesh,
@@ -91,10 +136,18 @@ impl Discretisation {
         boundaries: &[(String, Boundary)],
         matrix: &CsrMatrix<c64>,
     ) -> Result<CsrMatrix<f64>, SolverError> {
+        if self.space.family() == ElementFamily::Edge {
+            return Err(SolverError::Parameter {
+                what: "linear_solver.method".to_owned(),
+                value: "two_level".to_owned(),
+                expected: "a factor, or an incomplete one: edge elements have no coarse level".to_owned(),
+            });
+        }
         let conductor = conductor(weak_form);
         if self.space.order() == Order::Quadratic {
-            let vertices = Space::new(mesh.topology(), Order::Linear);
-            let coarse = Unknowns::new(mesh, &vertices, &conductor, boundaries)?;
+            let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
+            let impedance = weak_form.impedance_triangles();
+            let coarse = Unknowns::new(mesh, &vertices, &conductor, &impedance, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
         let mut conducts = vec![false; self.space.node_count()];
@@ -108,24 +161,7 @@ impl Discretisation {
     /// Assembles the matrix, or the rows of this rank, on a mesh with this topology.
     pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
-        let values = &mut matrix.values;
-        let local = self.local.as_ref();
-        let element = |e: ElementId| local.map_or(e, |local| local.elements[e.index()]);
-        let triangle = |t: ElementId| local.map_or(t.index(), |local| local.triangles[t.index()]);
-        match &self.groups {
-            Groups::Linear { tets, triangles } => {
-                self.add_group(tets, values, |e| weak_form.linear_tet(mesh, element(e)));
-                self.add_group(triangles, values, |t| {
-                    weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, triangle(t))
-                });
-            }
-            Groups::Quadratic { tets, triangles } => {
-                self.add_group(tets, values, |e| weak_form.quadratic_tet(mesh, element(e)));
-                self.add_group(triangles, values, |t| {
-                    weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, triangle(t))
-                });
-            }
-        }
+        self.groups.add(self, weak_form, mesh, &mut matrix.values);
         matrix
     }
 
@@ -147,27 +183,7 @@ impl Discretisation {
 
     /// `f −= K A_prescribed`: what the prescribed part of `A` does to the load.
     pub(crate) fn lift(&self, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
-        let (elements, triangles) = &self.lifted;
-        match &self.groups {
-            Groups::Linear { .. } => {
-                for &e in elements {
-                    self.subtract_lift(self.space.nodes_of(e), &weak_form.linear_tet(mesh, e), load);
-                }
-                for &t in triangles {
-                    let matrix = weak_form.triangle(Lagrange::<3, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&self.space.triangle(weak_form.triangles()[t]), &matrix, load);
-                }
-            }
-            Groups::Quadratic { .. } => {
-                for &e in elements {
-                    self.subtract_lift(self.space.nodes_of(e), &weak_form.quadratic_tet(mesh, e), load);
-                }
-                for &t in triangles {
-                    let matrix = weak_form.triangle(Lagrange::<6, 3>::triangle(), mesh, t);
-                    self.subtract_lift(&self.space.triangle(weak_form.triangles()[t]), &matrix, load);
-                }
-            }
-        }
+        self.groups.subtract_lift(self, weak_form, mesh, load);
     }
 
     /// `f −= K A_prescribed` for one element.
@@ -196,44 +212,52 @@ fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
 /// The pattern of the rows against the columns, and the elements and triangles of this rank bound to it.
 fn pattern(
     space: &Space,
-    (rows, columns): (&DofMap<4>, &DofMap<4>),
+    dofs: (&DofMap<4>, &DofMap<4>),
     local: Option<&LocalEntities>,
     coupling_of: impl Fn(ElementId) -> Coupling,
     triangles: &[[NodeId; 3]],
-) -> (BlockPattern<4>, Groups) {
-    let count = space.node_count();
+) -> (BlockPattern<4>, Box<dyn Bound>) {
     let couplings: Vec<Coupling> = match local {
         None => (0..space.element_count()).map(|e| coupling_of(ElementId::new(e))).collect(),
         Some(local) => local.elements.iter().map(|&e| coupling_of(e)).collect(),
     };
-    let triangles: Vec<[NodeId; 3]> = match local {
-        None => triangles.to_vec(),
-        Some(local) => local.triangles.iter().map(|&t| triangles[t]).collect(),
+    let triangles: Vec<Vec<NodeId>> = match local {
+        None => triangles.iter().map(|&t| space.triangle(t)).collect(),
+        Some(local) => local.triangles.iter().map(|&t| space.triangle(triangles[t])).collect(),
     };
-    let surface_couplings = vec![Coupling::full(3); triangles.len()];
-    fn local_tets<const N: usize>(tets: &[[NodeId; N]], local: Option<&LocalEntities>) -> Vec<[NodeId; N]> {
-        match local {
-            None => tets.to_vec(),
-            Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
-        }
+    let parts = (dofs, local, couplings, triangles.as_slice());
+    match (space.carriers(), space.family()) {
+        (Carriers::Four(tets), _) => bind(&*family::NODAL_1, tets, parts),
+        (Carriers::Six(tets), _) => bind(&*family::EDGE_1, tets, parts),
+        (Carriers::Ten(tets), ElementFamily::Nodal) => bind(&*family::NODAL_2, tets, parts),
+        (Carriers::Ten(tets), ElementFamily::Edge) => bind(&*family::EDGE_2, tets, parts),
     }
-    match (space.linear_tets(), space.quadratic_tets()) {
-        (Some(tets), _) => {
-            let volumes = ElementGroup::new(count, local_tets(tets, local), couplings);
-            let faces = ElementGroup::new(count, triangles, surface_couplings);
-            let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
-            let groups = Groups::Linear { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
-            (pattern, groups)
-        }
-        (None, tets) => {
-            let volumes = ElementGroup::new(count, local_tets(tets.unwrap_or_default(), local), couplings);
-            let triangles = triangles.iter().map(|&t| space.quadratic_triangle(t)).collect();
-            let faces = ElementGroup::new(count, triangles, surface_couplings);
-            let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
-            let groups = Groups::Quadratic { tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
-            (pattern, groups)
-        }
-    }
+}
+
+/// Rows and columns; the elements and triangles of this rank where there are several; couplings of these elements; carriers
+/// of these triangles.
+type Parts<'a> =
+    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [Vec<NodeId>]);
+
+fn bind<K: Matrices<N, F>, const N: usize, const F: usize>(
+    matrices: &'static K,
+    tets: &[[NodeId; N]],
+    ((rows, columns), local, couplings, triangles): Parts<'_>,
+) -> (BlockPattern<4>, Box<dyn Bound>) {
+    let count = columns.node_count();
+    let tets = match local {
+        None => tets.to_vec(),
+        Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
+    };
+    let carriers =
+        |t: &Vec<NodeId>| t.as_slice().try_into().expect("a triangle of the same family and order");
+    let triangles: Vec<[NodeId; F]> = triangles.iter().map(carriers).collect();
+    let volumes = ElementGroup::new(count, tets, couplings);
+    let full = vec![Coupling::full(K::SURFACE_COMPONENTS); triangles.len()];
+    let faces = ElementGroup::new(count, triangles, full);
+    let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
+    let groups = Groups { matrices, tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
+    (pattern, Box::new(groups))
 }
 
 /// Elements and surface triangles with a node whose `A` is prescribed, ascending.

@@ -1,4 +1,4 @@
-//! Magnetostatic and eddy-current fields by nodal A–ψ finite elements, objectives of the field, and their adjoint.
+//! Magnetostatic and eddy-current fields by nodal A–ψ and by edge finite elements, objectives of the field, and their adjoint.
 //!
 //! SI units; phasors are peak values with the time factor `exp(+jωt)`; `B = curl A`, `E = −jω(A + ∇ψ)`. A
 //! [`FieldModel`] is what does not change while the mesh moves (materials, coils, boundary conditions, equation
@@ -15,8 +15,10 @@ mod discretisation;
 mod distributed;
 pub mod element;
 pub mod error;
+pub mod family;
 mod fixed_directions;
 pub mod functional;
+mod gauge;
 pub mod linear;
 mod load;
 mod local_entities;
@@ -38,5 +40,5 @@ pub use linear::{LinearSolver, LinearSolverReport};
 pub use material::Material;
 pub use model::{FieldModel, FieldModelSetup};
 pub use solution::FieldSolution;
-pub use space::{Order, Space};
+pub use space::{ElementFamily, Order, Space};
 pub use surface::Conductor;

@@ -5,16 +5,15 @@
 //! has a derivative with respect to the node positions.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh};
 use rayon::prelude::*;
 
 use crate::coil::{Coil, SourceTerms};
-use crate::element::lagrange::Lagrange;
-use crate::element::volume::NodalField;
-use crate::element::{Complex3, point};
+use crate::element::Complex3;
 use crate::error::SolverError;
-use crate::space::{Order, Space};
+use crate::family::Local;
+use crate::space::Space;
 use crate::unknowns::Unknowns;
 
 /// All sources of a model, per element.
@@ -50,54 +49,42 @@ impl Sources {
         self.coils.moments.is_empty() && self.coils.currents.is_empty() && self.magnets.is_empty()
     }
 
-    /// The load [A m], added to `load`.
+    /// The load [A m; of edge elements A m²], added to `load`: element loads in parallel, then added in their order.
     pub(crate) fn add_load(&self, space: &Space, unknowns: &Unknowns, mesh: &Mesh, load: &mut [c64]) {
-        match space.order() {
-            Order::Linear => self.add_load_of_order(Lagrange::<4, 4>::tet(), space, unknowns, mesh, load),
-            Order::Quadratic => self.add_load_of_order(Lagrange::<10, 4>::tet(), space, unknowns, mesh, load),
-        }
-    }
-
-    /// [`Self::add_load`] on elements with `N` nodes: element loads in parallel, then added in their order.
-    fn add_load_of_order<const N: usize>(
-        &self,
-        shape: &'static Lagrange<N, 4>,
-        space: &Space,
-        unknowns: &Unknowns,
-        mesh: &Mesh,
-        load: &mut [c64],
-    ) {
-        let mut add = |(e, values): (ElementId, [Complex3; N])| {
-            for (&node, f) in space.nodes_of(e).iter().zip(values) {
-                unknowns.scatter_add(load, node, [f[0], f[1], f[2], c64::default()]);
+        let elements = space.elements();
+        let mut add = |(e, local): (ElementId, Local)| {
+            for (&carrier, values) in space.nodes_of(e).iter().zip(local.values()) {
+                unknowns.scatter_add(load, carrier, *values);
             }
         };
-        let tet = |e: ElementId| Tet4::new(mesh.vertices(e));
-        let of_coil =
-            |(e, moments): &(ElementId, [Complex3; 4])| (*e, point::curl_load(shape, &tet(*e), moments));
-        let of_magnet = |(e, source): &(ElementId, Point)| {
-            let tet = tet(*e);
-            let share = 0.25 * tet.volume;
-            (*e, point::curl_load(shape, &tet, &[source.map(|t| c64::from(share * t)); 4]))
+        let of_coil = |(e, moments): &(ElementId, [Complex3; 4])| {
+            (*e, elements.curl_load(&space.cell(mesh, *e), moments))
         };
-        let of_region =
-            |(e, current): &(ElementId, Complex3)| (*e, point::current_load(shape, &tet(*e), current));
+        let of_magnet = |(e, source): &(ElementId, Point)| {
+            let cell = space.cell(mesh, *e);
+            let share = 0.25 * cell.tet.volume;
+            (*e, elements.curl_load(&cell, &[source.map(|t| c64::from(share * t)); 4]))
+        };
+        let of_region = |(e, current): &(ElementId, Complex3)| {
+            (*e, elements.current_load(&space.cell(mesh, *e), current))
+        };
         self.coils.moments.par_iter().map(of_coil).collect::<Vec<_>>().into_iter().for_each(&mut add);
         self.magnets.par_iter().map(of_magnet).collect::<Vec<_>>().into_iter().for_each(&mut add);
         self.coils.currents.par_iter().map(of_region).collect::<Vec<_>>().into_iter().for_each(add);
     }
 
     /// `∂/∂x_k (λᵀ f)` of the magnets among `moving` (ascending), per element.
-    pub(crate) fn shape_derivatives<'a, const N: usize>(
+    pub(crate) fn shape_derivatives<'a>(
         &'a self,
-        shape: &'static Lagrange<N, 4>,
+        space: &'a Space,
         mesh: &'a Mesh,
         moving: &'a [ElementId],
-        adjoint: impl Fn(ElementId) -> NodalField<N> + 'a,
+        adjoint: impl Fn(ElementId) -> Local + 'a,
     ) -> impl Iterator<Item = (ElementId, [Complex3; 4])> + 'a {
         self.magnets.iter().filter(|(e, _)| moving.binary_search(e).is_ok()).map(move |&(e, source)| {
-            let tet = Tet4::new(mesh.vertices(e));
-            (e, point::magnet_shape_derivative(shape, &tet, source, &adjoint(e)))
+            let adjoint = adjoint(e);
+            let cell = space.cell(mesh, e);
+            (e, space.elements().magnet_shape_derivative(&cell, source, adjoint.values()))
         })
     }
 }

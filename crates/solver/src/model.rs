@@ -25,7 +25,7 @@ use crate::linear::{
 use crate::load::Sources;
 use crate::material::Material;
 use crate::solution::FieldSolution;
-use crate::space::{Order, Space};
+use crate::space::{ElementFamily, Order, Space};
 use crate::surface::{Conductor, SurfaceTerm};
 use crate::unknowns::Unknowns;
 use crate::weak_form::WeakForm;
@@ -37,6 +37,8 @@ pub struct FieldModelSetup {
     pub frequency: f64,
     /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
     pub penalty: f64,
+    /// What is continuous between elements. Default nodal.
+    pub family: ElementFamily,
     /// Polynomial order of the potentials. Default linear.
     pub order: Order,
     /// Material of every region, by `RegionId`.
@@ -61,6 +63,7 @@ impl Default for FieldModelSetup {
         Self {
             frequency: 0.0,
             penalty: 1.0,
+            family: ElementFamily::default(),
             order: Order::default(),
             materials: Vec::new(),
             remanence: Vec::new(),
@@ -118,7 +121,8 @@ impl FieldModel {
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
         let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
         let ownership = setup.ownership.as_ref().map(|(ownership, _)| ownership);
-        let fine = Discretisation::new(mesh, setup.order, &weak_form, &setup.boundaries, ownership)?;
+        let fine =
+            Discretisation::new(mesh, (setup.family, setup.order), &weak_form, &setup.boundaries, ownership)?;
         let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
@@ -175,8 +179,14 @@ impl FieldModel {
         check(mesh, setup)?;
         let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
         let numbers = (angular_frequency, setup.penalty);
-        let form =
-            WeakForm::new(mesh, numbers, &setup.materials, &setup.boundaries, &setup.impedance_surfaces)?;
+        let form = WeakForm::new(
+            mesh,
+            setup.family,
+            numbers,
+            &setup.materials,
+            &setup.boundaries,
+            &setup.impedance_surfaces,
+        )?;
         Ok((angular_frequency, form))
     }
 

@@ -111,7 +111,7 @@ mod tests {
     use crate::linear::transfer::Transfer;
     use crate::material::Material;
     use crate::model::{FieldModel, FieldModelSetup};
-    use crate::space::Order;
+    use crate::space::{ElementFamily, Order};
 
     fn unknowns(
         mesh: &Mesh,
@@ -119,8 +119,9 @@ mod tests {
         conductor: &[ElementId],
         boundaries: &[(String, Boundary)],
     ) -> (Space, Unknowns) {
-        let space = Space::new(mesh.topology(), order);
-        let unknowns = Unknowns::new(mesh, &space, conductor, boundaries).expect("conditions that agree");
+        let space = Space::new(mesh.topology(), ElementFamily::Nodal, order);
+        let unknowns =
+            Unknowns::new(mesh, &space, conductor, &[], boundaries).expect("conditions that agree");
         (space, unknowns)
     }
 

@@ -6,6 +6,9 @@
 //! symmetry plane or a material's face, where all elements lie on one side and a mean of their `B` would not
 //! (polynomial-preserving recovery; Zhang and Naga, SIAM J. Sci. Comput. 26 (2005) 1192). Across a material boundary
 //! the true field jumps, so only elements of the probed element's material take part.
+//!
+//! Edge elements have no potentials at nodes, and their gauge leaves `A` rough: there a polynomial is fitted to `B` itself at
+//! the points of elements where it is best (Zienkiewicz and Zhu, Int. J. Numer. Methods Eng. 33 (1992) 1331).
 
 use std::collections::BTreeSet;
 
@@ -16,10 +19,13 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
+use crate::element::quadrature::Node;
+use crate::element::tabulated::Rule;
 use crate::element::volume::curl;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+use crate::space::{ElementFamily, Order};
 
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
@@ -43,8 +49,8 @@ const DEPENDENT: f64 = 1e-3;
 
 /// The recovered flux density [T] at a point of an element.
 ///
-/// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares
-/// with a polynomial of one degree more than the elements'; a further layer of elements where these do not determine it.
+/// `A` at the nodes of all elements that share a vertex with `element` and have its material (of edge elements `B` in them),
+/// fitted by least squares with a polynomial of one degree more than that of the elements; a further layer of elements where these do not determine it.
 /// In a part of the material too small for any fit, the element's own mean.
 pub fn recovered_flux_density(
     solution: &FieldSolution,
@@ -57,7 +63,6 @@ pub fn recovered_flux_density(
     // A magnet's face is one even where its permeability is that of air.
     let material =
         |e: ElementId| (model.materials()[topology.region_of()[e.index()].index()], model.remanence_of(e));
-    let space = model.space();
     let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {
         elements = elements
@@ -67,28 +72,74 @@ pub fn recovered_flux_density(
             .copied()
             .filter(|&e| material(e) == material(element))
             .collect();
-        let nodes: BTreeSet<NodeId> = elements.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
-        let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
-        let values: Vec<Complex3> = nodes
-            .iter()
-            .map(|&n| {
-                let [x, y, z, _] = solution.potentials(model, n);
-                [x, y, z]
-            })
-            .collect();
-        if let Some(gradient) = fitted_gradient(space.order().degree() + 1, &offsets, &values) {
-            return curl(&gradient);
+        let fitted = match model.space().family() {
+            ElementFamily::Nodal => fitted_curl(solution, model, mesh, &elements, point),
+            ElementFamily::Edge => fitted_mean(solution, model, mesh, &elements, point),
+        };
+        if let Some(flux_density) = fitted {
+            return flux_density;
         }
     }
     solution.flux_density(model, mesh, element)
 }
 
-/// The gradient at the origin, `gradient[d][j] = ∂_d A_j`, of the polynomial of a degree fitted to values at points.
+/// The curl at a point of the polynomial fitted to the potentials at the nodes of some elements.
+fn fitted_curl(
+    solution: &FieldSolution,
+    model: &FieldModel,
+    mesh: &Mesh,
+    elements: &BTreeSet<ElementId>,
+    point: Point,
+) -> Option<Complex3> {
+    let space = model.space();
+    let nodes: BTreeSet<NodeId> = elements.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
+    let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
+    let potential = |&n: &NodeId| {
+        let [x, y, z, _] = solution.potentials(model, n);
+        [x, y, z]
+    };
+    let values: Vec<Complex3> = nodes.iter().map(potential).collect();
+    Some(curl(&fit(space.order().degree() + 1, &offsets, &values)?.gradient))
+}
+
+/// The value at a point of the polynomial fitted to the flux densities in some elements, taken where they are of one order
+/// better: at the centroid, or at the four points of the rule of degree 2.
+fn fitted_mean(
+    solution: &FieldSolution,
+    model: &FieldModel,
+    mesh: &Mesh,
+    elements: &BTreeSet<ElementId>,
+    point: Point,
+) -> Option<Complex3> {
+    let order = model.space().order();
+    let rule: &[Node] = match order {
+        Order::Linear => Rule::Centroid.nodes(),
+        Order::Quadratic => Rule::Degree2.nodes(),
+    };
+    let samples = || elements.iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda)));
+    let place = |(e, lambda): (ElementId, &[f64; 4])| -> Point {
+        let vertices = mesh.vertices(e);
+        std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>() - point[d])
+    };
+    let offsets: Vec<Point> = samples().map(place).collect();
+    let values: Vec<Complex3> =
+        samples().map(|(e, lambda)| solution.at(model, mesh, e, lambda).flux_density).collect();
+    Some(fit(order.degree(), &offsets, &values)?.value)
+}
+
+/// A fitted polynomial at the origin.
+struct Fit {
+    value: Complex3,
+    /// `∂_d A_j`, index `[d][j]`.
+    gradient: [Complex3; 3],
+}
+
+/// The polynomial of a degree fitted to values at points, at the origin.
 ///
 /// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), coordinates
 /// scaled to the extent of the points in each direction; the weight `exp(−|ξ|²)` in these coordinates lets the nearest
 /// nodes count most. `None` where the points do not determine the polynomial.
-fn fitted_gradient(degree: usize, points: &[Point], values: &[Complex3]) -> Option<[Complex3; 3]> {
+fn fit(degree: usize, points: &[Point], values: &[Complex3]) -> Option<Fit> {
     let monomials = monomials(degree);
     let terms = monomials.len();
     if points.len() < terms {
@@ -143,7 +194,8 @@ fn fitted_gradient(degree: usize, points: &[Point], values: &[Complex3]) -> Opti
             right[k][d] /= upper[k][k];
         }
     }
-    Some(std::array::from_fn(|d| right[1 + d].map(|c| c / scale[d])))
+    let gradient = std::array::from_fn(|d| right[1 + d].map(|c| c / scale[d]));
+    Some(Fit { value: right[0], gradient })
 }
 
 /// The recovered flux density [T] at the points of a probe.
@@ -194,7 +246,7 @@ mod tests {
         };
         let points = grid([3, 3, 3]);
         let values: Vec<Complex3> = points.iter().map(|&p| field(p)).collect();
-        let gradient = fitted_gradient(2, &points, &values).expect("27 points determine a quadratic");
+        let gradient = fit(2, &points, &values).expect("27 points determine a quadratic").gradient;
         let exact = [[2.0, -5.0], [-1.0, -1.0], [70.0, 70.0]];
         for d in 0..3 {
             // Values of order 1 on a patch of 0.2 mm: rounding of 1e-16 / 2e-4, a hundredfold.
@@ -208,7 +260,7 @@ mod tests {
         let constant = |n: usize| vec![[c64::from(1.0); 3]; n];
         for lines in [[3, 3, 2], [3, 3, 1], [9, 2, 1]] {
             let points = grid(lines);
-            assert!(fitted_gradient(2, &points, &constant(points.len())).is_none(), "{lines:?}");
+            assert!(fit(2, &points, &constant(points.len())).is_none(), "{lines:?}");
         }
     }
 }

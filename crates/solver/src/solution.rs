@@ -1,18 +1,16 @@
 //! The solved field: potentials at nodes; B, J and loss in elements.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Tet4, volume};
+use fluxmorph_geometry::tet4::volume;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
-use crate::element::lagrange::Lagrange;
-use crate::element::point::PointField;
-use crate::element::tabulated::{Rule, Tabulated};
-use crate::element::volume::NodalField;
-use crate::element::{Complex3, impedance};
+use crate::element::Complex3;
+use crate::element::edge::FieldPoint;
+use crate::family::Local;
 use crate::linear::LinearSolverReport;
 use crate::model::FieldModel;
-use crate::space::{Basis, Order};
+use crate::space::ElementFamily;
 use crate::surface::SurfaceTerm;
 
 /// Whose potentials a solution holds.
@@ -56,7 +54,8 @@ impl FieldSolution {
         self.report
     }
 
-    /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at a node of the space; ψ is zero outside conductors.
+    /// The coefficients of a carrier: of a node `A_x, A_y, A_z` [T m] and `ψ` [T m²], ψ zero outside conductors; of an edge
+    /// or face those of its functions.
     #[inline]
     pub fn potentials(&self, model: &FieldModel, node: NodeId) -> [c64; 4] {
         let unknowns = model.unknowns();
@@ -71,56 +70,54 @@ impl FieldSolution {
         potentials
     }
 
-    /// Potentials at the given nodes.
+    /// Coefficients of some carriers.
     #[inline]
-    pub(crate) fn nodal_field<const N: usize>(
-        &self,
-        model: &FieldModel,
-        nodes: [NodeId; N],
-    ) -> NodalField<N> {
-        NodalField::new(nodes.map(|n| self.potentials(model, n)))
+    pub(crate) fn local(&self, model: &FieldModel, carriers: &[NodeId]) -> Local {
+        Local::new(carriers.len(), |a| self.potentials(model, carriers[a]))
     }
 
-    /// Potentials at the nodes of an element.
-    ///
-    /// # Panics
-    /// If the elements of the model's space have another number of nodes.
+    /// Coefficients of an element.
     #[inline]
-    pub(crate) fn element_field<const N: usize>(&self, model: &FieldModel, e: ElementId) -> NodalField<N> {
-        let nodes = model.space().nodes_of(e);
-        self.nodal_field(model, nodes.try_into().expect("the caller knows the order of the space"))
+    pub(crate) fn element(&self, model: &FieldModel, e: ElementId) -> Local {
+        self.local(model, model.space().nodes_of(e))
     }
 
-    /// The field at a point of an element, given by the shape functions there.
+    /// The field at barycentric coordinates in an element.
     #[inline]
-    pub fn at(&self, model: &FieldModel, basis: &Basis) -> PointField {
-        let mut field = PointField::default();
-        for (node, value, gradient) in basis.iter() {
-            let [x, y, z, psi] = self.potentials(model, node);
-            field.add(value, gradient, [x, y, z], psi);
+    pub fn at(&self, model: &FieldModel, mesh: &Mesh, e: ElementId, lambda: &[f64; 4]) -> FieldPoint {
+        let space = model.space();
+        space.elements().field(&space.cell(mesh, e), lambda, self.element(model, e).values())
+    }
+
+    /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at nodes of the mesh. Edge elements do not tell `A` from `∇ψ`, and are
+    /// discontinuous across their faces: theirs is the mean of `A + ∇ψ` over the elements around, and ψ is zero.
+    pub fn nodal_potentials(&self, model: &FieldModel, mesh: &Mesh, nodes: &[NodeId]) -> Vec<[c64; 4]> {
+        let of_edges = |&node: &NodeId| {
+            let around = model.topology().elements_around(node);
+            let mut mean = [c64::default(); 4];
+            for &e in around {
+                let is_node = model.topology().tet(e).map(|n| f64::from(u8::from(n == node)));
+                let at = self.at(model, mesh, e, &is_node).vector_potential;
+                (0..3).for_each(|d| mean[d] += at[d] / around.len() as f64);
+            }
+            mean
+        };
+        match model.space().family() {
+            ElementFamily::Nodal => nodes.par_iter().map(|&n| self.potentials(model, n)).collect(),
+            ElementFamily::Edge => nodes.par_iter().map(of_edges).collect(),
         }
-        field
     }
 
     /// The mean of `B = curl A` [T] over an element; of linear elements, the constant.
     #[inline]
     pub fn flux_density(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> Complex3 {
-        self.at_centroid(model, mesh, e).flux_density()
+        self.at_centroid(model, mesh, e).flux_density
     }
 
     #[inline]
-    fn at_centroid(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> PointField {
-        let tet = Tet4::new(mesh.vertices(e));
-        match model.space().order() {
-            Order::Linear => {
-                let table = &Lagrange::<4, 4>::tet().at(Rule::Centroid)[0];
-                PointField::tabulated(table, &tet, &self.element_field(model, e))
-            }
-            Order::Quadratic => {
-                let table = &Lagrange::<10, 4>::tet().at(Rule::Centroid)[0];
-                PointField::tabulated(table, &tet, &self.element_field(model, e))
-            }
-        }
+    fn at_centroid(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> FieldPoint {
+        let space = model.space();
+        space.elements().at_centroid(&space.cell(mesh, e), self.element(model, e).values())
     }
 
     /// `B` [T] in every element, shape `(n_tets, 3)`.
@@ -157,7 +154,7 @@ impl FieldSolution {
                 if eddy == c64::default() {
                     return [c64::default(); 3];
                 }
-                self.at_centroid(model, mesh, e).electric_potential().map(|v| -eddy * v)
+                self.at_centroid(model, mesh, e).electric_potential.map(|v| -eddy * v)
             })
             .collect()
     }
@@ -177,15 +174,9 @@ impl FieldSolution {
         if eddy == c64::default() {
             return 0.0;
         }
-        let tet = Tet4::new(mesh.vertices(e));
-        let mean_square = match model.space().order() {
-            Order::Linear => {
-                mean_square(Lagrange::<4, 4>::tet().at(Rule::Degree2), &tet, &self.element_field(model, e))
-            }
-            Order::Quadratic => {
-                mean_square(Lagrange::<10, 4>::tet().at(Rule::Degree5), &tet, &self.element_field(model, e))
-            }
-        };
+        let space = model.space();
+        let field = self.element(model, e);
+        let mean_square = space.elements().mean_square(&space.cell(mesh, e), field.values());
         0.5 * model.angular_frequency() * eddy.im * mean_square
     }
 
@@ -208,23 +199,11 @@ impl FieldSolution {
         for (nodes, term) in model.surface() {
             if let SurfaceTerm::Impedance(coefficient, index) = term {
                 let vertices = nodes.map(|n| mesh.point(n));
-                let omega = model.angular_frequency();
-                by_surface[index] += match model.space().order() {
-                    Order::Linear => impedance::loss(
-                        Lagrange::<3, 3>::triangle(),
-                        vertices,
-                        coefficient,
-                        omega,
-                        &self.nodal_field(model, nodes).vector_potential,
-                    ),
-                    Order::Quadratic => impedance::loss(
-                        Lagrange::<6, 3>::triangle(),
-                        vertices,
-                        coefficient,
-                        omega,
-                        &self.nodal_field(model, model.space().quadratic_triangle(nodes)).vector_potential,
-                    ),
-                };
+                let field = self.local(model, &model.space().triangle(nodes));
+                // ½ω²Re(1/Zs), and the real part ωRe(1/Zs) of the surface coefficient.
+                let factor = 0.5 * model.angular_frequency() * coefficient.re;
+                by_surface[index] +=
+                    model.space().elements().surface_loss(vertices, factor, field.values()).value;
             }
         }
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));
@@ -234,13 +213,4 @@ impl FieldSolution {
 
 fn all(model: &FieldModel) -> Vec<ElementId> {
     model.topology().elements().collect()
-}
-
-/// The mean of `|A + ∇ψ|²` over an element [T² m²] by a rule.
-fn mean_square<const N: usize>(table: &[Tabulated<N>], tet: &Tet4, nodal: &NodalField<N>) -> f64 {
-    let square = |at: &Tabulated<N>| {
-        let potential = PointField::tabulated(at, tet, nodal).electric_potential();
-        at.share * potential.iter().map(|c| c.norm_sqr()).sum::<f64>()
-    };
-    table.iter().map(square).sum()
 }

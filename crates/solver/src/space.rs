@@ -1,23 +1,28 @@
-//! The nodes that carry unknowns: the mesh's vertices and, for quadratic elements, the midpoints of its edges.
+//! What carries the unknowns: of nodal elements the mesh's vertices and, of second order, its edges' midpoints; of edge
+//! elements its edges and, of second order, its faces.
 //!
-//! A space follows from topology and order alone. Its nodes are numbered vertices first, with the mesh's own numbers, then
-//! the edges in ascending order of their two vertices; geometry stays linear, so a midpoint lies where its vertices put
-//! it. [`Basis`] gives the shape functions of an element at a point, whatever the order.
+//! A space follows from topology, family and order alone. Carriers have numbers of their own, written as [`NodeId`] since
+//! assembly treats all alike: vertices first, with the mesh's own numbers, then the edges in ascending order of their two
+//! vertices, then the faces likewise; each family has those that it needs. Geometry stays linear, so a midpoint lies where
+//! its vertices put it. Does not live here: which carrier has which unknown ([`crate::unknowns`]), and what the functions
+//! are ([`crate::family`]).
 
 use fluxmorph_geometry::tet4::{EDGES, Point, Tet4};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use rayon::prelude::*;
 
-use crate::element::lagrange::{Lagrange, TRIANGLE_EDGES};
-use crate::element::point;
+use crate::element::edge::functions::{ASCENDING_FACES, ASCENDING_TRIANGLE_EDGES};
+use crate::element::lagrange::TRIANGLE_EDGES;
+use crate::family::{self, Cell, EachFunction, Family};
 
-/// Polynomial order of `A` and `ψ` in an element.
+/// Polynomial order of an element.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// Linear: `B` is constant in an element.
+    /// Linear potentials: `B` is constant in an element.
     #[default]
     Linear,
-    /// Quadratic: `B` is linear in an element.
+    /// Quadratic ones: `B` is linear in an element.
     Quadratic,
 }
 
@@ -31,145 +36,183 @@ impl Order {
     }
 }
 
-/// Nodes with unknowns, and those of each element.
+/// What is continuous between elements.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ElementFamily {
+    /// All components of `A`, and `ψ`, at nodes (Lagrange).
+    #[default]
+    Nodal,
+    /// The tangential components of `A + ∇ψ`, along edges (Nédélec).
+    Edge,
+}
+
+/// Carriers of unknowns, and those of each element.
 #[derive(Clone, Debug)]
 pub struct Space {
+    family: ElementFamily,
+    order: Order,
     vertex_count: usize,
-    nodes: Nodes,
+    /// Those that carry unknowns, ascending.
+    edges: Vec<[NodeId; 2]>,
+    /// Those that carry unknowns, ascending.
+    faces: Vec<[NodeId; 3]>,
+    tets: Carriers,
+    /// Place of each vertex in ascending order, of edge elements.
+    ascending: Vec<[u8; 4]>,
 }
 
+/// Carriers of every element.
 #[derive(Clone, Debug)]
-enum Nodes {
-    Linear(Vec<[NodeId; 4]>),
-    Quadratic { tets: Vec<[NodeId; 10]>, edges: Vec<[NodeId; 2]> },
-}
-
-/// Most nodes of an element.
-const MOST: usize = 10;
-
-/// The shape functions of one element at one point.
-#[derive(Clone, Copy, Debug)]
-pub struct Basis {
-    count: usize,
-    nodes: [NodeId; MOST],
-    values: [f64; MOST],
-    gradients: [Point; MOST],
-}
-
-impl Basis {
-    /// Node, `N_a` and `∇N_a` [1/m] of every shape function.
-    #[inline]
-    pub fn iter(&self) -> impl Iterator<Item = (NodeId, f64, Point)> + '_ {
-        (0..self.count).map(|a| (self.nodes[a], self.values[a], self.gradients[a]))
-    }
+pub(crate) enum Carriers {
+    /// Vertices.
+    Four(Vec<[NodeId; 4]>),
+    /// Edges.
+    Six(Vec<[NodeId; 6]>),
+    /// Vertices and edges, or edges and faces.
+    Ten(Vec<[NodeId; 10]>),
 }
 
 impl Space {
-    /// The nodes of a topology.
-    pub fn new(topology: &Topology, order: Order) -> Self {
+    /// The carriers of a topology.
+    pub fn new(topology: &Topology, family: ElementFamily, order: Order) -> Self {
         let vertex_count = topology.node_count();
-        let nodes = match order {
-            Order::Linear => Nodes::Linear(topology.tets().to_vec()),
-            Order::Quadratic => {
-                let mut edges: Vec<[NodeId; 2]> =
-                    topology.tets().par_iter().flat_map_iter(|tet| EDGES.map(|e| edge(tet, e))).collect();
-                edges.par_sort_unstable();
-                edges.dedup();
-                let tets = topology
-                    .tets()
-                    .par_iter()
-                    .map(|tet| {
-                        std::array::from_fn(|a| match a.checked_sub(4) {
-                            None => tet[a],
-                            Some(e) => midpoint(vertex_count, &edges, edge(tet, EDGES[e])),
-                        })
-                    })
-                    .collect();
-                Nodes::Quadratic { tets, edges }
-            }
+        let tets = topology.tets();
+        let of_edges = family == ElementFamily::Edge;
+        let edges = match (family, order) {
+            (ElementFamily::Nodal, Order::Linear) => Vec::new(),
+            _ => collect(tets, |tet| EDGES.map(|e| edge(tet, e))),
         };
-        Self { vertex_count, nodes }
+        let faces = match (family, order) {
+            (ElementFamily::Edge, Order::Quadratic) => {
+                collect(tets, |tet| ASCENDING_FACES.map(|face| face_key(face.map(|v| tet[v]))))
+            }
+            _ => Vec::new(),
+        };
+        let mut space = Self {
+            family,
+            order,
+            vertex_count,
+            edges,
+            faces,
+            tets: Carriers::Four(Vec::new()),
+            ascending: if of_edges { tets.par_iter().map(ascending).collect() } else { Vec::new() },
+        };
+        space.tets = match (family, order) {
+            (ElementFamily::Nodal, Order::Linear) => Carriers::Four(tets.to_vec()),
+            (ElementFamily::Nodal, Order::Quadratic) => Carriers::Ten(each(tets, |tet, a| {
+                a.checked_sub(4).map_or_else(|| tet[a], |e| space.carrier_of_edge(edge(tet, EDGES[e])))
+            })),
+            (ElementFamily::Edge, Order::Linear) => {
+                Carriers::Six(each(tets, |tet, a| space.carrier_of_edge(edge(&sorted(tet), EDGES[a]))))
+            }
+            (ElementFamily::Edge, Order::Quadratic) => Carriers::Ten(each(tets, |tet, a| {
+                let tet = sorted(tet);
+                match a.checked_sub(6) {
+                    None => space.carrier_of_edge(edge(&tet, EDGES[a])),
+                    Some(f) => space.carrier_of_face(ASCENDING_FACES[f].map(|v| tet[v])),
+                }
+            })),
+        };
+        space
+    }
+
+    /// What is continuous between its elements.
+    pub fn family(&self) -> ElementFamily {
+        self.family
     }
 
     /// The order of its elements.
     pub fn order(&self) -> Order {
-        match self.nodes {
-            Nodes::Linear(_) => Order::Linear,
-            Nodes::Quadratic { .. } => Order::Quadratic,
-        }
+        self.order
     }
 
-    /// Number of nodes.
+    /// Number of carriers.
     pub fn node_count(&self) -> usize {
-        self.vertex_count + self.edges().len()
+        self.first_edge() + self.edges.len() + self.faces.len()
     }
 
     /// Number of elements.
     pub fn element_count(&self) -> usize {
-        match &self.nodes {
-            Nodes::Linear(tets) => tets.len(),
-            Nodes::Quadratic { tets, .. } => tets.len(),
+        match &self.tets {
+            Carriers::Four(tets) => tets.len(),
+            Carriers::Six(tets) => tets.len(),
+            Carriers::Ten(tets) => tets.len(),
         }
     }
 
-    /// The vertices of every edge that carries a node.
+    /// The vertices of every edge that is a carrier, in the order of the carriers.
     pub fn edges(&self) -> &[[NodeId; 2]] {
-        match &self.nodes {
-            Nodes::Linear(_) => &[],
-            Nodes::Quadratic { edges, .. } => edges,
-        }
+        &self.edges
     }
 
-    /// Nodes of an element: vertices, then midpoints in the order of [`EDGES`].
+    /// Carriers of an element, in the order of its functions: vertices, then edges in the order of [`EDGES`], then faces; of
+    /// edge elements with the vertices in ascending order.
     #[inline]
     pub fn nodes_of(&self, e: ElementId) -> &[NodeId] {
-        match &self.nodes {
-            Nodes::Linear(tets) => &tets[e.index()],
-            Nodes::Quadratic { tets, .. } => &tets[e.index()],
+        match &self.tets {
+            Carriers::Four(tets) => &tets[e.index()],
+            Carriers::Six(tets) => &tets[e.index()],
+            Carriers::Ten(tets) => &tets[e.index()],
         }
     }
 
-    /// Nodes of all linear elements; `None` for another order.
-    pub fn linear_tets(&self) -> Option<&[[NodeId; 4]]> {
-        match &self.nodes {
-            Nodes::Linear(tets) => Some(tets),
-            Nodes::Quadratic { .. } => None,
-        }
+    /// Carriers of all elements.
+    pub(crate) fn carriers(&self) -> &Carriers {
+        &self.tets
     }
 
-    /// Nodes of all quadratic elements; `None` for another order.
-    pub fn quadratic_tets(&self) -> Option<&[[NodeId; 10]]> {
-        match &self.nodes {
-            Nodes::Linear(_) => None,
-            Nodes::Quadratic { tets, .. } => Some(tets),
-        }
-    }
-
-    /// Nodes of a face: vertices, then the midpoints of the edges (0, 1), (1, 2), (2, 0).
+    /// The carrier of an edge, by its ascending vertices.
     ///
     /// # Panics
-    /// If the triangle is not a face of the mesh.
-    pub fn quadratic_triangle(&self, triangle: [NodeId; 3]) -> [NodeId; 6] {
-        std::array::from_fn(|a| match a.checked_sub(3) {
-            None => triangle[a],
-            Some(e) => midpoint(self.vertex_count, self.edges(), edge(&triangle, TRIANGLE_EDGES[e])),
-        })
+    /// If there is no such edge.
+    pub fn carrier_of_edge(&self, edge: [NodeId; 2]) -> NodeId {
+        let place = self.edges.binary_search(&edge).expect("the edge of an element is an edge of the mesh");
+        NodeId::new(self.first_edge() + place)
     }
 
-    /// Nodes of a face.
+    fn carrier_of_face(&self, face: [NodeId; 3]) -> NodeId {
+        let place = self.faces.binary_search(&face).expect("the face of an element is a face of the mesh");
+        NodeId::new(self.first_edge() + self.edges.len() + place)
+    }
+
+    fn first_edge(&self) -> usize {
+        match self.family {
+            ElementFamily::Nodal => self.vertex_count,
+            ElementFamily::Edge => 0,
+        }
+    }
+
+    /// Carriers of a face in the order of its functions: of nodal elements vertices and the edges (0, 1), (1, 2), (2, 0); of
+    /// edge elements, with the vertices in ascending order, the edges (0, 1), (0, 2), (1, 2) and the face.
     ///
     /// # Panics
     /// If the triangle is not a face of the mesh.
     pub fn triangle(&self, triangle: [NodeId; 3]) -> Vec<NodeId> {
-        match self.nodes {
-            Nodes::Linear(_) => triangle.to_vec(),
-            Nodes::Quadratic { .. } => self.quadratic_triangle(triangle).to_vec(),
+        let edges =
+            |of: [NodeId; 3], local: [[usize; 2]; 3]| local.map(|e| self.carrier_of_edge(edge(&of, e)));
+        let ascending = face_key(triangle);
+        let mut carriers = Vec::with_capacity(6);
+        match (self.family, self.order) {
+            (ElementFamily::Nodal, Order::Linear) => carriers.extend(triangle),
+            (ElementFamily::Nodal, Order::Quadratic) => {
+                carriers.extend(triangle);
+                carriers.extend(edges(triangle, TRIANGLE_EDGES));
+            }
+            (ElementFamily::Edge, order) => {
+                carriers.extend(edges(ascending, ASCENDING_TRIANGLE_EDGES));
+                carriers.extend((order == Order::Quadratic).then(|| self.carrier_of_face(ascending)));
+            }
         }
+        carriers
     }
 
-    /// Where a node lies [m].
+    /// Where a carrier lies [m]: a vertex, the middle of an edge, the centre of a face.
     #[inline]
     pub fn position(&self, mesh: &Mesh, node: NodeId) -> Point {
+        let face = node.index().checked_sub(self.first_edge() + self.edges.len());
+        if let Some(face) = face {
+            return fluxmorph_geometry::tet4::centroid(self.faces[face].map(|n| mesh.point(n)));
+        }
         match self.vertices_of(node) {
             [a, b] if a == b => mesh.point(a),
             [a, b] => {
@@ -179,53 +222,71 @@ impl Space {
         }
     }
 
-    /// The vertices that carry a node: a vertex twice, or the two ends of an edge.
+    /// Vertices of a carrier: a vertex twice, the two ends of an edge, or the first two vertices of a face, whose edges are
+    /// carriers as well.
     #[inline]
     pub fn vertices_of(&self, node: NodeId) -> [NodeId; 2] {
-        match node.index().checked_sub(self.vertex_count) {
-            None => [node; 2],
-            Some(edge) => self.edges()[edge],
+        let Some(edge) = node.index().checked_sub(self.first_edge()) else { return [node; 2] };
+        match edge.checked_sub(self.edges.len()) {
+            None => self.edges[edge],
+            Some(face) => [self.faces[face][0], self.faces[face][1]],
         }
     }
 
-    /// The shape functions of an element at barycentric coordinates.
+    /// The geometry of an element, as its functions need it.
     #[inline]
-    pub fn basis(&self, e: ElementId, tet: &Tet4, lambda: &[f64; 4]) -> Basis {
-        fn fill<const N: usize>(
-            shape: &Lagrange<N, 4>,
-            element: &[NodeId; N],
-            tet: &Tet4,
-            lambda: &[f64; 4],
-        ) -> Basis {
-            let mut basis = Basis {
-                count: N,
-                nodes: [NodeId(0); MOST],
-                values: [0.0; MOST],
-                gradients: [[0.0; 3]; MOST],
-            };
-            for a in 0..N {
-                basis.nodes[a] = element[a];
-                basis.values[a] = shape.value(a, lambda);
-                basis.gradients[a] = point::gradient(shape, tet, lambda, a);
-            }
-            basis
-        }
-        match &self.nodes {
-            Nodes::Linear(tets) => fill(Lagrange::<4, 4>::tet(), &tets[e.index()], tet, lambda),
-            Nodes::Quadratic { tets, .. } => fill(Lagrange::<10, 4>::tet(), &tets[e.index()], tet, lambda),
-        }
+    pub fn cell(&self, mesh: &Mesh, e: ElementId) -> Cell {
+        let order = self.ascending.get(e.index()).copied().unwrap_or([0, 1, 2, 3]);
+        Cell { tet: Tet4::new(mesh.vertices(e)), order }
     }
+
+    /// Calls back with every function of an element at barycentric coordinates: local carrier, component, value of what it
+    /// adds to `A + ∇ψ`, and its curl.
+    pub fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>) {
+        self.elements().functions(cell, lambda, each);
+    }
+
+    /// What the elements make of coefficients.
+    pub(crate) fn elements(&self) -> &'static dyn Family {
+        family::of(self.family, self.order)
+    }
+}
+
+/// What some entities of all elements are called, each once, ascending.
+fn collect<const K: usize, const V: usize>(
+    tets: &[[NodeId; 4]],
+    of: impl Fn(&[NodeId; 4]) -> [[NodeId; V]; K] + Sync,
+) -> Vec<[NodeId; V]> {
+    let mut all: Vec<[NodeId; V]> = tets.par_iter().flat_map_iter(&of).collect();
+    all.par_sort_unstable();
+    all.dedup();
+    all
+}
+
+/// `N` carriers of every element.
+fn each<const N: usize>(
+    tets: &[[NodeId; 4]],
+    of: impl Fn(&[NodeId; 4], usize) -> NodeId + Sync,
+) -> Vec<[NodeId; N]> {
+    tets.par_iter().map(|tet| std::array::from_fn(|a| of(tet, a))).collect()
+}
+
+fn sorted(tet: &[NodeId; 4]) -> [NodeId; 4] {
+    let mut sorted = *tet;
+    sorted.sort_unstable();
+    sorted
+}
+
+/// Place of each vertex in ascending order.
+fn ascending(tet: &[NodeId; 4]) -> [u8; 4] {
+    let mut places = [0, 1, 2, 3];
+    places.sort_unstable_by_key(|&place| tet[usize::from(place)]);
+    places
 }
 
 /// The vertices of a local edge, ascending.
 fn edge<const N: usize>(nodes: &[NodeId; N], [i, j]: [usize; 2]) -> [NodeId; 2] {
     [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])]
-}
-
-fn midpoint(vertex_count: usize, edges: &[[NodeId; 2]], edge: [NodeId; 2]) -> NodeId {
-    let position =
-        edges.binary_search(&edge).expect("the edge of an element or a face is an edge of the mesh");
-    NodeId::new(vertex_count + position)
 }
 
 #[cfg(test)]
@@ -234,19 +295,23 @@ mod tests {
     use fluxmorph_geometry::generate::{BlockParameters, block};
 
     #[test]
-    fn a_block_has_as_many_edges_as_eulers_formula_says() {
+    fn a_block_has_as_many_edges_and_faces_as_eulers_formula_says() {
         let mesh = block(&BlockParameters { cells: [3, 2, 2], ..BlockParameters::default() }).unwrap();
         let topology = mesh.topology();
-        let space = Space::new(topology, Order::Quadratic);
         // V − E + F − T = 1 for a ball; every tet has four faces, of which the outer ones are counted once.
         let faces = (4 * topology.tets().len() + topology.facets().len()) / 2;
         let edges = topology.node_count() + faces - topology.tets().len() - 1;
-        assert_eq!(space.edges().len(), edges);
-        assert_eq!(space.node_count(), topology.node_count() + edges);
-        for facet in topology.facets() {
-            let nodes = space.quadratic_triangle(facet.nodes);
-            let inside = space.nodes_of(facet.inside);
-            assert!(nodes.iter().all(|n| inside.contains(n)), "a face has the midpoints of its element");
+        let of = |family| Space::new(topology, family, Order::Quadratic);
+        let (nodal, edge) = (of(ElementFamily::Nodal), of(ElementFamily::Edge));
+        assert_eq!(nodal.edges().len(), edges);
+        assert_eq!(nodal.node_count(), topology.node_count() + edges);
+        assert_eq!(edge.node_count(), edges + faces);
+        for space in [nodal, edge] {
+            for facet in topology.facets() {
+                let carriers = space.triangle(facet.nodes);
+                let inside = space.nodes_of(facet.inside);
+                assert!(carriers.iter().all(|n| inside.contains(n)), "a face has those of its element");
+            }
         }
     }
 }

@@ -3,17 +3,19 @@
 use std::collections::HashSet;
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
-use fluxmorph_geometry::tet4::{area_vector, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
 use crate::element::impedance::{self, ImpedanceTriangle};
 use crate::element::interface::InterfaceTriangle;
+use crate::element::lagrange::Lagrange;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
 use crate::material::Material;
+use crate::space::ElementFamily;
 
 /// A conductor that is not meshed but replaced by its impedance surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +43,19 @@ pub(crate) enum SurfaceMatrix<const N: usize> {
     Impedance(ImpedanceTriangle<N>),
 }
 
+impl<const N: usize> SurfaceMatrix<N> {
+    /// The matrix of a nodal triangle.
+    #[inline]
+    pub(crate) fn new(shape: &'static Lagrange<N, 3>, vertices: [Point; 3], term: SurfaceTerm) -> Self {
+        match term {
+            SurfaceTerm::Interface(jump) => Self::Interface(InterfaceTriangle::new(shape, vertices, jump)),
+            SurfaceTerm::Impedance(coefficient, _) => {
+                Self::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient))
+            }
+        }
+    }
+}
+
 impl<const N: usize> LocalMatrix<c64, N, 4> for SurfaceMatrix<N> {
     #[inline]
     fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
@@ -59,32 +74,25 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Triangles at which ν jumps, natural and curved outer faces, and impedance surfaces.
+    /// Of nodal elements the triangles at which ν jumps, natural and curved outer faces; of all, impedance surfaces.
     ///
-    /// `coefficients` by region.
+    /// `coefficients` by region. Nodes are in ascending order for edge elements.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::Parameter`] for an impedance surface without skin
     /// depth.
     pub(crate) fn new(
         mesh: &Mesh,
+        family: ElementFamily,
         coefficients: &[Coefficients],
         boundaries: &[(String, Boundary)],
         conductors: &[Conductor],
         angular_frequency: f64,
     ) -> Result<Self, SolverError> {
-        let topology = mesh.topology();
-        let needless = faces_without_term(mesh, boundaries)?;
-        let reluctivity = |e: ElementId| coefficients[topology.region_of()[e.index()].index()].reluctivity;
-        let mut surfaces = Self::default();
-        for facet in topology.facets() {
-            let outside = facet.outside.map_or(0.0, reluctivity);
-            let jump = reluctivity(facet.inside) - outside;
-            if jump != 0.0 && !(facet.outside.is_none() && needless.contains(&face_key(facet.nodes))) {
-                surfaces.triangles.push(facet.nodes);
-                surfaces.terms.push(SurfaceTerm::Interface(jump));
-            }
-        }
+        let mut surfaces = match family {
+            ElementFamily::Nodal => Self::interfaces(mesh, coefficients, boundaries)?,
+            ElementFamily::Edge => Self::default(),
+        };
         for (index, conductor) in conductors.iter().enumerate() {
             let Some(skin_depth) = conductor.material.skin_depth(angular_frequency) else {
                 return Err(SolverError::Parameter {
@@ -99,8 +107,32 @@ impl Surfaces {
             let conductivity = conductor.material.conductivity;
             let coefficient = impedance::surface_coefficient(angular_frequency, conductivity, skin_depth);
             for triangle in &conductor.surface {
-                surfaces.triangles.push(*triangle);
+                surfaces.triangles.push(match family {
+                    ElementFamily::Nodal => *triangle,
+                    ElementFamily::Edge => face_key(*triangle),
+                });
                 surfaces.terms.push(SurfaceTerm::Impedance(coefficient, index));
+            }
+        }
+        Ok(surfaces)
+    }
+
+    /// Triangles at which ν jumps, natural and curved outer faces.
+    fn interfaces(
+        mesh: &Mesh,
+        coefficients: &[Coefficients],
+        boundaries: &[(String, Boundary)],
+    ) -> Result<Self, SolverError> {
+        let topology = mesh.topology();
+        let needless = faces_without_term(mesh, boundaries)?;
+        let reluctivity = |e: ElementId| coefficients[topology.region_of()[e.index()].index()].reluctivity;
+        let mut surfaces = Self::default();
+        for facet in topology.facets() {
+            let outside = facet.outside.map_or(0.0, reluctivity);
+            let jump = reluctivity(facet.inside) - outside;
+            if jump != 0.0 && !(facet.outside.is_none() && needless.contains(&face_key(facet.nodes))) {
+                surfaces.triangles.push(facet.nodes);
+                surfaces.terms.push(SurfaceTerm::Interface(jump));
             }
         }
         Ok(surfaces)

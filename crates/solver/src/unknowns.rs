@@ -1,12 +1,18 @@
 //! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors, less what the boundaries fix.
 //!
+//! Of nodal elements:
+//!
 //! * *flux-parallel* surface (B·n = 0): the tangential components of `A` are zero, and `ψ = 0` where the surface cuts a
 //!   conductor, since the current crosses it at right angles;
 //! * *flux-normal* surface (n × H = 0): the normal component of `A` is zero, `ψ` is free;
 //! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
-//! On planes along the axes the unknowns are components of `A`; at the nodes of other conditioned surfaces they are
+//! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors ([`crate::gauge`]),
+//! and the gradients' coefficients in and on conductors; on flux-parallel surfaces and where a field is applied, all that is
+//! tangential is known. Flux-normal is natural.
+//!
+//! On planes along the axes the unknowns of nodal elements are components of `A`; at the nodes of other conditioned surfaces they are
 //! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
@@ -14,14 +20,16 @@ use std::collections::{BTreeMap, HashMap};
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
+use crate::element::edge::functions::{EDGE_GRADIENTS, FACE_GRADIENTS, WHITNEY};
 use crate::error::SolverError;
 use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
-use crate::space::Space;
+use crate::gauge;
+use crate::space::{ElementFamily, Order, Space};
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
@@ -55,12 +63,25 @@ struct AtNode {
 }
 
 impl Unknowns {
-    /// Numbers the unknowns of a space with conducting elements `conductor` and conditions on named surfaces.
+    /// Numbers the unknowns of a space with conducting elements and impedance surfaces, and conditions on named surfaces.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::Conflict`] where an applied field contradicts
     /// another condition.
     pub fn new(
+        mesh: &Mesh,
+        space: &Space,
+        conductor: &[ElementId],
+        impedance: &[[NodeId; 3]],
+        boundaries: &[(String, Boundary)],
+    ) -> Result<Self, SolverError> {
+        match space.family() {
+            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductor, boundaries),
+            ElementFamily::Edge => Self::of_edges(mesh, space, conductor, impedance, boundaries),
+        }
+    }
+
+    fn of_nodes(
         mesh: &Mesh,
         space: &Space,
         conductor: &[ElementId],
@@ -106,6 +127,59 @@ impl Unknowns {
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
         Ok(Self { dofs, grounded, frames, prescribed, planes })
+    }
+
+    fn of_edges(
+        mesh: &Mesh,
+        space: &Space,
+        conductor: &[ElementId],
+        impedance: &[[NodeId; 3]],
+        boundaries: &[(String, Boundary)],
+    ) -> Result<Self, SolverError> {
+        let count = space.node_count();
+        let edges = space.edges();
+        let (mut known, mut prescribed) = (vec![false; count], BTreeMap::new());
+        let along = |carrier: NodeId, potential: Point| -> f64 {
+            let [from, to] = edges[carrier.index()].map(|n| mesh.point(n));
+            dot(potential, sub(to, from))
+        };
+        let at_carriers = conditions(mesh, space, boundaries)?;
+        let applied: Vec<(NodeId, f64, bool)> = at_carriers
+            .iter()
+            .filter(|(carrier, _)| carrier.index() < edges.len())
+            .filter_map(|(&carrier, at)| {
+                let is_zero = at.own.iter().any(|(fix, _)| *fix == Fix::Tangential);
+                Some((carrier, along(carrier, at.potential?), is_zero))
+            })
+            .collect();
+        let largest = applied.iter().map(|(_, value, _)| value.abs()).fold(0.0, f64::max);
+        for (carrier, value, is_zero) in applied {
+            if is_zero && value.abs() > CONFLICT * largest {
+                return Err(SolverError::Conflict { place: space.position(mesh, carrier) });
+            }
+            prescribed.insert(carrier, [if is_zero { 0.0 } else { value }, 0.0, 0.0]);
+        }
+        for (carrier, at) in &at_carriers {
+            known[carrier.index()] = at.psi_zero;
+        }
+        let mut conducts = vec![false; count];
+        conductor.iter().flat_map(|&e| space.nodes_of(e)).for_each(|n| conducts[n.index()] = true);
+        let on_surface = impedance.iter().flat_map(|&triangle| space.triangle(triangle));
+        on_surface.for_each(|n| conducts[n.index()] = true);
+        let branches = gauge::tree(mesh.topology().node_count(), edges, |e| known[e] || conducts[e]);
+        let dofs = DofMap::new(count, |carrier, c| {
+            let i = carrier.index();
+            if known[i] {
+                return false;
+            }
+            match branches.get(i) {
+                Some(&is_branch) if c == WHITNEY => !is_branch,
+                Some(_) => conducts[i] && has_gradient(EDGE_GRADIENTS, space.order(), c),
+                None => c < 2 || conducts[i] && FACE_GRADIENTS >> c & 1 == 1,
+            }
+        });
+        let planes = planes(mesh, boundaries)?;
+        Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes })
     }
 
     /// `A_x, A_y, A_z` and `ψ` at a node out of a vector of unknowns; zero where a component is fixed.
@@ -178,7 +252,26 @@ impl Unknowns {
     }
 }
 
-/// The faces of conditioned surfaces at every node of the space.
+/// Whether an edge has a gradient function of this component.
+fn has_gradient(gradients: u8, order: Order, component: usize) -> bool {
+    gradients >> component & 1 == 1 && (order == Order::Quadratic || component == 2)
+}
+
+/// The axes across conditioned planes, at every vertex on one.
+fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<BTreeMap<NodeId, u8>, SolverError> {
+    let mut planes = BTreeMap::new();
+    for (surface, _) in boundaries {
+        for &triangle in mesh.topology().surface(surface)? {
+            let area = area_vector(triangle.map(|v| mesh.point(v)));
+            if let Some(axis) = axis_of(area.map(|c| c / norm(area))) {
+                triangle.iter().for_each(|&v| *planes.entry(v).or_insert(0) |= 1 << axis);
+            }
+        }
+    }
+    Ok(planes)
+}
+
+/// The faces of conditioned surfaces at every carrier of the space.
 fn conditions(
     mesh: &Mesh,
     space: &Space,

@@ -5,18 +5,16 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::Tet4;
+use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::boundary::Boundary;
-use crate::element::lagrange::Lagrange;
-use crate::element::quadratic::LagrangeTet;
-use crate::element::volume::{AphiTet, Coefficients};
-use crate::element::{impedance::ImpedanceTriangle, interface::InterfaceTriangle};
+use crate::element::volume::Coefficients;
 use crate::error::SolverError;
+use crate::family::{Cell, Matrices};
 use crate::material::Material;
-use crate::surface::{Conductor, SurfaceMatrix, SurfaceTerm, Surfaces};
+use crate::space::ElementFamily;
+use crate::surface::{Conductor, SurfaceTerm, Surfaces};
 
 /// Coefficients of the weak form at one frequency.
 #[derive(Debug)]
@@ -35,6 +33,7 @@ impl WeakForm {
     /// As [`Surfaces::new`].
     pub(crate) fn new(
         mesh: &Mesh,
+        family: ElementFamily,
         (angular_frequency, penalty): (f64, f64),
         materials: &[Material],
         boundaries: &[(String, Boundary)],
@@ -48,7 +47,7 @@ impl WeakForm {
                 eddy: c64::new(0.0, angular_frequency * m.conductivity),
             })
             .collect();
-        let surfaces = Surfaces::new(mesh, &coefficients, boundaries, conductors, angular_frequency)?;
+        let surfaces = Surfaces::new(mesh, family, &coefficients, boundaries, conductors, angular_frequency)?;
         Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces })
     }
 
@@ -78,39 +77,36 @@ impl WeakForm {
         &self.surfaces.triangles
     }
 
+    /// Triangles of impedance surfaces.
+    pub(crate) fn impedance_triangles(&self) -> Vec<[NodeId; 3]> {
+        let is_impedance = |term: &SurfaceTerm| matches!(term, SurfaceTerm::Impedance(..));
+        self.surface().filter(|(_, term)| is_impedance(term)).map(|(triangle, _)| triangle).collect()
+    }
+
     /// Every triangle with its term.
     pub(crate) fn surface(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
         self.surfaces.iter()
     }
 
-    /// The matrix of a linear tetrahedron.
+    /// The matrix of a tetrahedron.
     #[inline]
-    pub(crate) fn linear_tet(&self, mesh: &Mesh, e: ElementId) -> AphiTet {
-        AphiTet::new(Tet4::new(mesh.vertices(e)), *self.coefficients_of(e))
-    }
-
-    /// The matrix of a quadratic tetrahedron.
-    #[inline]
-    pub(crate) fn quadratic_tet(&self, mesh: &Mesh, e: ElementId) -> LagrangeTet<10> {
-        let tet = Tet4::new(mesh.vertices(e));
-        LagrangeTet::new(Lagrange::<10, 4>::tet(), tet, *self.coefficients_of(e))
+    pub(crate) fn tet<const N: usize, const F: usize>(
+        &self,
+        matrices: &impl Matrices<N, F>,
+        cell: Cell,
+        e: ElementId,
+    ) -> impl LocalMatrix<c64, N, 4> {
+        matrices.tet(cell, *self.coefficients_of(e))
     }
 
     /// The matrix of a triangle, by its number.
-    pub(crate) fn triangle<const N: usize>(
+    pub(crate) fn triangle<const N: usize, const F: usize>(
         &self,
-        shape: &'static Lagrange<N, 3>,
+        matrices: &impl Matrices<N, F>,
         mesh: &Mesh,
         triangle: usize,
-    ) -> SurfaceMatrix<N> {
+    ) -> impl LocalMatrix<c64, F, 4> {
         let vertices = self.surfaces.triangles[triangle].map(|n| mesh.point(n));
-        match self.surfaces.terms[triangle] {
-            SurfaceTerm::Interface(jump) => {
-                SurfaceMatrix::Interface(InterfaceTriangle::new(shape, vertices, jump))
-            }
-            SurfaceTerm::Impedance(coefficient, _) => {
-                SurfaceMatrix::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient))
-            }
-        }
+        matrices.triangle(vertices, self.surfaces.terms[triangle])
     }
 }

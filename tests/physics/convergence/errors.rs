@@ -6,7 +6,10 @@ use fluxmorph_geometry::tet4::{Point, Tet4, centroid};
 use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
 use fluxmorph_solver::recovery::recovered_flux_density;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, FieldSolution, Material, Order};
+use fluxmorph_solver::unknowns::PSI;
+use fluxmorph_solver::{
+    Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, Order,
+};
 
 use super::quadrature::{point_in, tet_rule};
 use crate::meshes::Distortion;
@@ -63,24 +66,26 @@ fn eddy(model: &FieldModel) -> Vec<c64> {
 /// over all q is zero, as grounding ψ in one node requires.
 fn load(field: &impl KnownField, model: &FieldModel, mesh: &Mesh) -> Vec<c64> {
     let (rule, eddy) = (tet_rule(), eddy(model));
+    let nodal = model.space().family() == ElementFamily::Nodal;
     let topology = mesh.topology();
     let mut load = vec![c64::default(); model.unknown_count()];
     for e in topology.elements() {
         let vertices = mesh.vertices(e);
-        let (tet, inside) = (Tet4::new(vertices), centroid(vertices));
+        let (cell, inside) = (model.space().cell(mesh, e), centroid(vertices));
         let sigma = eddy[topology.region_of()[e.index()].index()];
         for &(bary, weight) in &rule {
             let known = field.at(point_in(vertices, bary), inside);
-            let weight = weight * tet.volume;
-            for (node, value, gradient) in model.space().basis(e, &tet, &bary).iter() {
+            let weight = weight * cell.tet.volume;
+            let drive: Complex3 =
+                std::array::from_fn(|d| sigma * (known.vector_potential[d] + known.scalar_gradient[d]));
+            let carriers = model.space().nodes_of(e);
+            let is_psi = |component| nodal && component == PSI;
+            model.space().functions(&cell, &bary, &mut |carrier, component, value, _| {
+                let source = if is_psi(component) { drive } else { known.source };
                 let mut local = [c64::default(); 4];
-                for d in 0..3 {
-                    local[d] = weight * value * known.source[d];
-                    let drive = known.vector_potential[d] + known.scalar_gradient[d];
-                    local[3] += weight * sigma * drive * gradient[d];
-                }
-                model.unknowns().scatter_add(&mut load, node, local);
-            }
+                local[component] = (0..3).map(|d| weight * value[d] * source[d]).sum();
+                model.unknowns().scatter_add(&mut load, carriers[carrier], local);
+            });
         }
     }
     load
@@ -117,12 +122,12 @@ fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &F
         for &(bary, weight) in &rule {
             let known = field.at(point_in(vertices, bary), inside);
             let weight = weight * tet.volume;
-            let computed = solution.at(model, &model.space().basis(e, &tet, &bary));
+            let computed = solution.at(model, mesh, e, &bary);
             let exact_drive = std::array::from_fn(|d| known.vector_potential[d] + known.scalar_gradient[d]);
             let pairs = [
                 (computed.vector_potential, known.vector_potential),
-                (computed.flux_density(), known.flux_density),
-                if conducts { (computed.electric_potential(), exact_drive) } else { (zero, zero) },
+                (computed.flux_density, known.flux_density),
+                if conducts { (computed.electric_potential, exact_drive) } else { (zero, zero) },
             ];
             for (sum, (computed, exact)) in sums.iter_mut().zip(pairs) {
                 sum[0] += weight * distance(computed, exact);

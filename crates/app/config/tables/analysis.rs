@@ -6,6 +6,7 @@ use super::linear_solver::LinearSolver;
 use super::petsc::Petsc;
 use crate::config::section::Section;
 use crate::config::table::{Group, left_out, table};
+use crate::config::value::choice::choice;
 use crate::config::value::definitions::{Definitions, Keywords};
 use crate::config::value::{Entry, Value, Whole};
 
@@ -28,6 +29,9 @@ table! {
         /// Penalty reluctivity over reluctivity, ν_p / ν. With 1 the penalised operator is the Laplacian in uniform material,
         /// which is what iterative solvers like best.
         penalty: f64 = number(POSITIVE) => 1.0;
+        /// What is continuous from element to element: all of A at the nodes, or its part along the edges. `docs/theory.md`
+        /// tells what each is right for.
+        elements: Elements = WORD => Elements::Nodal;
         /// Polynomial degree of A and ψ in an element. 2 gives about eight times the unknowns, and far smaller errors on the
         /// same mesh.
         order: ElementOrder = integer(1, 2) => ElementOrder::Linear;
@@ -50,6 +54,16 @@ table! {
         frequencies: Option<Vec<f64>> = quantity(Frequency, NOT_NEGATIVE);
     }
     rules = |rules| rules.exactly_one(&["frequency", "frequencies"]);
+}
+
+choice! {
+    /// The family of the elements.
+    pub enum Elements {
+        /// A and ψ at nodes, with a penalty on div A: the paper's method.
+        Nodal = "nodal",
+        /// A along edges: right at every corner, in iron and behind impedance surfaces.
+        Edge = "edge",
+    }
 }
 
 /// The degree of the potentials in an element, written as its number.

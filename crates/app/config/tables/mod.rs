@@ -19,7 +19,7 @@ mod output;
 mod petsc;
 mod remesh;
 
-pub use analysis::{Analysis, ElementOrder, Frequencies};
+pub use analysis::{Analysis, ElementOrder, Elements, Frequencies};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
     Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,

@@ -154,34 +154,8 @@ pub fn surface_loss<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::differences::{SKEW, assert_shape_derivative, central_difference, values};
+    use super::super::differences::{SKEW, derivatives_hold};
     use super::*;
-
-    /// Both derivatives of an element integral against central differences.
-    fn derivatives_hold<const N: usize, const M: usize>(
-        vertices: [Point; M],
-        integral: impl Fn([Point; M], [[c64; 4]; N]) -> ElementIntegral<N, M>,
-    ) {
-        let field = values(11);
-        let exact = integral(vertices, field);
-        // Truncation and rounding of a central difference of values of order one balance near 1e-5.
-        let (h, tolerance) = (1e-5, 1e-8 * (1.0 + exact.value.abs()));
-        for a in 0..N {
-            for c in 0..4 {
-                for direction in [c64::new(1.0, 0.0), c64::new(0.0, 1.0)] {
-                    let difference = central_difference(h, |s| {
-                        let mut moved = field;
-                        moved[a][c] += s * direction;
-                        integral(vertices, moved).value.into()
-                    });
-                    let derivative = 2.0 * (exact.potentials[a][c] * direction).re;
-                    assert!((difference - derivative).norm() < tolerance, "potential {c} of node {a}");
-                }
-            }
-        }
-        let value = |moved| integral(moved, field).value.into();
-        assert_shape_derivative([h, tolerance], vertices, value, &exact.positions.map(|p| p.map(c64::from)));
-    }
 
     const REMANENCE: Point = [0.4, -0.2, 0.9];
 

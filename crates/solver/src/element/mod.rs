@@ -9,11 +9,12 @@
 //! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
 //! order, [`interface`] the triangles, [`impedance`] the Leontovich surface; [`lagrange`], [`quadrature`] and
 //! [`tabulated`] what they are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
-//! [`density`] integrals of energy and loss with their derivatives.
+//! [`density`] integrals of energy and loss with their derivatives; [`edge`] all of that for edge elements.
 
 pub mod density;
 #[cfg(test)]
 mod differences;
+pub mod edge;
 pub mod impedance;
 pub mod interface;
 pub mod lagrange;

@@ -3,17 +3,15 @@
 //! The sums run in the order of the elements, whatever the number of threads.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
 use super::FunctionalValue;
-use crate::element::density::{ElementIntegral, eddy_loss, flux_energy, surface_loss};
-use crate::element::lagrange::Lagrange;
 use crate::error::SolverError;
+use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::space::Order;
 use crate::surface::SurfaceTerm;
 
 /// Elements whose integrals are held at once: some megabytes.
@@ -69,43 +67,22 @@ impl Integral {
         mesh: &Mesh,
         solution: &FieldSolution,
     ) -> FunctionalValue {
-        match model.space().order() {
-            Order::Linear => {
-                let shapes = (Lagrange::<4, 4>::tet(), Lagrange::<3, 3>::triangle());
-                self.of_order(shapes, |triangle| triangle, model, mesh, solution)
-            }
-            Order::Quadratic => {
-                let shapes = (Lagrange::<10, 4>::tet(), Lagrange::<6, 3>::triangle());
-                let nodes_of = |triangle| model.space().quadratic_triangle(triangle);
-                self.of_order(shapes, nodes_of, model, mesh, solution)
-            }
-        }
-    }
-
-    /// On elements with `N` and faces with `F` nodes.
-    fn of_order<const N: usize, const F: usize>(
-        &self,
-        (tet_shape, face_shape): (&'static Lagrange<N, 4>, &'static Lagrange<F, 3>),
-        nodes_of: impl Fn([NodeId; 3]) -> [NodeId; F],
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> FunctionalValue {
         let mut sum = Sum::new(model);
-        let tet = |e: ElementId| Tet4::new(mesh.vertices(e));
+        let space = model.space();
+        let elements = space.elements();
         match self {
-            Self::Energy(elements) => {
+            Self::Energy(of) => {
                 let share = if model.angular_frequency() == 0.0 { 0.5 } else { 0.25 };
-                sum.elements(elements, |e| {
+                sum.elements(of, |e| {
                     let factor = share * model.coefficients_of(e).reluctivity;
-                    let field = solution.element_field(model, e);
-                    flux_energy(tet_shape, &tet(e), factor, model.remanence_of(e), &field)
+                    let field = solution.element(model, e);
+                    elements.flux_energy(&space.cell(mesh, e), factor, model.remanence_of(e), field.values())
                 });
             }
-            Self::VolumeLoss(elements) => sum.elements(elements, |e| {
+            Self::VolumeLoss(of) => sum.elements(of, |e| {
                 // ½σ|E|² with E = −jω(A + ∇ψ), and the imaginary part ωσ of the eddy coefficient.
                 let factor = 0.5 * model.angular_frequency() * model.coefficients_of(e).eddy.im;
-                eddy_loss(tet_shape, &tet(e), factor, &solution.element_field(model, e))
+                elements.eddy_loss(&space.cell(mesh, e), factor, solution.element(model, e).values())
             }),
             Self::SurfaceLoss(index) => {
                 for (triangle, term) in model.surface() {
@@ -113,12 +90,13 @@ impl Integral {
                     if owner != *index {
                         continue;
                     }
-                    let nodes = nodes_of(triangle);
-                    let potential = solution.nodal_field(model, nodes).vector_potential;
+                    let carriers = space.triangle(triangle);
+                    let field = solution.local(model, &carriers);
                     // ½ω²Re(1/Zs), and the real part ωRe(1/Zs) of the surface coefficient.
                     let factor = 0.5 * model.angular_frequency() * coefficient.re;
                     let vertices = triangle.map(|n| mesh.point(n));
-                    sum.add(&nodes, &triangle, &surface_loss(face_shape, vertices, factor, &potential));
+                    let integral = elements.surface_loss(vertices, factor, field.values());
+                    sum.add(&carriers, &triangle, &integral);
                 }
             }
         }
@@ -144,11 +122,7 @@ impl<'a> Sum<'a> {
         }
     }
 
-    fn elements<const N: usize>(
-        &mut self,
-        elements: &[ElementId],
-        integral: impl Fn(ElementId) -> ElementIntegral<N, 4> + Sync,
-    ) {
+    fn elements(&mut self, elements: &[ElementId], integral: impl Fn(ElementId) -> LocalIntegral<4> + Sync) {
         for chunk in elements.chunks(CHUNK) {
             let integrals: Vec<_> = chunk.par_iter().map(|&e| integral(e)).collect();
             for (&e, integral) in chunk.iter().zip(&integrals) {
@@ -157,15 +131,15 @@ impl<'a> Sum<'a> {
         }
     }
 
-    fn add<const N: usize, const M: usize>(
+    fn add<const M: usize>(
         &mut self,
-        nodes: &[NodeId],
+        carriers: &[NodeId],
         vertices: &[NodeId; M],
-        integral: &ElementIntegral<N, M>,
+        integral: &LocalIntegral<M>,
     ) {
         self.value += integral.value;
-        for (&node, terms) in nodes.iter().zip(integral.potentials) {
-            self.model.unknowns().scatter_add(&mut self.derivative, node, terms);
+        for (&carrier, terms) in carriers.iter().zip(integral.potentials.values()) {
+            self.model.unknowns().scatter_add(&mut self.derivative, carrier, *terms);
         }
         for (vertex, terms) in vertices.iter().zip(integral.positions) {
             for d in 0..3 {

@@ -4,12 +4,12 @@
 //! the field alone.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::{Point, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use super::FunctionalValue;
+use crate::element::Complex3;
 use crate::element::quadrature::{self, Node};
-use crate::element::{Complex3, cross3};
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
@@ -108,12 +108,13 @@ impl Observation {
             value += term;
             let by_b = by_b.map(|c| c / volume);
             for &e in cell {
-                let tet = Tet4::new(mesh.vertices(e));
-                for (node, _, gradient) in model.space().basis(e, &tet, lambda).iter() {
-                    // w·(∇N × A) = (w × ∇N)·A.
-                    let [x, y, z] = cross3(by_b, gradient.map(|g| c64::from(share * tet.volume * g)));
-                    model.unknowns().scatter_add(&mut derivative, node, [x, y, z, c64::default()]);
-                }
+                let cell = model.space().cell(mesh, e);
+                let carriers = model.space().nodes_of(e);
+                model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
+                    let mut local = [c64::default(); 4];
+                    local[component] = (0..3).map(|d| by_b[d] * (share * cell.tet.volume * curl[d])).sum();
+                    model.unknowns().scatter_add(&mut derivative, carriers[carrier], local);
+                });
             }
         }
         FunctionalValue { value, derivative, explicit: None }
@@ -161,9 +162,8 @@ fn mean(
     let mut sum = [c64::default(); 3];
     let mut volume = 0.0;
     for &e in cell {
-        let tet = Tet4::new(mesh.vertices(e));
-        let b = solution.at(model, &model.space().basis(e, &tet, lambda)).flux_density();
-        let v = share * tet.volume;
+        let b = solution.at(model, mesh, e, lambda).flux_density;
+        let v = share * volume_of(mesh.vertices(e));
         volume += v;
         for d in 0..3 {
             sum[d] += v * b[d];
