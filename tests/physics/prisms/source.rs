@@ -57,6 +57,12 @@ impl Source {
         self.plateau() * (1.0 - distance(0).max(distance(1)) / self.width).clamp(0.0, 1.0)
     }
 
+    /// Distance from the winding outwards [m], in the maximum norm.
+    pub(super) fn clearance(&self, place: Place) -> f64 {
+        let distance = |d: usize| (place[d] - self.centre[d]).abs() - self.half_window[d] - self.width;
+        distance(0).max(distance(1))
+    }
+
     /// `∇T` at a place off the kinks [A/m²].
     pub(super) fn slope(&self, place: Place) -> Place {
         let pieces = self.pieces();

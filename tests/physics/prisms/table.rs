@@ -11,7 +11,7 @@ use super::refine::refined;
 use super::{cases, iron_circuit, unstructured};
 
 /// Errors of B, of the loss, and what they cost: the mean of B over the observation, far from the source; the energy norm
-/// over all that the source does not meet, where the field is weak; the loss of all conductors.
+/// of B from two coarse cells off the winding on, where the field is weak; the loss of all conductors.
 #[test]
 #[ignore = "a table to read, of some minutes"]
 fn of_all_cases() {
