@@ -13,6 +13,7 @@ mod meshes;
 mod optimiser;
 mod orders;
 mod paper;
+mod prisms;
 mod problems;
 mod references;
 mod solvers;

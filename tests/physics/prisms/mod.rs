@@ -1,0 +1,30 @@
+//! Prisms: a family of devices whose field is known exactly, whatever their shape, iron, conductors and walls.
+//!
+//! `exact` has the field and why it is exact, `derivative` how it changes when a wall moves, on `polygon`, `source` and
+//! `diffusion`. `cases` are prisms with sides along the axes, meshed in `boxed`; `unstructured` reads those of
+//! `fixtures/`, which Gmsh meshed. `problem` makes a problem of the program from any of them and measures its errors;
+//! `gradient` compares its derivatives with the exact ones. `discretisation` is the list of elements, with what each must
+//! get right; `known` asserts that, and has the numbers with which faults were first seen. `iron_circuit` is a device
+//! without closed form. All numbers, in some minutes:
+//!
+//! `cargo test --release --test physics -- --ignored --nocapture prisms::table`
+
+mod boxed;
+mod cases;
+mod derivative;
+mod diffusion;
+mod discretisation;
+mod exact;
+mod gradient;
+mod hand;
+mod iron_circuit;
+mod known;
+mod polygon;
+mod problem;
+mod refine;
+mod source;
+mod table;
+mod unstructured;
+
+/// Region of air.
+const AIR: &str = "air";
