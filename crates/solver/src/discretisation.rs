@@ -18,6 +18,7 @@ use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, ElementFamily, Order, Space};
+use crate::surface::SurfaceTerm;
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
 
@@ -119,7 +120,7 @@ impl Discretisation {
             }
         };
         let (pattern, groups) =
-            pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form.triangles());
+            pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form);
         let lifted = find_lifted(mesh, &space, &unknowns, weak_form.triangles());
         Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
@@ -144,14 +145,17 @@ impl Discretisation {
             });
         }
         let conductor = conductor(weak_form);
+        let impedance = weak_form.impedance_triangles();
         if self.space.order() == Order::Quadratic {
             let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
-            let impedance = weak_form.impedance_triangles();
             let coarse = Unknowns::new(mesh, &vertices, &conductor, &impedance, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
         let mut conducts = vec![false; self.space.node_count()];
         for node in conductor.iter().flat_map(|&e| self.space.nodes_of(e)) {
+            conducts[node.index()] = true;
+        }
+        for node in impedance.iter().flat_map(|&triangle| self.space.triangle(triangle)) {
             conducts[node.index()] = true;
         }
         let kept = |node: NodeId| conducts[node.index()];
@@ -215,17 +219,25 @@ fn pattern(
     dofs: (&DofMap<4>, &DofMap<4>),
     local: Option<&LocalEntities>,
     coupling_of: impl Fn(ElementId) -> Coupling,
-    triangles: &[[NodeId; 3]],
+    weak_form: &WeakForm,
 ) -> (BlockPattern<4>, Box<dyn Bound>) {
     let couplings: Vec<Coupling> = match local {
         None => (0..space.element_count()).map(|e| coupling_of(ElementId::new(e))).collect(),
         Some(local) => local.elements.iter().map(|&e| coupling_of(e)).collect(),
     };
-    let triangles: Vec<Vec<NodeId>> = match local {
-        None => triangles.iter().map(|&t| space.triangle(t)).collect(),
-        Some(local) => local.triangles.iter().map(|&t| space.triangle(triangles[t])).collect(),
+    let face = |(triangle, term)| {
+        let components = if matches!(term, SurfaceTerm::Interface(_)) { 3 } else { 4 };
+        (space.triangle(triangle), Coupling::full(components))
     };
-    let parts = (dofs, local, couplings, triangles.as_slice());
+    let all = weak_form.surface();
+    let faces: Vec<(Vec<NodeId>, Coupling)> = match local {
+        None => all.map(face).collect(),
+        Some(local) => {
+            let all: Vec<_> = all.collect();
+            local.triangles.iter().map(|&t| face(all[t])).collect()
+        }
+    };
+    let parts = (dofs, local, couplings, faces.as_slice());
     match (space.carriers(), space.family()) {
         (Carriers::Four(tets), _) => bind(&*family::NODAL_1, tets, parts),
         (Carriers::Six(tets), _) => bind(&*family::EDGE_1, tets, parts),
@@ -235,26 +247,26 @@ fn pattern(
 }
 
 /// Rows and columns; the elements and triangles of this rank where there are several; couplings of these elements; carriers
-/// of these triangles.
+/// and coupling of these triangles.
 type Parts<'a> =
-    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [Vec<NodeId>]);
+    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [(Vec<NodeId>, Coupling)]);
 
 fn bind<K: Matrices<N, F>, const N: usize, const F: usize>(
     matrices: &'static K,
     tets: &[[NodeId; N]],
-    ((rows, columns), local, couplings, triangles): Parts<'_>,
+    ((rows, columns), local, couplings, faces): Parts<'_>,
 ) -> (BlockPattern<4>, Box<dyn Bound>) {
     let count = columns.node_count();
     let tets = match local {
         None => tets.to_vec(),
         Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
     };
-    let carriers =
-        |t: &Vec<NodeId>| t.as_slice().try_into().expect("a triangle of the same family and order");
-    let triangles: Vec<[NodeId; F]> = triangles.iter().map(carriers).collect();
+    let carriers = |face: &(Vec<NodeId>, Coupling)| -> [NodeId; F] {
+        face.0.as_slice().try_into().expect("a triangle of the same family and order")
+    };
+    let triangles = faces.iter().map(carriers).collect();
     let volumes = ElementGroup::new(count, tets, couplings);
-    let full = vec![Coupling::full(K::SURFACE_COMPONENTS); triangles.len()];
-    let faces = ElementGroup::new(count, triangles, full);
+    let faces = ElementGroup::new(count, triangles, faces.iter().map(|face| face.1).collect());
     let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
     let groups = Groups { matrices, tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
     (pattern, Box::new(groups))

@@ -1,4 +1,5 @@
-//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors, less what the boundaries fix.
+//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors and on impedance surfaces, less what
+//! the boundaries fix.
 //!
 //! Of nodal elements:
 //!
@@ -76,7 +77,7 @@ impl Unknowns {
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         match space.family() {
-            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductor, boundaries),
+            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductor, impedance, boundaries),
             ElementFamily::Edge => Self::of_edges(mesh, space, conductor, impedance, boundaries),
         }
     }
@@ -85,6 +86,7 @@ impl Unknowns {
         mesh: &Mesh,
         space: &Space,
         conductor: &[ElementId],
+        impedance: &[[NodeId; 3]],
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         let at_nodes = conditions(mesh, space, boundaries)?;
@@ -113,12 +115,14 @@ impl Unknowns {
             }
         }
         let mut has_psi = vec![false; node_count];
-        for &e in conductor {
-            for n in space.nodes_of(e) {
-                has_psi[n.index()] = true;
-            }
+        let mut conductors = DisjointSets::new(node_count);
+        let surfaces: Vec<Vec<NodeId>> = impedance.iter().map(|&triangle| space.triangle(triangle)).collect();
+        let volumes = conductor.iter().map(|&e| space.nodes_of(e));
+        for nodes in volumes.chain(surfaces.iter().map(Vec::as_slice)) {
+            conductors.join(nodes.iter().map(|n| n.index()));
+            nodes.iter().for_each(|n| has_psi[n.index()] = true);
         }
-        let grounded = ground(space, conductor, &psi_zero);
+        let grounded = ground(&mut conductors, &has_psi, &psi_zero);
         for n in &grounded {
             psi_zero[n.index()] = true;
         }
@@ -334,20 +338,12 @@ fn check_agreement(
     Ok(())
 }
 
-/// The first node of every connected set of conducting elements in which no node is fixed already.
-fn ground(space: &Space, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId> {
-    let mut sets = DisjointSets::new(space.node_count());
-    for &e in conductor {
-        sets.join(space.nodes_of(e).iter().map(|n| n.index()));
+/// The first node of every connected set of nodes with ψ in which no node is fixed already.
+fn ground(sets: &mut DisjointSets, has_psi: &[bool], psi_zero: &[bool]) -> Vec<NodeId> {
+    let nodes = || (0..has_psi.len()).filter(|&n| has_psi[n]);
+    let mut is_fixed = vec![false; has_psi.len()];
+    for n in nodes().filter(|&n| psi_zero[n]) {
+        is_fixed[sets.root(n)] = true;
     }
-    let mut nodes: Vec<NodeId> = conductor.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    let mut is_fixed = vec![false; space.node_count()];
-    for n in &nodes {
-        if psi_zero[n.index()] {
-            is_fixed[sets.root(n.index())] = true;
-        }
-    }
-    nodes.into_iter().filter(|n| sets.root(n.index()) == n.index() && !is_fixed[n.index()]).collect()
+    nodes().filter(|&n| sets.root(n) == n && !is_fixed[n]).map(NodeId::new).collect()
 }

@@ -3,6 +3,7 @@
 mod coil_regions;
 mod grounding;
 mod guards;
+mod prisms;
 mod sources;
 mod two_level;
 

@@ -1,0 +1,95 @@
+//! Fields that are known exactly on any planar polygon: `H = (0, 0, T + c)` between flux-normal planes.
+//!
+//! Side walls are flux-parallel, and a coil along z that is longer than the domain is high has the potential `T(x, y)`.
+//! `c` follows from the induction law around the domain, `∫μ(T + c) + Σ Zs/(jω) ∮(T + c) ds = 0` over all blocks with an
+//! impedance surface; a perfect conductor has `Zs = 0`. Every block has an edge that the field goes around, where a nodal
+//! `A` with zero tangential parts fails.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, Order};
+
+/// `∫T dS` of the coil [A m]: 1 kA over 0.4 m, half window 0.15 m, winding 0.1 m wide.
+const MOMENT: f64 = 2500.0 * 0.163_333_333_333_333_33;
+
+/// Perimeter of the block inside the domain [m].
+const PERIMETER: f64 = 2.0;
+
+/// The square of 2 m without its quarter x > 0, y < 0, and the faces that the quarter left.
+fn square_without_a_quarter() -> (Mesh, Vec<[fluxmorph_geometry::NodeId; 3]>) {
+    let line = |n: i32, from: f64| (0..=n).map(|i| from + 0.1 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(20, -1.0), line(20, -1.0), vec![0.0, 0.05, 0.1]]).expect("a grid");
+    let topology = grid
+        .topology(&["air", "block"], |x| RegionId(u32::from(x[0] > 0.0 && x[1] < 0.0)))
+        .expect("two regions");
+    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    mesh.without_region(RegionId(1)).expect("what is left")
+}
+
+fn setup(order: Order, frequency: f64) -> FieldModelSetup {
+    let shape = Racetrack::new([0.5, 0.5, 0.05], 2, [0.15; 2], 0.1, 0.4, Corner::Mitred).expect("a coil");
+    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
+        names.iter().map(|&name| (name.to_owned(), boundary)).collect()
+    };
+    let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
+    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
+    FieldModelSetup {
+        frequency,
+        order,
+        materials: vec![Material::AIR; 2],
+        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1e3, 0.0), shape: shape.into() }],
+        boundaries,
+        ..FieldModelSetup::default()
+    }
+}
+
+/// `μ0 c` [T] behind a surface with `Zs/(jω)` [H].
+fn far_field(reactance: c64) -> c64 {
+    -MOMENT * VACUUM_PERMEABILITY / (3.0 + reactance / VACUUM_PERMEABILITY * PERIMETER)
+}
+
+/// The largest error of `B` in the arm x < −0.2 m, y < −0.2 m, of the exact field there.
+fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
+    let model = FieldModel::new(mesh, setup).expect("a sound problem");
+    let (solution, _) = model.solve(mesh).expect("it converges");
+    let centre = |e| {
+        let vertices = mesh.vertices(e);
+        [0, 1].map(|d| vertices.iter().map(|x| x[d]).sum::<f64>() / 4.0)
+    };
+    let far = mesh.topology().elements().filter(|&e| centre(e).iter().all(|&c| c < -0.2));
+    let far: Vec<_> = far.collect();
+    let errors = solution.flux_densities_of(&model, mesh, &far).into_iter().map(|b| {
+        let squares = [b[0], b[1], b[2] - exact].map(|c| c.norm_sqr());
+        (squares.iter().sum::<f64>() / exact.norm_sqr()).sqrt()
+    });
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_field_goes_around_the_edge_of_an_impedance_surface() {
+    let (mesh, surface) = square_without_a_quarter();
+    let frequency = 25.330_295_91;
+    for (skin_depth, order, tolerance) in [
+        (0.1, Order::Linear, 0.03),
+        (0.1, Order::Quadratic, 0.01),
+        (0.01, Order::Linear, 0.03),
+        (0.01, Order::Quadratic, 0.01),
+        (1e-5, Order::Linear, 0.03),
+    ] {
+        let conductivity =
+            2.0 / (2.0 * std::f64::consts::PI * frequency * VACUUM_PERMEABILITY * skin_depth * skin_depth);
+        let material = Material { relative_permeability: 1.0, conductivity };
+        let conductor = Conductor { name: "block".to_owned(), surface: surface.clone(), material };
+        let setup = FieldModelSetup { impedance_surfaces: vec![conductor], ..setup(order, frequency) };
+        // Zs/(jω) = μ δ (1 − j)/2.
+        let reactance = 0.5 * VACUUM_PERMEABILITY * skin_depth * c64::new(1.0, -1.0);
+        let error = error(&mesh, setup, far_field(reactance));
+        println!("skin depth {skin_depth} m, {order:?}: {error:.2e}");
+        assert!(error < tolerance, "skin depth {skin_depth} m, {order:?}: {error:.2e}");
+    }
+}
