@@ -53,7 +53,7 @@ fn far_field(reactance: c64) -> c64 {
     -MOMENT * VACUUM_PERMEABILITY / (3.0 + reactance / VACUUM_PERMEABILITY * PERIMETER)
 }
 
-/// The largest error of `B` in the arm x < −0.2 m, y < −0.2 m, of the exact field there.
+/// The largest error of `B` in the arm x < −0.4 m, y < −0.4 m, of the exact field there.
 fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
     let model = FieldModel::new(mesh, setup).expect("a sound problem");
     let (solution, _) = model.solve(mesh).expect("it converges");
@@ -61,7 +61,7 @@ fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
         let vertices = mesh.vertices(e);
         [0, 1].map(|d| vertices.iter().map(|x| x[d]).sum::<f64>() / 4.0)
     };
-    let far = mesh.topology().elements().filter(|&e| centre(e).iter().all(|&c| c < -0.2));
+    let far = mesh.topology().elements().filter(|&e| centre(e).iter().all(|&c| c < -0.4));
     let far: Vec<_> = far.collect();
     let errors = solution.flux_densities_of(&model, mesh, &far).into_iter().map(|b| {
         let squares = [b[0], b[1], b[2] - exact].map(|c| c.norm_sqr());
