@@ -97,8 +97,7 @@ impl Discretisation {
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
         let space = Space::new(topology, family, order);
-        let impedance = weak_form.impedance_triangles();
-        let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), &impedance, boundaries)?;
+        let unknowns = Unknowns::new(mesh, &space, &weak_form.conductors(), boundaries)?;
         let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
         let local = ownership.map(|own| LocalEntities::new(topology, weak_form.triangles(), own));
         let coupling_of = |e: ElementId| {
@@ -144,20 +143,14 @@ impl Discretisation {
                 expected: "a factor, or an incomplete one: edge elements have no coarse level".to_owned(),
             });
         }
-        let conductor = conductor(weak_form);
-        let impedance = weak_form.impedance_triangles();
+        let conductors = weak_form.conductors();
         if self.space.order() == Order::Quadratic {
             let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
-            let coarse = Unknowns::new(mesh, &vertices, &conductor, &impedance, boundaries)?;
+            let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
         let mut conducts = vec![false; self.space.node_count()];
-        for node in conductor.iter().flat_map(|&e| self.space.nodes_of(e)) {
-            conducts[node.index()] = true;
-        }
-        for node in impedance.iter().flat_map(|&triangle| self.space.triangle(triangle)) {
-            conducts[node.index()] = true;
-        }
+        conductors.each(&self.space, |nodes| nodes.iter().for_each(|n| conducts[n.index()] = true));
         let kept = |node: NodeId| conducts[node.index()];
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
     }
@@ -206,11 +199,6 @@ impl Discretisation {
             }
         }
     }
-}
-
-/// Elements in which eddy currents flow, ascending.
-fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
-    weak_form.topology().elements().filter(|&e| weak_form.conducts(e)).collect()
 }
 
 /// The pattern of the rows against the columns, and the elements and triangles of this rank bound to it.

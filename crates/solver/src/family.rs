@@ -280,15 +280,17 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
         adjoint: &[[c64; 4]],
         state: &[[c64; 4]],
     ) -> [Complex3; 3] {
+        let surface = |coefficient: c64| {
+            let (l, u) = (at_nodes(adjoint), at_nodes(state));
+            impedance::shape_derivative(self.triangle, vertices, coefficient, l, u)
+        };
         match term {
             SurfaceTerm::Interface(jump) => {
                 let (l, u) = (nodal(adjoint).vector_potential, nodal(state).vector_potential);
                 interface::shape_derivative(self.triangle, jump, &l, &u)
             }
-            SurfaceTerm::Impedance(coefficient, _) => {
-                let (l, u) = (at_nodes(adjoint), at_nodes(state));
-                impedance::shape_derivative(self.triangle, vertices, coefficient, l, u)
-            }
+            SurfaceTerm::Impedance(coefficient, _) => surface(coefficient),
+            SurfaceTerm::Perfect(coefficient) => surface(coefficient.into()),
         }
     }
 
@@ -394,7 +396,7 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         state: &[[c64; 4]],
     ) -> [Complex3; 3] {
         match term {
-            SurfaceTerm::Interface(_) => [[c64::default(); 3]; 3],
+            SurfaceTerm::Interface(_) | SurfaceTerm::Perfect(_) => [[c64::default(); 3]; 3],
             SurfaceTerm::Impedance(coefficient, _) => {
                 self.triangle.shape_derivative(vertices, coefficient, adjoint, state)
             }
@@ -415,7 +417,7 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Matrices<N,
     #[inline]
     fn triangle(&self, vertices: [Point; 3], term: SurfaceTerm) -> impl LocalMatrix<c64, F, 4> {
         let coefficient = match term {
-            SurfaceTerm::Interface(_) => c64::default(),
+            SurfaceTerm::Interface(_) | SurfaceTerm::Perfect(_) => c64::default(),
             SurfaceTerm::Impedance(coefficient, _) => coefficient,
         };
         let matrix: EdgeTriangle<F> = self.triangle.matrix(vertices, coefficient);

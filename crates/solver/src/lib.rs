@@ -41,4 +41,4 @@ pub use material::Material;
 pub use model::{FieldModel, FieldModelSetup};
 pub use solution::FieldSolution;
 pub use space::{ElementFamily, Order, Space};
-pub use surface::Conductor;
+pub use surface::{Conductor, SurfaceLaw};

@@ -1,9 +1,9 @@
-//! The terms of the weak form on triangles: jumps of the reluctivity, and impedance surfaces.
+//! The terms of the weak form on triangles: jumps of the reluctivity, impedance surfaces and perfect conductors.
 
 use std::collections::HashSet;
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
-use fluxmorph_geometry::tet4::{Point, area_vector, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
@@ -14,19 +14,32 @@ use crate::element::lagrange::Lagrange;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
-use crate::material::Material;
+use crate::material::{Material, VACUUM_PERMEABILITY};
 use crate::space::ElementFamily;
 
-/// A conductor that is not meshed but replaced by its impedance surface.
+/// A conductor that is not meshed but replaced by its surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     /// Name of the region it stood for.
     pub name: String,
     /// Its surface, oriented out of the surrounding mesh.
     pub surface: Vec<[NodeId; 3]>,
-    /// Its material.
-    pub material: Material,
+    /// What the surface says of the field.
+    pub law: SurfaceLaw,
 }
+
+/// What the surface of a conductor says of the field outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SurfaceLaw {
+    /// The surface impedance of a material, many skin depths thick.
+    Impedance(Material),
+    /// `E_t = 0` and `B·n = 0`: the limit of no impedance, in statics as well.
+    Perfect,
+}
+
+/// Perfect conductors under nodal elements: `1/Zs'` of their surface term over `1/(μ0 L)`, `L` their size. A conductor with
+/// the skin depth 1e-6 L: what gets through is of that order.
+const PERFECTION: f64 = 1e6;
 
 /// A term of the weak form on one triangle.
 #[derive(Clone, Copy, Debug)]
@@ -35,6 +48,8 @@ pub(crate) enum SurfaceTerm {
     Interface(f64),
     /// `jω/Zs` [1/H] of the conductor with this index.
     Impedance(c64, usize),
+    /// The large coefficient [1/H] that makes `A_t + ∇_tψ` zero under nodal elements. Edge elements know theirs.
+    Perfect(f64),
 }
 
 /// The matrix of one surface term.
@@ -51,6 +66,9 @@ impl<const N: usize> SurfaceMatrix<N> {
             SurfaceTerm::Interface(jump) => Self::Interface(InterfaceTriangle::new(shape, vertices, jump)),
             SurfaceTerm::Impedance(coefficient, _) => {
                 Self::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient))
+            }
+            SurfaceTerm::Perfect(coefficient) => {
+                Self::Impedance(ImpedanceTriangle::new(shape, vertices, coefficient.into()))
             }
         }
     }
@@ -74,7 +92,7 @@ pub(crate) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Of nodal elements the triangles at which ν jumps, natural and curved outer faces; of all, impedance surfaces.
+    /// Of nodal elements the triangles at which ν jumps, natural and curved outer faces; of all, the conductors' surfaces.
     ///
     /// `coefficients` by region. Nodes are in ascending order for edge elements.
     ///
@@ -94,24 +112,18 @@ impl Surfaces {
             ElementFamily::Edge => Self::default(),
         };
         for (index, conductor) in conductors.iter().enumerate() {
-            let Some(skin_depth) = conductor.material.skin_depth(angular_frequency) else {
-                return Err(SolverError::Parameter {
-                    what: format!("model of `{}`", conductor.name),
-                    value: "impedance".to_owned(),
-                    expected:
-                        "an impedance surface needs a conductivity and a frequency above zero; use model = \
-                               \"volume\""
-                            .to_owned(),
-                });
+            let term = match conductor.law {
+                SurfaceLaw::Impedance(material) => {
+                    SurfaceTerm::Impedance(coefficient(conductor, &material, angular_frequency)?, index)
+                }
+                SurfaceLaw::Perfect => SurfaceTerm::Perfect(perfect(mesh, &conductor.surface)),
             };
-            let conductivity = conductor.material.conductivity;
-            let coefficient = impedance::surface_coefficient(angular_frequency, conductivity, skin_depth);
             for triangle in &conductor.surface {
                 surfaces.triangles.push(match family {
                     ElementFamily::Nodal => *triangle,
                     ElementFamily::Edge => face_key(*triangle),
                 });
-                surfaces.terms.push(SurfaceTerm::Impedance(coefficient, index));
+                surfaces.terms.push(term);
             }
         }
         Ok(surfaces)
@@ -142,6 +154,34 @@ impl Surfaces {
     pub(crate) fn iter(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
         self.triangles.iter().copied().zip(self.terms.iter().copied())
     }
+}
+
+/// `jω/Zs` [1/H] of a conductor.
+fn coefficient(
+    conductor: &Conductor,
+    material: &Material,
+    angular_frequency: f64,
+) -> Result<c64, SolverError> {
+    let skin_depth = material.skin_depth(angular_frequency).ok_or_else(|| SolverError::Parameter {
+        what: format!("model of `{}`", conductor.name),
+        value: "impedance".to_owned(),
+        expected:
+            "an impedance surface needs a conductivity and a frequency above zero; use model = \"volume\""
+                .to_owned(),
+    })?;
+    Ok(impedance::surface_coefficient(angular_frequency, material.conductivity, skin_depth))
+}
+
+/// The coefficient [1/H] of a perfect conductor's surface, from its size on the reference mesh.
+fn perfect(mesh: &Mesh, surface: &[[NodeId; 3]]) -> f64 {
+    let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for point in surface.iter().flatten().map(|&n| mesh.point(n)) {
+        for d in 0..3 {
+            lower[d] = lower[d].min(point[d]);
+            upper[d] = upper[d].max(point[d]);
+        }
+    }
+    PERFECTION / (VACUUM_PERMEABILITY * norm(sub(upper, lower)))
 }
 
 /// Faces of planes along the axes whose condition is zero: the term couples components there that the condition fixes to

@@ -11,7 +11,7 @@
 //!
 //! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors ([`crate::gauge`]),
 //! and the gradients' coefficients in and on conductors; on flux-parallel surfaces and where a field is applied, all that is
-//! tangential is known. Flux-normal is natural.
+//! tangential is known, as on perfect conductors. Flux-normal is natural.
 //!
 //! On planes along the axes the unknowns of nodal elements are components of `A`; at the nodes of other conditioned surfaces they are
 //! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
@@ -53,6 +53,25 @@ pub struct Unknowns {
     planes: BTreeMap<NodeId, u8>,
 }
 
+/// Where currents flow, so that there is ψ.
+#[derive(Clone, Debug, Default)]
+pub struct Conductors {
+    /// Meshed, ascending.
+    pub elements: Vec<ElementId>,
+    /// Impedance surfaces.
+    pub impedance: Vec<[NodeId; 3]>,
+    /// Surfaces of perfect conductors: edge elements know their tangential field, nodal ones have a surface term.
+    pub perfect: Vec<[NodeId; 3]>,
+}
+
+impl Conductors {
+    /// Calls back with the carriers of every element and surface triangle.
+    pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[NodeId])) {
+        self.elements.iter().for_each(|&e| with(space.nodes_of(e)));
+        self.impedance.iter().chain(&self.perfect).for_each(|&triangle| with(&space.triangle(triangle)));
+    }
+}
+
 /// What conditions say at one node.
 #[derive(Default)]
 struct AtNode {
@@ -64,7 +83,7 @@ struct AtNode {
 }
 
 impl Unknowns {
-    /// Numbers the unknowns of a space with conducting elements and impedance surfaces, and conditions on named surfaces.
+    /// Numbers the unknowns of a space with conductors, and conditions on named surfaces.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::Conflict`] where an applied field contradicts
@@ -72,21 +91,19 @@ impl Unknowns {
     pub fn new(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
-        impedance: &[[NodeId; 3]],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         match space.family() {
-            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductor, impedance, boundaries),
-            ElementFamily::Edge => Self::of_edges(mesh, space, conductor, impedance, boundaries),
+            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductors, boundaries),
+            ElementFamily::Edge => Self::of_edges(mesh, space, conductors, boundaries),
         }
     }
 
     fn of_nodes(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
-        impedance: &[[NodeId; 3]],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         let at_nodes = conditions(mesh, space, boundaries)?;
@@ -115,14 +132,12 @@ impl Unknowns {
             }
         }
         let mut has_psi = vec![false; node_count];
-        let mut conductors = DisjointSets::new(node_count);
-        let surfaces: Vec<Vec<NodeId>> = impedance.iter().map(|&triangle| space.triangle(triangle)).collect();
-        let volumes = conductor.iter().map(|&e| space.nodes_of(e));
-        for nodes in volumes.chain(surfaces.iter().map(Vec::as_slice)) {
-            conductors.join(nodes.iter().map(|n| n.index()));
+        let mut connected = DisjointSets::new(node_count);
+        conductors.each(space, |nodes| {
+            connected.join(nodes.iter().map(|n| n.index()));
             nodes.iter().for_each(|n| has_psi[n.index()] = true);
-        }
-        let grounded = ground(&mut conductors, &has_psi, &psi_zero);
+        });
+        let grounded = ground(&mut connected, &has_psi, &psi_zero);
         for n in &grounded {
             psi_zero[n.index()] = true;
         }
@@ -136,8 +151,7 @@ impl Unknowns {
     fn of_edges(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
-        impedance: &[[NodeId; 3]],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         let count = space.node_count();
@@ -166,10 +180,10 @@ impl Unknowns {
         for (carrier, at) in &at_carriers {
             known[carrier.index()] = at.psi_zero;
         }
+        let perfect = conductors.perfect.iter().flat_map(|&triangle| space.triangle(triangle));
+        perfect.for_each(|carrier| known[carrier.index()] = true);
         let mut conducts = vec![false; count];
-        conductor.iter().flat_map(|&e| space.nodes_of(e)).for_each(|n| conducts[n.index()] = true);
-        let on_surface = impedance.iter().flat_map(|&triangle| space.triangle(triangle));
-        on_surface.for_each(|n| conducts[n.index()] = true);
+        conductors.each(space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
         let branches = gauge::tree(mesh.topology().node_count(), edges, |e| known[e] || conducts[e]);
         let dofs = DofMap::new(count, |carrier, c| {
             let i = carrier.index();

@@ -15,6 +15,7 @@ use crate::family::{Cell, Matrices};
 use crate::material::Material;
 use crate::space::ElementFamily;
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
+use crate::unknowns::Conductors;
 
 /// Coefficients of the weak form at one frequency.
 #[derive(Debug)]
@@ -77,10 +78,20 @@ impl WeakForm {
         &self.surfaces.triangles
     }
 
-    /// Triangles of impedance surfaces.
-    pub(crate) fn impedance_triangles(&self) -> Vec<[NodeId; 3]> {
-        let is_impedance = |term: &SurfaceTerm| matches!(term, SurfaceTerm::Impedance(..));
-        self.surface().filter(|(_, term)| is_impedance(term)).map(|(triangle, _)| triangle).collect()
+    /// Where currents flow.
+    pub(crate) fn conductors(&self) -> Conductors {
+        let mut conductors = Conductors {
+            elements: self.topology.elements().filter(|&e| self.conducts(e)).collect(),
+            ..Conductors::default()
+        };
+        for (triangle, term) in self.surface() {
+            match term {
+                SurfaceTerm::Interface(_) => {}
+                SurfaceTerm::Impedance(..) => conductors.impedance.push(triangle),
+                SurfaceTerm::Perfect(_) => conductors.perfect.push(triangle),
+            }
+        }
+        conductors
     }
 
     /// Every triangle with its term.

@@ -12,7 +12,9 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SurfaceLaw,
+};
 
 /// `∫T dS` of the coil [A m]: 1 kA over 0.4 m, half window 0.15 m, winding 0.1 m wide.
 const MOMENT: f64 = 2500.0 * 0.163_333_333_333_333_33;
@@ -46,6 +48,10 @@ fn setup(order: Order, frequency: f64) -> FieldModelSetup {
         boundaries,
         ..FieldModelSetup::default()
     }
+}
+
+fn block(surface: &[[fluxmorph_geometry::NodeId; 3]], law: SurfaceLaw) -> Conductor {
+    Conductor { name: "block".to_owned(), surface: surface.to_vec(), law }
 }
 
 /// `μ0 c` [T] behind a surface with `Zs/(jω)` [H].
@@ -84,12 +90,34 @@ fn the_field_goes_around_the_edge_of_an_impedance_surface() {
         let conductivity =
             2.0 / (2.0 * std::f64::consts::PI * frequency * VACUUM_PERMEABILITY * skin_depth * skin_depth);
         let material = Material { relative_permeability: 1.0, conductivity };
-        let conductor = Conductor { name: "block".to_owned(), surface: surface.clone(), material };
-        let setup = FieldModelSetup { impedance_surfaces: vec![conductor], ..setup(order, frequency) };
+        let setup = FieldModelSetup {
+            impedance_surfaces: vec![block(&surface, SurfaceLaw::Impedance(material))],
+            ..setup(order, frequency)
+        };
         // Zs/(jω) = μ δ (1 − j)/2.
         let reactance = 0.5 * VACUUM_PERMEABILITY * skin_depth * c64::new(1.0, -1.0);
         let error = error(&mesh, setup, far_field(reactance));
         println!("skin depth {skin_depth} m, {order:?}: {error:.2e}");
         assert!(error < tolerance, "skin depth {skin_depth} m, {order:?}: {error:.2e}");
+    }
+}
+
+#[test]
+fn the_field_goes_around_a_perfect_conductor() {
+    let (mesh, surface) = square_without_a_quarter();
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        for order in [Order::Linear, Order::Quadratic] {
+            for frequency in [0.0, 50.0] {
+                let setup = FieldModelSetup {
+                    family,
+                    impedance_surfaces: vec![block(&surface, SurfaceLaw::Perfect)],
+                    ..setup(order, frequency)
+                };
+                let error = error(&mesh, setup, far_field(c64::default()));
+                let case = format!("{family:?}, {order:?}, {frequency} Hz: {error:.2e}");
+                println!("{case}");
+                assert!(error < if order == Order::Linear { 0.03 } else { 0.01 }, "{case}");
+            }
+        }
     }
 }

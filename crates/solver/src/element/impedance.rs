@@ -61,9 +61,8 @@ impl<const N: usize> LocalMatrix<c64, N, 4> for ImpedanceTriangle<N> {
             for j in 0..3 {
                 block[i][j] = self.coefficient * mass[a][b] * self.projection[i][j];
             }
-            let along = |a: usize, b: usize| -> f64 {
-                (0..3).map(|m| advection[a][b][m] * self.slopes[m][i]).sum()
-            };
+            let along =
+                |a: usize, b: usize| -> f64 { (0..3).map(|m| advection[a][b][m] * self.slopes[m][i]).sum() };
             block[i][3] = self.coefficient * along(a, b);
             block[3][i] = self.coefficient * along(b, a);
         }
@@ -96,8 +95,8 @@ impl Moments {
                     weighted[i] += u[i] * shape.mass[a][b];
                     for m in 0..3 {
                         // Node `a` has the vector, node `b` the slope, of either field.
-                        moments.mixed[m][i] += shape.advection[a][b][m] * l[i] * u[3]
-                            + shape.advection[b][a][m] * u[i] * l[3];
+                        moments.mixed[m][i] +=
+                            shape.advection[a][b][m] * l[i] * u[3] + shape.advection[b][a][m] * u[i] * l[3];
                         moments.scalar[m][i] += shape.stiffness[a][b][m][i] * product;
                     }
                 }
@@ -146,8 +145,8 @@ pub fn shape_derivative<const N: usize>(
     let along = dot3(turned, n);
     for i in 0..3 {
         let rtn: c64 = (0..3).map(|j| r[j][i] * n[j]).sum();
-        by_normal[i] += n[i] * (trace + normal_part) - rn[i] - rtn
-            + (turned[i] - along * n[i]) / (2.0 * triangle.area);
+        by_normal[i] +=
+            n[i] * (trace + normal_part) - rn[i] - rtn + (turned[i] - along * n[i]) / (2.0 * triangle.area);
     }
     triangle
         .by_vertices(&Slopes { by_normal, by_edge })
