@@ -26,6 +26,7 @@ pub mod material;
 pub mod model;
 pub mod prolongation;
 pub mod recovery;
+mod reentrant;
 mod rotated;
 pub mod solution;
 pub mod space;

@@ -15,6 +15,7 @@ use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
 use crate::material::{Material, VACUUM_PERMEABILITY};
+use crate::reentrant::beside_reentrant_edges;
 use crate::space::ElementFamily;
 
 /// A conductor that is not meshed but replaced by its surface.
@@ -48,7 +49,8 @@ pub(crate) enum SurfaceTerm {
     Interface(f64),
     /// `jω/Zs` [1/H] of the conductor with this index.
     Impedance(c64, usize),
-    /// The large coefficient [1/H] that makes `A_t + ∇_tψ` zero under nodal elements. Edge elements know theirs.
+    /// The large coefficient [1/H] that makes `A_t + ∇_tψ` zero under nodal elements, on perfect conductors and on walls.
+    /// Edge elements know theirs.
     Perfect(f64),
 }
 
@@ -89,10 +91,13 @@ impl<const N: usize> LocalMatrix<c64, N, 4> for SurfaceMatrix<N> {
 pub(crate) struct Surfaces {
     pub(crate) triangles: Vec<[NodeId; 3]>,
     pub(crate) terms: Vec<SurfaceTerm>,
+    /// Whether ψ is unknown on it.
+    pub(crate) has_psi: Vec<bool>,
 }
 
 impl Surfaces {
-    /// Of nodal elements the triangles at which ν jumps, natural and curved outer faces; of all, the conductors' surfaces.
+    /// Of nodal elements the triangles at which ν jumps, natural and curved outer faces, and flux-parallel walls beside
+    /// re-entrant edges; of all, the conductors' surfaces.
     ///
     /// `coefficients` by region. Nodes are in ascending order for edge elements.
     ///
@@ -107,10 +112,19 @@ impl Surfaces {
         conductors: &[Conductor],
         angular_frequency: f64,
     ) -> Result<Self, SolverError> {
-        let mut surfaces = match family {
-            ElementFamily::Nodal => Self::interfaces(mesh, coefficients, boundaries)?,
-            ElementFamily::Edge => Self::default(),
-        };
+        let mut surfaces = Self::default();
+        let mut beside = HashSet::new();
+        if family == ElementFamily::Nodal {
+            let parallel = flux_parallel(mesh, boundaries)?;
+            let replaced = conductors.iter().flat_map(|conductor| &conductor.surface);
+            let replaced: HashSet<_> = replaced.map(|&triangle| face_key(triangle)).collect();
+            let found = beside_reentrant_edges(mesh, &parallel.union(&replaced).copied().collect());
+            beside.extend(found.iter().map(|&triangle| face_key(triangle)));
+            let walls: Vec<_> = found.into_iter().filter(|&t| !replaced.contains(&face_key(t))).collect();
+            surfaces = Self::interfaces(mesh, coefficients, boundaries, &walls)?;
+            let term = SurfaceTerm::Perfect(perfect(mesh, &walls));
+            walls.into_iter().for_each(|wall| surfaces.push(wall, term, true));
+        }
         for (index, conductor) in conductors.iter().enumerate() {
             let term = match conductor.law {
                 SurfaceLaw::Impedance(material) => {
@@ -118,12 +132,12 @@ impl Surfaces {
                 }
                 SurfaceLaw::Perfect => SurfaceTerm::Perfect(perfect(mesh, &conductor.surface)),
             };
-            for triangle in &conductor.surface {
-                surfaces.triangles.push(match family {
-                    ElementFamily::Nodal => *triangle,
-                    ElementFamily::Edge => face_key(*triangle),
-                });
-                surfaces.terms.push(term);
+            for &triangle in &conductor.surface {
+                let key = face_key(triangle);
+                match family {
+                    ElementFamily::Nodal => surfaces.push(triangle, term, beside.contains(&key)),
+                    ElementFamily::Edge => surfaces.push(key, term, conductor.law != SurfaceLaw::Perfect),
+                }
             }
         }
         Ok(surfaces)
@@ -134,26 +148,47 @@ impl Surfaces {
         mesh: &Mesh,
         coefficients: &[Coefficients],
         boundaries: &[(String, Boundary)],
+        walls: &[[NodeId; 3]],
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
-        let needless = faces_without_term(mesh, boundaries)?;
+        let mut needless = faces_without_term(mesh, boundaries)?;
+        for triangle in walls {
+            needless.remove(&face_key(*triangle));
+        }
         let reluctivity = |e: ElementId| coefficients[topology.region_of()[e.index()].index()].reluctivity;
         let mut surfaces = Self::default();
         for facet in topology.facets() {
             let outside = facet.outside.map_or(0.0, reluctivity);
             let jump = reluctivity(facet.inside) - outside;
             if jump != 0.0 && !(facet.outside.is_none() && needless.contains(&face_key(facet.nodes))) {
-                surfaces.triangles.push(facet.nodes);
-                surfaces.terms.push(SurfaceTerm::Interface(jump));
+                surfaces.push(facet.nodes, SurfaceTerm::Interface(jump), false);
             }
         }
         Ok(surfaces)
+    }
+
+    fn push(&mut self, triangle: [NodeId; 3], term: SurfaceTerm, has_psi: bool) {
+        self.triangles.push(triangle);
+        self.terms.push(term);
+        self.has_psi.push(has_psi);
     }
 
     /// Every triangle with its term.
     pub(crate) fn iter(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
         self.triangles.iter().copied().zip(self.terms.iter().copied())
     }
+}
+
+/// Triangles of flux-parallel surfaces, by their ascending nodes.
+fn flux_parallel(
+    mesh: &Mesh,
+    boundaries: &[(String, Boundary)],
+) -> Result<HashSet<[NodeId; 3]>, SolverError> {
+    let mut faces = HashSet::new();
+    for (name, _) in boundaries.iter().filter(|(_, boundary)| *boundary == Boundary::FluxParallel) {
+        faces.extend(mesh.topology().surface(name)?.iter().map(|&triangle| face_key(triangle)));
+    }
+    Ok(faces)
 }
 
 /// `jω/Zs` [1/H] of a conductor.

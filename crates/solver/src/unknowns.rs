@@ -1,10 +1,11 @@
-//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors and on impedance surfaces, less what
-//! the boundaries fix.
+//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors and on their surfaces, less what the
+//! boundaries fix.
 //!
 //! Of nodal elements:
 //!
 //! * *flux-parallel* surface (B·n = 0): the tangential components of `A` are zero, and `ψ = 0` where the surface cuts a
-//!   conductor, since the current crosses it at right angles;
+//!   conductor, since the current crosses it at right angles; beside a re-entrant edge of the domain there is a
+//!   term with `ψ` instead (`reentrant`);
 //! * *flux-normal* surface (n × H = 0): the normal component of `A` is zero, `ψ` is free;
 //! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
@@ -17,7 +18,7 @@
 //! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
@@ -58,17 +59,19 @@ pub struct Unknowns {
 pub struct Conductors {
     /// Meshed, ascending.
     pub elements: Vec<ElementId>,
-    /// Impedance surfaces.
-    pub impedance: Vec<[NodeId; 3]>,
-    /// Surfaces of perfect conductors: edge elements know their tangential field, nodal ones have a surface term.
-    pub perfect: Vec<[NodeId; 3]>,
+    /// Surfaces with ψ: of edge elements those with an impedance, of nodal ones those beside re-entrant edges, conductors' or
+    /// flux-parallel.
+    pub surface: Vec<[NodeId; 3]>,
+    /// Surfaces of conductors on which ψ is zero; of edge elements those of perfect conductors, where all is zero that is
+    /// tangential.
+    pub grounded: Vec<[NodeId; 3]>,
 }
 
 impl Conductors {
-    /// Calls back with the carriers of every element and surface triangle.
+    /// Calls back with the carriers of every element and surface triangle with ψ.
     pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[NodeId])) {
         self.elements.iter().for_each(|&e| with(space.nodes_of(e)));
-        self.impedance.iter().chain(&self.perfect).for_each(|&triangle| with(&space.triangle(triangle)));
+        self.surface.iter().for_each(|&triangle| with(&space.triangle(triangle)));
     }
 }
 
@@ -106,20 +109,18 @@ impl Unknowns {
         conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
-        let at_nodes = conditions(mesh, space, boundaries)?;
+        let covered = conductors.surface.iter().map(|&triangle| face_key(triangle)).collect();
+        let at_nodes = conditions(mesh, space, boundaries, &covered)?;
         let potentials = at_nodes.values().filter_map(|at| at.potential).map(norm);
         let tolerance = CONFLICT * potentials.fold(0.0, f64::max);
         let node_count = space.node_count();
         let mut fixed = vec![0u8; node_count];
         let mut psi_zero = vec![false; node_count];
         let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
-        let mut planes = BTreeMap::new();
         for (node, at) in at_nodes {
             let FixedDirections { frame, fixed: bits } = fixed_directions(&at.faces);
             fixed[node.index()] = bits;
             psi_zero[node.index()] = at.psi_zero;
-            let axes = at.faces.iter().filter_map(|(_, area)| axis_of(area.map(|c| c / norm(*area))));
-            planes.insert(node, axes.fold(0, |bits, axis| bits | 1 << axis));
             if frame != Frame::COORDINATES {
                 frames.insert(node, frame);
             }
@@ -132,6 +133,8 @@ impl Unknowns {
             }
         }
         let mut has_psi = vec![false; node_count];
+        let bare = conductors.grounded.iter().flat_map(|&triangle| space.triangle(triangle));
+        bare.for_each(|n| psi_zero[n.index()] = true);
         let mut connected = DisjointSets::new(node_count);
         conductors.each(space, |nodes| {
             connected.join(nodes.iter().map(|n| n.index()));
@@ -145,6 +148,7 @@ impl Unknowns {
             let i = node.index();
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
+        let planes = planes(mesh, boundaries)?;
         Ok(Self { dofs, grounded, frames, prescribed, planes })
     }
 
@@ -161,7 +165,7 @@ impl Unknowns {
             let [from, to] = edges[carrier.index()].map(|n| mesh.point(n));
             dot(potential, sub(to, from))
         };
-        let at_carriers = conditions(mesh, space, boundaries)?;
+        let at_carriers = conditions(mesh, space, boundaries, &HashSet::new())?;
         let applied: Vec<(NodeId, f64, bool)> = at_carriers
             .iter()
             .filter(|(carrier, _)| carrier.index() < edges.len())
@@ -180,7 +184,7 @@ impl Unknowns {
         for (carrier, at) in &at_carriers {
             known[carrier.index()] = at.psi_zero;
         }
-        let perfect = conductors.perfect.iter().flat_map(|&triangle| space.triangle(triangle));
+        let perfect = conductors.grounded.iter().flat_map(|&triangle| space.triangle(triangle));
         perfect.for_each(|carrier| known[carrier.index()] = true);
         let mut conducts = vec![false; count];
         conductors.each(space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
@@ -289,11 +293,12 @@ fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<BTreeMap<Nod
     Ok(planes)
 }
 
-/// The faces of conditioned surfaces at every carrier of the space.
+/// The faces of conditioned surfaces at every carrier of the space, but for flux-parallel ones that have a term instead.
 fn conditions(
     mesh: &Mesh,
     space: &Space,
     boundaries: &[(String, Boundary)],
+    covered: &HashSet<[NodeId; 3]>,
 ) -> Result<BTreeMap<NodeId, AtNode>, SolverError> {
     let mut at_nodes: BTreeMap<NodeId, AtNode> = BTreeMap::new();
     let mut condition_of: HashMap<[NodeId; 3], (&str, &Boundary)> = HashMap::new();
@@ -312,6 +317,9 @@ fn conditions(
                     surfaces: [(*other).to_owned(), surface.clone()],
                     place: centroid(vertices),
                 });
+            }
+            if *boundary == Boundary::FluxParallel && covered.contains(&face_key(triangle)) {
+                continue;
             }
             for node in space.triangle(triangle) {
                 let at = at_nodes.entry(node).or_default();

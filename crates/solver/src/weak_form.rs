@@ -84,11 +84,11 @@ impl WeakForm {
             elements: self.topology.elements().filter(|&e| self.conducts(e)).collect(),
             ..Conductors::default()
         };
-        for (triangle, term) in self.surface() {
+        for ((triangle, term), has_psi) in self.surface().zip(&self.surfaces.has_psi) {
             match term {
                 SurfaceTerm::Interface(_) => {}
-                SurfaceTerm::Impedance(..) => conductors.impedance.push(triangle),
-                SurfaceTerm::Perfect(_) => conductors.perfect.push(triangle),
+                _ if *has_psi => conductors.surface.push(triangle),
+                _ => conductors.grounded.push(triangle),
             }
         }
         conductors

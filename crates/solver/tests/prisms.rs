@@ -121,3 +121,21 @@ fn the_field_goes_around_a_perfect_conductor() {
         }
     }
 }
+
+/// The quarter's faces are then part of a flux-parallel wall with a re-entrant edge.
+#[test]
+fn the_field_goes_around_the_edge_of_a_wall() {
+    let (mesh, surface) = square_without_a_quarter();
+    let topology = (**mesh.topology()).clone().with_surface("wall", surface).expect("faces of the mesh");
+    let mesh = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("the same mesh");
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        for order in [Order::Linear, Order::Quadratic] {
+            let mut setup = FieldModelSetup { family, ..setup(order, 0.0) };
+            setup.boundaries.push(("wall".to_owned(), Boundary::FluxParallel));
+            let error = error(&mesh, setup, far_field(c64::default()));
+            let case = format!("{family:?}, {order:?}: {error:.2e}");
+            println!("{case}");
+            assert!(error < if order == Order::Linear { 0.03 } else { 0.01 }, "{case}");
+        }
+    }
+}
