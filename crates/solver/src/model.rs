@@ -181,7 +181,7 @@ impl FieldModel {
         let numbers = (angular_frequency, setup.penalty);
         let form = WeakForm::new(
             mesh,
-            setup.family,
+            (setup.family, setup.order),
             numbers,
             &setup.materials,
             &setup.boundaries,

@@ -13,7 +13,7 @@ use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
-use crate::space::ElementFamily;
+use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
 use crate::unknowns::Conductors;
 
@@ -34,7 +34,7 @@ impl WeakForm {
     /// As [`Surfaces::new`].
     pub(crate) fn new(
         mesh: &Mesh,
-        family: ElementFamily,
+        elements: (ElementFamily, Order),
         (angular_frequency, penalty): (f64, f64),
         materials: &[Material],
         boundaries: &[(String, Boundary)],
@@ -48,7 +48,8 @@ impl WeakForm {
                 eddy: c64::new(0.0, angular_frequency * m.conductivity),
             })
             .collect();
-        let surfaces = Surfaces::new(mesh, family, &coefficients, boundaries, conductors, angular_frequency)?;
+        let surfaces =
+            Surfaces::new(mesh, elements, &coefficients, boundaries, conductors, angular_frequency)?;
         Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces })
     }
 
