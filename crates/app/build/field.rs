@@ -8,7 +8,8 @@ use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
 };
 use fluxmorph_solver::{
-    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Order, SolverError, UniformField,
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Order, SolverError, SurfaceLaw,
+    UniformField,
 };
 
 use super::locate_error::DiagnosticSink;
@@ -18,26 +19,26 @@ use crate::config::{
 };
 use crate::error::Error;
 
-/// The mesh without the regions that impedance surfaces replace, and those surfaces on it.
-pub(super) fn without_impedance_regions(
+/// The mesh without the regions that their surfaces replace, and those surfaces on it.
+pub(super) fn without_replaced_regions(
     config: &Config,
     full: &Mesh,
 ) -> Result<(Mesh, Vec<Conductor>), Error> {
     let mut mesh = full.clone();
-    let replaced: Vec<&String> = config
-        .regions
-        .iter()
-        .filter(|(_, r)| r.model == RegionModel::Impedance)
-        .map(|(name, _)| name)
-        .collect();
-    for name in &replaced {
+    let law = |(name, region): (&'_ String, &config::Region)| match region.model {
+        RegionModel::Volume => None,
+        RegionModel::Impedance => Some((name.clone(), SurfaceLaw::Impedance(super::material(config, name)))),
+        RegionModel::Perfect => Some((name.clone(), SurfaceLaw::Perfect)),
+    };
+    let replaced: Vec<(String, SurfaceLaw)> = config.regions.iter().filter_map(law).collect();
+    for (name, _) in &replaced {
         mesh = mesh.without_region(full.topology().region(name)?)?.0;
     }
     // Node numbers are final only now: expose each surface on the last mesh through the positions it kept.
     let mut conductors = Vec::new();
-    for name in replaced {
-        let surface = exposed_surface(full, &mesh, name)?;
-        conductors.push(Conductor { name: name.clone(), surface, material: super::material(config, name) });
+    for (name, law) in replaced {
+        let surface = exposed_surface(full, &mesh, &name)?;
+        conductors.push(Conductor { name, surface, law });
     }
     Ok((mesh, conductors))
 }
@@ -273,8 +274,8 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
         }
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
-        if config.regions.get(name).is_some_and(|r| r.model == RegionModel::Impedance) {
-            let fault = source.diagnostic(&path, format!("`{name}` is replaced by its impedance surface"));
+        if config.regions.get(name).is_some_and(|r| r.model != RegionModel::Volume) {
+            let fault = source.diagnostic(&path, format!("`{name}` is replaced by its surface"));
             faults.push(fault.expected("a region that is meshed"));
         } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
             && super::material(config, name).conductivity > 0.0

@@ -48,7 +48,14 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
         let entry = config.regions.get(region);
         if functional.kind == ObjectiveKind::Loss {
-            if super::material(config, region).conductivity == 0.0 {
+            if entry.is_some_and(|entry| entry.model == RegionModel::Perfect) {
+                let message = format!("`{region}` is a perfect conductor, so it has no eddy-current loss");
+                faults.push(
+                    source
+                        .diagnostic(&format!("{path}.region"), message)
+                        .expected("a region whose material conducts, with another model"),
+                );
+            } else if super::material(config, region).conductivity == 0.0 {
                 let message = format!("`{region}` does not conduct, so it has no eddy-current loss");
                 faults.push(
                     source
@@ -56,8 +63,8 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
                         .expected("a region whose material conducts"),
                 );
             }
-        } else if entry.is_some_and(|entry| entry.model == RegionModel::Impedance) {
-            let message = format!("`{region}` is replaced by its impedance surface");
+        } else if entry.is_some_and(|entry| entry.model != RegionModel::Volume) {
+            let message = format!("`{region}` is replaced by its surface");
             faults.push(
                 source
                     .diagnostic(&format!("{path}.region"), message)

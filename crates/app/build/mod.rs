@@ -62,6 +62,7 @@ impl Audited {
         match self.model {
             RegionModel::Volume => self.audit.volume_warning(),
             RegionModel::Impedance => self.audit.impedance_warning(),
+            RegionModel::Perfect => None,
         }
     }
 }
@@ -125,7 +126,7 @@ fn build_problem(
     check_names(config, source, &full_mesh, &warnings)?;
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
-    let (mesh, conductors) = field::without_impedance_regions(config, &full_mesh)?;
+    let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut sink = DiagnosticSink::new(config, source, probe_faults(config, source, &full_mesh, &mesh));
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     if conductors.is_empty() && !motion_alone {
@@ -235,7 +236,8 @@ fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
         };
         Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
     };
-    config.regions.iter().filter_map(of).flatten().collect()
+    let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
+    config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
 }
 
 /// The material of a region; air where the configuration says nothing.

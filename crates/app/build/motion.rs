@@ -46,7 +46,7 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     let Morphing { morph, remesh } = config.morphing(source)?;
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     source.check(name_faults(config, source, full_mesh.topology()))?;
-    let (mesh, _) = field::without_impedance_regions(config, &full_mesh)?;
+    let (mesh, _) = field::without_replaced_regions(config, &full_mesh)?;
 
     let mut faults = Vec::new();
     let mut moved: BTreeMap<NodeId, NodeMotion> = BTreeMap::new();

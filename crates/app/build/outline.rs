@@ -52,7 +52,7 @@ pub struct OutlinedDesign {
 pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
     let full_mesh = mesh::build(config, source)?.mesh;
     source.check(name_faults(config, source, full_mesh.topology()))?;
-    let (mesh, _) = field::without_impedance_regions(config, &full_mesh)?;
+    let (mesh, _) = field::without_replaced_regions(config, &full_mesh)?;
     let node_of = same_nodes(&full_mesh, &mesh);
     let design = match &config.design {
         Some(_) => Some(outline_design(config, source, &full_mesh, &mesh, &node_of)?),

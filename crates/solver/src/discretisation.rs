@@ -18,6 +18,7 @@ use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, ElementFamily, Order, Space};
+use crate::surface::SurfaceTerm;
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
 
@@ -96,8 +97,7 @@ impl Discretisation {
     ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
         let space = Space::new(topology, family, order);
-        let impedance = weak_form.impedance_triangles();
-        let unknowns = Unknowns::new(mesh, &space, &conductor(weak_form), &impedance, boundaries)?;
+        let unknowns = Unknowns::new(mesh, &space, &weak_form.conductors(), boundaries)?;
         let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
         let local = ownership.map(|own| LocalEntities::new(topology, weak_form.triangles(), own));
         let coupling_of = |e: ElementId| {
@@ -119,7 +119,7 @@ impl Discretisation {
             }
         };
         let (pattern, groups) =
-            pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form.triangles());
+            pattern(&space, (&rows, &unknowns.dofs), local.as_ref(), coupling_of, weak_form);
         let lifted = find_lifted(mesh, &space, &unknowns, weak_form.triangles());
         Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
@@ -143,17 +143,14 @@ impl Discretisation {
                 expected: "a factor, or an incomplete one: edge elements have no coarse level".to_owned(),
             });
         }
-        let conductor = conductor(weak_form);
+        let conductors = weak_form.conductors();
         if self.space.order() == Order::Quadratic {
             let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
-            let impedance = weak_form.impedance_triangles();
-            let coarse = Unknowns::new(mesh, &vertices, &conductor, &impedance, boundaries)?;
+            let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
         let mut conducts = vec![false; self.space.node_count()];
-        for node in conductor.iter().flat_map(|&e| self.space.nodes_of(e)) {
-            conducts[node.index()] = true;
-        }
+        conductors.each(&self.space, |nodes| nodes.iter().for_each(|n| conducts[n.index()] = true));
         let kept = |node: NodeId| conducts[node.index()];
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
     }
@@ -204,28 +201,31 @@ impl Discretisation {
     }
 }
 
-/// Elements in which eddy currents flow, ascending.
-fn conductor(weak_form: &WeakForm) -> Vec<ElementId> {
-    weak_form.topology().elements().filter(|&e| weak_form.conducts(e)).collect()
-}
-
 /// The pattern of the rows against the columns, and the elements and triangles of this rank bound to it.
 fn pattern(
     space: &Space,
     dofs: (&DofMap<4>, &DofMap<4>),
     local: Option<&LocalEntities>,
     coupling_of: impl Fn(ElementId) -> Coupling,
-    triangles: &[[NodeId; 3]],
+    weak_form: &WeakForm,
 ) -> (BlockPattern<4>, Box<dyn Bound>) {
     let couplings: Vec<Coupling> = match local {
         None => (0..space.element_count()).map(|e| coupling_of(ElementId::new(e))).collect(),
         Some(local) => local.elements.iter().map(|&e| coupling_of(e)).collect(),
     };
-    let triangles: Vec<Vec<NodeId>> = match local {
-        None => triangles.iter().map(|&t| space.triangle(t)).collect(),
-        Some(local) => local.triangles.iter().map(|&t| space.triangle(triangles[t])).collect(),
+    let face = |(triangle, term)| {
+        let components = if matches!(term, SurfaceTerm::Interface(_)) { 3 } else { 4 };
+        (space.triangle(triangle), Coupling::full(components))
     };
-    let parts = (dofs, local, couplings, triangles.as_slice());
+    let all = weak_form.surface();
+    let faces: Vec<(Vec<NodeId>, Coupling)> = match local {
+        None => all.map(face).collect(),
+        Some(local) => {
+            let all: Vec<_> = all.collect();
+            local.triangles.iter().map(|&t| face(all[t])).collect()
+        }
+    };
+    let parts = (dofs, local, couplings, faces.as_slice());
     match (space.carriers(), space.family()) {
         (Carriers::Four(tets), _) => bind(&*family::NODAL_1, tets, parts),
         (Carriers::Six(tets), _) => bind(&*family::EDGE_1, tets, parts),
@@ -235,26 +235,26 @@ fn pattern(
 }
 
 /// Rows and columns; the elements and triangles of this rank where there are several; couplings of these elements; carriers
-/// of these triangles.
+/// and coupling of these triangles.
 type Parts<'a> =
-    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [Vec<NodeId>]);
+    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [(Vec<NodeId>, Coupling)]);
 
 fn bind<K: Matrices<N, F>, const N: usize, const F: usize>(
     matrices: &'static K,
     tets: &[[NodeId; N]],
-    ((rows, columns), local, couplings, triangles): Parts<'_>,
+    ((rows, columns), local, couplings, faces): Parts<'_>,
 ) -> (BlockPattern<4>, Box<dyn Bound>) {
     let count = columns.node_count();
     let tets = match local {
         None => tets.to_vec(),
         Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
     };
-    let carriers =
-        |t: &Vec<NodeId>| t.as_slice().try_into().expect("a triangle of the same family and order");
-    let triangles: Vec<[NodeId; F]> = triangles.iter().map(carriers).collect();
+    let carriers = |face: &(Vec<NodeId>, Coupling)| -> [NodeId; F] {
+        face.0.as_slice().try_into().expect("a triangle of the same family and order")
+    };
+    let triangles = faces.iter().map(carriers).collect();
     let volumes = ElementGroup::new(count, tets, couplings);
-    let full = vec![Coupling::full(K::SURFACE_COMPONENTS); triangles.len()];
-    let faces = ElementGroup::new(count, triangles, full);
+    let faces = ElementGroup::new(count, triangles, faces.iter().map(|face| face.1).collect());
     let pattern = BlockPattern::of_rows(rows, columns, &volumes, &faces);
     let groups = Groups { matrices, tets: pattern.bind(&volumes), triangles: pattern.bind(&faces) };
     (pattern, Box::new(groups))

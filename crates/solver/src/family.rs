@@ -138,8 +138,6 @@ pub(crate) trait Family: Sync {
 
 /// The matrices of elements with `N` and faces with `F` carriers.
 pub(crate) trait Matrices<const N: usize, const F: usize>: Sync {
-    /// Components that surface terms couple.
-    const SURFACE_COMPONENTS: usize;
     /// Of a tetrahedron.
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4>;
     /// Of a surface term.
@@ -185,8 +183,12 @@ pub(crate) static EDGE_2: LazyLock<Edge<10, 30, 4, 12>> = LazyLock::new(|| Edge 
 /// The nodal potentials of an element.
 #[inline]
 fn nodal<const N: usize>(coefficients: &[[c64; 4]]) -> NodalField<N> {
-    let values: [[c64; 4]; N] = coefficients.try_into().expect("one entry a node");
-    NodalField::new(values)
+    NodalField::new(*at_nodes(coefficients))
+}
+
+#[inline]
+fn at_nodes<const N: usize>(coefficients: &[[c64; 4]]) -> &[[c64; 4]; N] {
+    coefficients.try_into().expect("one entry a node")
 }
 
 fn with_psi<const N: usize>(load: [Complex3; N]) -> Local {
@@ -278,24 +280,26 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
         adjoint: &[[c64; 4]],
         state: &[[c64; 4]],
     ) -> [Complex3; 3] {
-        let (l, u) = (nodal(adjoint).vector_potential, nodal(state).vector_potential);
+        let surface = |coefficient: c64| {
+            let (l, u) = (at_nodes(adjoint), at_nodes(state));
+            impedance::shape_derivative(self.triangle, vertices, coefficient, l, u)
+        };
         match term {
-            SurfaceTerm::Interface(jump) => interface::shape_derivative(self.triangle, jump, &l, &u),
-            SurfaceTerm::Impedance(coefficient, _) => {
-                impedance::shape_derivative(self.triangle, vertices, coefficient, &l, &u)
+            SurfaceTerm::Interface(jump) => {
+                let (l, u) = (nodal(adjoint).vector_potential, nodal(state).vector_potential);
+                interface::shape_derivative(self.triangle, jump, &l, &u)
             }
+            SurfaceTerm::Impedance(coefficient, _) => surface(coefficient),
+            SurfaceTerm::Perfect(coefficient) => surface(coefficient.into()),
         }
     }
 
     fn surface_loss(&self, vertices: [Point; 3], factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<3> {
-        let potential = nodal(coefficients).vector_potential;
-        density::surface_loss(self.triangle, vertices, factor, &potential).into()
+        impedance::loss(self.triangle, vertices, factor, at_nodes(coefficients)).into()
     }
 }
 
 impl Matrices<4, 3> for Nodal<4, 3> {
-    const SURFACE_COMPONENTS: usize = 3;
-
     #[inline]
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, 4, 4> {
         AphiTet::new(cell.tet, law)
@@ -308,8 +312,6 @@ impl Matrices<4, 3> for Nodal<4, 3> {
 }
 
 impl Matrices<10, 6> for Nodal<10, 6> {
-    const SURFACE_COMPONENTS: usize = 3;
-
     #[inline]
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, 10, 4> {
         LagrangeTet::new(self.tet, cell.tet, law)
@@ -394,7 +396,7 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         state: &[[c64; 4]],
     ) -> [Complex3; 3] {
         match term {
-            SurfaceTerm::Interface(_) => [[c64::default(); 3]; 3],
+            SurfaceTerm::Interface(_) | SurfaceTerm::Perfect(_) => [[c64::default(); 3]; 3],
             SurfaceTerm::Impedance(coefficient, _) => {
                 self.triangle.shape_derivative(vertices, coefficient, adjoint, state)
             }
@@ -407,8 +409,6 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
 }
 
 impl<const N: usize, const M: usize, const F: usize, const K: usize> Matrices<N, F> for Edge<N, M, F, K> {
-    const SURFACE_COMPONENTS: usize = 4;
-
     #[inline]
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4> {
         EdgeTet::new(self.tet, &cell.ascending(), law)
@@ -417,7 +417,7 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Matrices<N,
     #[inline]
     fn triangle(&self, vertices: [Point; 3], term: SurfaceTerm) -> impl LocalMatrix<c64, F, 4> {
         let coefficient = match term {
-            SurfaceTerm::Interface(_) => c64::default(),
+            SurfaceTerm::Interface(_) | SurfaceTerm::Perfect(_) => c64::default(),
             SurfaceTerm::Impedance(coefficient, _) => coefficient,
         };
         let matrix: EdgeTriangle<F> = self.triangle.matrix(vertices, coefficient);

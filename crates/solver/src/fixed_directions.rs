@@ -14,7 +14,7 @@ use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
 
 /// Angle between faces above which they are two surfaces: finer than the facets of any sensible mesh of a curved
 /// surface, coarser than a corner.
-const CREASE: f64 = 40.0;
+pub(crate) const CREASE: f64 = 40.0;
 
 /// Angle by which a curved surface's mean normal may miss a plane it ends at: half a facet of [`CREASE`], and some.
 const SKEW: f64 = 25.0;

@@ -45,7 +45,7 @@ pub struct FieldModelSetup {
     pub materials: Vec<Material>,
     /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
     pub remanence: Vec<Point>,
-    /// Conductors replaced by impedance surfaces.
+    /// Conductors replaced by their surfaces.
     pub impedance_surfaces: Vec<Conductor>,
     /// Coils.
     pub coils: Vec<Coil>,
@@ -181,7 +181,7 @@ impl FieldModel {
         let numbers = (angular_frequency, setup.penalty);
         let form = WeakForm::new(
             mesh,
-            setup.family,
+            (setup.family, setup.order),
             numbers,
             &setup.materials,
             &setup.boundaries,
@@ -309,7 +309,7 @@ impl FieldModel {
         self.setup.remanence.get(region.index()).copied().unwrap_or_default()
     }
 
-    /// Conductors replaced by impedance surfaces.
+    /// Conductors replaced by their surfaces.
     pub fn conductors(&self) -> &[Conductor] {
         &self.setup.impedance_surfaces
     }
@@ -420,7 +420,7 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
         if conductor.surface.is_empty() {
             return Err(SolverError::EmptyRegion {
                 region: conductor.name.clone(),
-                expected: "an impedance surface needs faces",
+                expected: "the surface that replaces a conductor needs faces",
             });
         }
     }

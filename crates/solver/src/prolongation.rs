@@ -102,9 +102,9 @@ impl Columns {
 
 #[cfg(test)]
 mod tests {
+    use fluxmorph_geometry::Mesh;
     use fluxmorph_geometry::fem::c64;
     use fluxmorph_geometry::generate::{ShieldParameters, SphereParameters, shield, sphere};
-    use fluxmorph_geometry::{ElementId, Mesh};
 
     use super::*;
     use crate::boundary::Boundary;
@@ -112,16 +112,16 @@ mod tests {
     use crate::material::Material;
     use crate::model::{FieldModel, FieldModelSetup};
     use crate::space::{ElementFamily, Order};
+    use crate::unknowns::Conductors;
 
     fn unknowns(
         mesh: &Mesh,
         order: Order,
-        conductor: &[ElementId],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> (Space, Unknowns) {
         let space = Space::new(mesh.topology(), ElementFamily::Nodal, order);
-        let unknowns =
-            Unknowns::new(mesh, &space, conductor, &[], boundaries).expect("conditions that agree");
+        let unknowns = Unknowns::new(mesh, &space, conductors, boundaries).expect("conditions that agree");
         (space, unknowns)
     }
 
@@ -132,7 +132,8 @@ mod tests {
         let parameters = SphereParameters { divisions: 3, ..SphereParameters::default() };
         let mesh = sphere(&parameters).expect("a sphere");
         let topology = mesh.topology();
-        let conductor = topology.elements_of(topology.region("sphere").expect("its region"));
+        let elements = topology.elements_of(topology.region("sphere").expect("its region"));
+        let conductors = Conductors { elements, ..Conductors::default() };
         let of = |(surface, boundary): (&str, Boundary)| (surface.to_owned(), boundary);
         let boundaries = [
             ("x_min", Boundary::FluxParallel),
@@ -141,8 +142,8 @@ mod tests {
             ("outer", Boundary::FluxParallel),
         ]
         .map(of);
-        let (_, coarse) = unknowns(&mesh, Order::Linear, &conductor, &boundaries);
-        let (space, fine) = unknowns(&mesh, Order::Quadratic, &conductor, &boundaries);
+        let (_, coarse) = unknowns(&mesh, Order::Linear, &conductors, &boundaries);
+        let (space, fine) = unknowns(&mesh, Order::Quadratic, &conductors, &boundaries);
         assert!(fine.has_frames() && coarse.has_frames());
         let p = prolongation(&coarse, &space, &fine, ScalarSpace::Linear);
         let x: Vec<c64> = (0..coarse.dofs.count()).map(|i| c64::new((0.7 * i as f64).sin(), 0.1)).collect();

@@ -180,7 +180,7 @@ impl FieldSolution {
         0.5 * model.angular_frequency() * eddy.im * mean_square
     }
 
-    /// Time-averaged loss [W] of every conductor by name: meshed regions, then impedance surfaces.
+    /// Time-averaged loss [W] of every conductor by name: meshed regions, then those replaced by their surfaces.
     pub fn losses(&self, model: &FieldModel, mesh: &Mesh) -> Vec<(String, f64)> {
         let topology = model.topology();
         let mut by_region = vec![0.0; topology.region_names().len()];

@@ -1,22 +1,24 @@
-//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors, less what the boundaries fix.
+//! Which components are unknown where: `A_x, A_y, A_z` everywhere, `ψ` in conductors and on their surfaces, less what the
+//! boundaries fix.
 //!
 //! Of nodal elements:
 //!
 //! * *flux-parallel* surface (B·n = 0): the tangential components of `A` are zero, and `ψ = 0` where the surface cuts a
-//!   conductor, since the current crosses it at right angles;
+//!   conductor, since the current crosses it at right angles; beside a re-entrant edge of the domain there is a
+//!   term with `ψ` instead (`reentrant`);
 //! * *flux-normal* surface (n × H = 0): the normal component of `A` is zero, `ψ` is free;
 //! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
 //! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors ([`crate::gauge`]),
 //! and the gradients' coefficients in and on conductors; on flux-parallel surfaces and where a field is applied, all that is
-//! tangential is known. Flux-normal is natural.
+//! tangential is known, as on perfect conductors. Flux-normal is natural.
 //!
 //! On planes along the axes the unknowns of nodal elements are components of `A`; at the nodes of other conditioned surfaces they are
 //! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
 //! [`Unknowns::scatter_add`] turn between the two.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
@@ -52,6 +54,27 @@ pub struct Unknowns {
     planes: BTreeMap<NodeId, u8>,
 }
 
+/// Where currents flow, so that there is ψ.
+#[derive(Clone, Debug, Default)]
+pub struct Conductors {
+    /// Meshed, ascending.
+    pub elements: Vec<ElementId>,
+    /// Surfaces with ψ: of edge elements those with an impedance, of nodal ones those beside re-entrant edges, conductors' or
+    /// flux-parallel.
+    pub surface: Vec<[NodeId; 3]>,
+    /// Surfaces of conductors on which ψ is zero; of edge elements those of perfect conductors, where all is zero that is
+    /// tangential.
+    pub grounded: Vec<[NodeId; 3]>,
+}
+
+impl Conductors {
+    /// Calls back with the carriers of every element and surface triangle with ψ.
+    pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[NodeId])) {
+        self.elements.iter().for_each(|&e| with(space.nodes_of(e)));
+        self.surface.iter().for_each(|&triangle| with(&space.triangle(triangle)));
+    }
+}
+
 /// What conditions say at one node.
 #[derive(Default)]
 struct AtNode {
@@ -63,7 +86,7 @@ struct AtNode {
 }
 
 impl Unknowns {
-    /// Numbers the unknowns of a space with conducting elements and impedance surfaces, and conditions on named surfaces.
+    /// Numbers the unknowns of a space with conductors, and conditions on named surfaces.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] for an unknown surface, [`SolverError::Conflict`] where an applied field contradicts
@@ -71,36 +94,42 @@ impl Unknowns {
     pub fn new(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
-        impedance: &[[NodeId; 3]],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         match space.family() {
-            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductor, boundaries),
-            ElementFamily::Edge => Self::of_edges(mesh, space, conductor, impedance, boundaries),
+            ElementFamily::Nodal => Self::of_nodes(mesh, space, conductors, boundaries),
+            ElementFamily::Edge => Self::of_edges(mesh, space, conductors, boundaries),
         }
     }
 
     fn of_nodes(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
-        let at_nodes = conditions(mesh, space, boundaries)?;
+        let covered = conductors.surface.iter().map(|&triangle| face_key(triangle)).collect();
+        let at_nodes = conditions(mesh, space, boundaries, &covered)?;
+        if at_nodes.is_empty() && conductors.grounded.is_empty() && !conductors.surface.is_empty() {
+            return Err(SolverError::Parameter {
+                what: "boundaries".to_owned(),
+                value: "none".to_owned(),
+                expected: "a condition on an outer surface, or elements = \"edge\": a surface with sharp edges leaves \
+                           the potential of nodal elements open by a constant"
+                    .to_owned(),
+            });
+        }
         let potentials = at_nodes.values().filter_map(|at| at.potential).map(norm);
         let tolerance = CONFLICT * potentials.fold(0.0, f64::max);
         let node_count = space.node_count();
         let mut fixed = vec![0u8; node_count];
         let mut psi_zero = vec![false; node_count];
         let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
-        let mut planes = BTreeMap::new();
         for (node, at) in at_nodes {
             let FixedDirections { frame, fixed: bits } = fixed_directions(&at.faces);
             fixed[node.index()] = bits;
             psi_zero[node.index()] = at.psi_zero;
-            let axes = at.faces.iter().filter_map(|(_, area)| axis_of(area.map(|c| c / norm(*area))));
-            planes.insert(node, axes.fold(0, |bits, axis| bits | 1 << axis));
             if frame != Frame::COORDINATES {
                 frames.insert(node, frame);
             }
@@ -113,12 +142,14 @@ impl Unknowns {
             }
         }
         let mut has_psi = vec![false; node_count];
-        for &e in conductor {
-            for n in space.nodes_of(e) {
-                has_psi[n.index()] = true;
-            }
-        }
-        let grounded = ground(space, conductor, &psi_zero);
+        let bare = conductors.grounded.iter().flat_map(|&triangle| space.triangle(triangle));
+        bare.for_each(|n| psi_zero[n.index()] = true);
+        let mut connected = DisjointSets::new(node_count);
+        conductors.each(space, |nodes| {
+            connected.join(nodes.iter().map(|n| n.index()));
+            nodes.iter().for_each(|n| has_psi[n.index()] = true);
+        });
+        let grounded = ground(&mut connected, &has_psi, &psi_zero);
         for n in &grounded {
             psi_zero[n.index()] = true;
         }
@@ -126,14 +157,14 @@ impl Unknowns {
             let i = node.index();
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
+        let planes = planes(mesh, boundaries)?;
         Ok(Self { dofs, grounded, frames, prescribed, planes })
     }
 
     fn of_edges(
         mesh: &Mesh,
         space: &Space,
-        conductor: &[ElementId],
-        impedance: &[[NodeId; 3]],
+        conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
         let count = space.node_count();
@@ -143,7 +174,7 @@ impl Unknowns {
             let [from, to] = edges[carrier.index()].map(|n| mesh.point(n));
             dot(potential, sub(to, from))
         };
-        let at_carriers = conditions(mesh, space, boundaries)?;
+        let at_carriers = conditions(mesh, space, boundaries, &HashSet::new())?;
         let applied: Vec<(NodeId, f64, bool)> = at_carriers
             .iter()
             .filter(|(carrier, _)| carrier.index() < edges.len())
@@ -162,10 +193,10 @@ impl Unknowns {
         for (carrier, at) in &at_carriers {
             known[carrier.index()] = at.psi_zero;
         }
+        let perfect = conductors.grounded.iter().flat_map(|&triangle| space.triangle(triangle));
+        perfect.for_each(|carrier| known[carrier.index()] = true);
         let mut conducts = vec![false; count];
-        conductor.iter().flat_map(|&e| space.nodes_of(e)).for_each(|n| conducts[n.index()] = true);
-        let on_surface = impedance.iter().flat_map(|&triangle| space.triangle(triangle));
-        on_surface.for_each(|n| conducts[n.index()] = true);
+        conductors.each(space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
         let branches = gauge::tree(mesh.topology().node_count(), edges, |e| known[e] || conducts[e]);
         let dofs = DofMap::new(count, |carrier, c| {
             let i = carrier.index();
@@ -271,11 +302,12 @@ fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<BTreeMap<Nod
     Ok(planes)
 }
 
-/// The faces of conditioned surfaces at every carrier of the space.
+/// The faces of conditioned surfaces at every carrier of the space, but for flux-parallel ones that have a term instead.
 fn conditions(
     mesh: &Mesh,
     space: &Space,
     boundaries: &[(String, Boundary)],
+    covered: &HashSet<[NodeId; 3]>,
 ) -> Result<BTreeMap<NodeId, AtNode>, SolverError> {
     let mut at_nodes: BTreeMap<NodeId, AtNode> = BTreeMap::new();
     let mut condition_of: HashMap<[NodeId; 3], (&str, &Boundary)> = HashMap::new();
@@ -294,6 +326,9 @@ fn conditions(
                     surfaces: [(*other).to_owned(), surface.clone()],
                     place: centroid(vertices),
                 });
+            }
+            if *boundary == Boundary::FluxParallel && covered.contains(&face_key(triangle)) {
+                continue;
             }
             for node in space.triangle(triangle) {
                 let at = at_nodes.entry(node).or_default();
@@ -334,20 +369,12 @@ fn check_agreement(
     Ok(())
 }
 
-/// The first node of every connected set of conducting elements in which no node is fixed already.
-fn ground(space: &Space, conductor: &[ElementId], psi_zero: &[bool]) -> Vec<NodeId> {
-    let mut sets = DisjointSets::new(space.node_count());
-    for &e in conductor {
-        sets.join(space.nodes_of(e).iter().map(|n| n.index()));
+/// The first node of every connected set of nodes with ψ in which no node is fixed already.
+fn ground(sets: &mut DisjointSets, has_psi: &[bool], psi_zero: &[bool]) -> Vec<NodeId> {
+    let nodes = || (0..has_psi.len()).filter(|&n| has_psi[n]);
+    let mut is_fixed = vec![false; has_psi.len()];
+    for n in nodes().filter(|&n| psi_zero[n]) {
+        is_fixed[sets.root(n)] = true;
     }
-    let mut nodes: Vec<NodeId> = conductor.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    let mut is_fixed = vec![false; space.node_count()];
-    for n in &nodes {
-        if psi_zero[n.index()] {
-            is_fixed[sets.root(n.index())] = true;
-        }
-    }
-    nodes.into_iter().filter(|n| sets.root(n.index()) == n.index() && !is_fixed[n.index()]).collect()
+    nodes().filter(|&n| sets.root(n) == n && !is_fixed[n]).map(NodeId::new).collect()
 }

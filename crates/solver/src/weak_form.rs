@@ -13,8 +13,9 @@ use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
-use crate::space::ElementFamily;
+use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
+use crate::unknowns::Conductors;
 
 /// Coefficients of the weak form at one frequency.
 #[derive(Debug)]
@@ -33,7 +34,7 @@ impl WeakForm {
     /// As [`Surfaces::new`].
     pub(crate) fn new(
         mesh: &Mesh,
-        family: ElementFamily,
+        elements: (ElementFamily, Order),
         (angular_frequency, penalty): (f64, f64),
         materials: &[Material],
         boundaries: &[(String, Boundary)],
@@ -47,7 +48,8 @@ impl WeakForm {
                 eddy: c64::new(0.0, angular_frequency * m.conductivity),
             })
             .collect();
-        let surfaces = Surfaces::new(mesh, family, &coefficients, boundaries, conductors, angular_frequency)?;
+        let surfaces =
+            Surfaces::new(mesh, elements, &coefficients, boundaries, conductors, angular_frequency)?;
         Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces })
     }
 
@@ -77,10 +79,20 @@ impl WeakForm {
         &self.surfaces.triangles
     }
 
-    /// Triangles of impedance surfaces.
-    pub(crate) fn impedance_triangles(&self) -> Vec<[NodeId; 3]> {
-        let is_impedance = |term: &SurfaceTerm| matches!(term, SurfaceTerm::Impedance(..));
-        self.surface().filter(|(_, term)| is_impedance(term)).map(|(triangle, _)| triangle).collect()
+    /// Where currents flow.
+    pub(crate) fn conductors(&self) -> Conductors {
+        let mut conductors = Conductors {
+            elements: self.topology.elements().filter(|&e| self.conducts(e)).collect(),
+            ..Conductors::default()
+        };
+        for ((triangle, term), has_psi) in self.surface().zip(&self.surfaces.has_psi) {
+            match term {
+                SurfaceTerm::Interface(_) => {}
+                _ if *has_psi => conductors.surface.push(triangle),
+                _ => conductors.grounded.push(triangle),
+            }
+        }
+        conductors
     }
 
     /// Every triangle with its term.

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
 
 use crate::meshes::{FACES, shaken, unit_cube};
 
@@ -186,8 +186,11 @@ fn the_split_matrix_is_the_plain_one_around_an_impedance_surface() {
     for penalty in [1.0, 0.5] {
         let mut setup = setup(50.0, penalty, &boundaries);
         let material = materials()[STEEL as usize];
-        setup.impedance_surfaces =
-            vec![Conductor { name: "steel".to_owned(), surface: surface.clone(), material }];
+        setup.impedance_surfaces = vec![Conductor {
+            name: "steel".to_owned(),
+            surface: surface.clone(),
+            law: SurfaceLaw::Impedance(material),
+        }];
         assert_same(&mesh, &setup);
     }
     // The surface term is not lost among the magnetic ones.

@@ -9,7 +9,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, subdivide, uniform};
 use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
 
 use crate::meshes::{boxed, shaken};
 use crate::orders::Study;
@@ -125,7 +125,8 @@ fn the_loss_of_an_impedance_surface_is_that_of_a_thick_slab() {
     let slab = Slab::new("steel");
     let (whole, area) = slab.column(1);
     let (mesh, surface) = whole.without_region(RegionId(1)).expect("air is left");
-    let conductor = Conductor { name: slab.name.to_owned(), surface, material: slab.material };
+    let conductor =
+        Conductor { name: slab.name.to_owned(), surface, law: SurfaceLaw::Impedance(slab.material) };
     let loss = slab.loss_per_area(&mesh, area, vec![conductor]);
     println!(
         "    impedance surface: {loss:.6e} W/m², closed form {:.6e}, {:+.2e}",

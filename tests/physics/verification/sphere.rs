@@ -11,7 +11,8 @@ use fluxmorph_geometry::tet4::{Point, norm};
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{
-    Boundary, Conductor, FieldModel, FieldModelSetup, Functional, Material, Order, UniformField, adjoint,
+    Boundary, Conductor, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw, UniformField,
+    adjoint,
 };
 use serde_json::Value;
 
@@ -177,7 +178,7 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
         sphere(&SphereParameters { divisions: 8, ..coarse(radius, refinement) }).expect("a sound sphere");
     let region = full.topology().region("sphere").expect("the generator makes it");
     let (mesh, surface) = full.without_region(region).expect("air is left");
-    let conductor = Conductor { name: "sphere".to_owned(), surface, material };
+    let conductor = Conductor { name: "sphere".to_owned(), surface, law: SurfaceLaw::Impedance(material) };
     let setup = FieldModelSetup {
         impedance_surfaces: vec![conductor],
         ..setup(&mesh, frequency, Material::AIR, order)

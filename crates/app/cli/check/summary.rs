@@ -137,6 +137,7 @@ fn model_name(model: RegionModel) -> &'static str {
     match model {
         RegionModel::Volume => "volume",
         RegionModel::Impedance => "impedance",
+        RegionModel::Perfect => "perfect",
     }
 }
 

@@ -34,6 +34,9 @@ choice! {
         Volume = "volume",
         /// Replaced by its surface impedance, for conductors of several skin depths; needs a frequency and a conductivity above 0.
         Impedance = "impedance",
+        /// Replaced by a surface that no flux crosses, at 0 Hz too: a superconductor, or the limit of a skin depth far below
+        /// every size. Its material's permeability and conductivity have no effect.
+        Perfect = "perfect",
     }
 }
 

@@ -205,6 +205,7 @@ pub(super) fn skin(outline: &Outline) -> Markup {
         let model = match audited.model {
             RegionModel::Volume => "meshed",
             RegionModel::Impedance => "surface impedance",
+            RegionModel::Perfect => "perfect conductor",
         };
         let [median, least] =
             [a.median_elements_per_skin_depth, a.least_elements_per_skin_depth].map(|n| number(n, 3));

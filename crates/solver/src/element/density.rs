@@ -5,10 +5,9 @@
 //! ∂_d)`, as in [`super::point`]. The quadrature is exact for each order. Derivatives by the complex nodal values are
 //! halved, so that `d(∫j) = 2 Re Σ derivative · d(value)`.
 
-use fluxmorph_geometry::fem::{LocalMatrix, c64};
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
 
-use super::impedance::{self, ImpedanceTriangle};
 use super::lagrange::Lagrange;
 use super::point::PointField;
 use super::tabulated::Rule;
@@ -125,33 +124,6 @@ fn integrate<const N: usize>(
     integral
 }
 
-/// `f ∫|A_t|² dS` over a triangle, `A_t` the tangential part.
-pub fn surface_loss<const N: usize>(
-    shape: &'static Lagrange<N, 3>,
-    vertices: [Point; 3],
-    factor: f64,
-    potential: &[Complex3; N],
-) -> ElementIntegral<N, 3> {
-    let coefficient = c64::new(factor, 0.0);
-    let matrix = ImpedanceTriangle::new(shape, vertices, coefficient);
-    let conjugate = potential.map(|a| a.map(|c| c.conj()));
-    let mut potentials = [[c64::default(); 4]; N];
-    for a in 0..N {
-        for b in 0..N {
-            let block = matrix.block(a, b);
-            for i in 0..3 {
-                for j in 0..3 {
-                    potentials[b][j] += conjugate[a][i] * block[i][j];
-                }
-            }
-        }
-    }
-    let product = |b: usize| dot3([potentials[b][0], potentials[b][1], potentials[b][2]], potential[b]);
-    let positions = impedance::shape_derivative(shape, vertices, coefficient, &conjugate, potential)
-        .map(|row| row.map(|c| c.re));
-    ElementIntegral { value: (0..N).map(product).sum::<c64>().re, potentials, positions }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::differences::{SKEW, derivatives_hold};
@@ -180,18 +152,6 @@ mod tests {
     }
 
     #[test]
-    fn the_derivatives_of_the_surface_loss_match_central_differences() {
-        let triangle = [SKEW[0], SKEW[1], SKEW[3]];
-        let vector = |[x, y, z, _]: [c64; 4]| [x, y, z];
-        derivatives_hold::<3, 3>(triangle, |x, u| {
-            surface_loss(Lagrange::<3, 3>::triangle(), x, 0.9, &u.map(vector))
-        });
-        derivatives_hold::<6, 3>(triangle, |x, u| {
-            surface_loss(Lagrange::<6, 3>::triangle(), x, 0.9, &u.map(vector))
-        });
-    }
-
-    #[test]
     fn a_uniform_field_has_the_energy_of_its_volume() {
         // A = ½ b × x has the curl b.
         let (tet, b) = (Tet4::new(SKEW), [0.3, -0.4, 1.2]);
@@ -206,14 +166,10 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_potential_has_the_loss_of_its_volume_and_its_face() {
+    fn a_constant_potential_has_the_loss_of_its_volume() {
         let tet = Tet4::new(SKEW);
         let constant = [c64::new(0.0, 2.0), c64::default(), c64::default(), c64::default()];
         let loss = eddy_loss(Lagrange::<4, 4>::tet(), &tet, 0.5, &NodalField::new([constant; 4])).value;
         assert!((loss - 2.0 * tet.volume).abs() < 1e-14, "½ |2j|² V");
-        let flat = [[0.0; 3], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let vector = [constant[0], constant[1], constant[2]];
-        let loss = surface_loss(Lagrange::<3, 3>::triangle(), flat, 0.5, &[vector; 3]).value;
-        assert!((loss - 2.0).abs() < 1e-14, "½ |2j|² on the area 1");
     }
 }

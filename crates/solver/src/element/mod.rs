@@ -7,7 +7,7 @@
 //! where the last sum runs over the triangles at which `ν` jumps: on each region of constant `ν` the difference between
 //! `curl·curl + div·div` and `∇:∇` is a null Lagrangian, that is, a surface integral. So for `p = 1` the three
 //! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
-//! order, [`interface`] the triangles, [`impedance`] the Leontovich surface; [`lagrange`], [`quadrature`] and
+//! order, [`interface`] the triangles, [`impedance`] the Leontovich surface with `ψ` on it; [`lagrange`], [`quadrature`] and
 //! [`tabulated`] what they are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
 //! [`density`] integrals of energy and loss with their derivatives; [`edge`] all of that for edge elements.
 
@@ -22,6 +22,7 @@ pub mod point;
 pub mod quadratic;
 pub mod quadrature;
 pub mod tabulated;
+mod triangle;
 pub mod volume;
 
 use fluxmorph_geometry::fem::c64;

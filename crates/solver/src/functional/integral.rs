@@ -12,7 +12,7 @@ use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::surface::SurfaceTerm;
+use crate::surface::{SurfaceLaw, SurfaceTerm};
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
@@ -32,6 +32,13 @@ impl Integral {
     pub(super) fn loss(model: &FieldModel, region: &str) -> Result<Self, SolverError> {
         let topology = model.topology();
         if let Some(index) = model.conductors().iter().position(|c| c.name == region) {
+            if model.conductors()[index].law == SurfaceLaw::Perfect {
+                return Err(SolverError::Parameter {
+                    what: format!("model of `{region}`"),
+                    value: "perfect".to_owned(),
+                    expected: "a perfect conductor has no loss".to_owned(),
+                });
+            }
             return Ok(Self::SurfaceLoss(index));
         }
         let id = topology.region(region)?;

@@ -7,10 +7,11 @@
 use std::sync::LazyLock;
 
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::Point;
 
 use super::super::Complex3;
 use super::super::density::ElementIntegral;
+use super::super::triangle::{Triangle, quadratic_form};
 use super::functions::{self, ASCENDING_TRIANGLE_EDGES};
 use crate::space::Order;
 
@@ -37,26 +38,6 @@ impl EdgeTriangleShape<4, 12> {
     /// Second order: three edges and the face.
     pub fn triangle() -> &'static Self {
         &SECOND
-    }
-}
-
-/// What a triangle's integrals are made from.
-struct Geometry {
-    area: f64,
-    unit_normal: Point,
-    /// Edge opposite each vertex.
-    edges: [Point; 3],
-    /// `e_m·e_n / 4S`.
-    metric: [Point; 3],
-}
-
-impl Geometry {
-    fn new(vertices: [Point; 3]) -> Self {
-        let normal = area_vector(vertices);
-        let area = norm(normal);
-        let edges: [Point; 3] = std::array::from_fn(|n| sub(vertices[(n + 2) % 3], vertices[(n + 1) % 3]));
-        let metric = edges.map(|a| edges.map(|b| dot(a, b) / (4.0 * area)));
-        Self { area, unit_normal: normal.map(|c| c / area), edges, metric }
     }
 }
 
@@ -87,7 +68,7 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
 
     /// The matrix for three vertices [m] and the coefficient `jω/Zs` [1/H].
     pub fn matrix(&self, vertices: [Point; 3], coefficient: c64) -> EdgeTriangle<N> {
-        let geometry = Geometry::new(vertices);
+        let geometry = Triangle::new(vertices);
         let mut entries = [[[[0.0; 4]; 4]; N]; N];
         for (f, &(a, i)) in self.slots.iter().enumerate() {
             for (g, &(b, j)) in self.slots.iter().enumerate() {
@@ -115,8 +96,7 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
         moment
     }
 
-    /// `∂/∂x_k (λᵀ M u)` for the three vertices, shape `(3, 3)`: of `c/4S Σ_mn R_mn e_m·e_n` with
-    /// `∂S/∂x_k = ½ n × e_k`.
+    /// `∂/∂x_k (λᵀ M u)` for the three vertices, shape `(3, 3)`: of `c/4S Σ_mn R_mn e_m·e_n`.
     pub fn shape_derivative(
         &self,
         vertices: [Point; 3],
@@ -124,48 +104,18 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
         adjoint: &[[c64; 4]],
         state: &[[c64; 4]],
     ) -> [Complex3; 3] {
-        let Geometry { area, unit_normal, edges, metric } = Geometry::new(vertices);
-        let r = self.moment(adjoint, state);
-        let mut value = c64::default();
-        let mut by_edge = [[c64::default(); 3]; 3];
-        for m in 0..3 {
-            for n in 0..3 {
-                value += r[m][n] * metric[m][n];
-                let both = (r[m][n] + r[n][m]) / (4.0 * area);
-                for d in 0..3 {
-                    by_edge[m][d] += both * edges[n][d];
-                }
-            }
-        }
-        std::array::from_fn(|k| {
-            let by_area = cross(unit_normal, edges[k]).map(|c| -0.5 * c / area);
-            std::array::from_fn(|d| {
-                coefficient * (by_edge[(k + 1) % 3][d] - by_edge[(k + 2) % 3][d] + value * by_area[d])
-            })
-        })
+        let triangle = Triangle::new(vertices);
+        let moment = self.moment(adjoint, state).map(|row| row.map(|entry| coefficient * entry));
+        triangle.by_vertices(&triangle.metric_form(&moment))
     }
 
     /// `f ∫|(A + ∇ψ)_t|² dS`.
     pub fn loss(&self, vertices: [Point; 3], factor: f64, field: &[[c64; 4]]) -> ElementIntegral<N, 3> {
         let coefficient = c64::new(factor, 0.0);
-        let conjugate: [[c64; 4]; N] = std::array::from_fn(|a| field[a].map(|c| c.conj()));
-        let matrix = self.matrix(vertices, coefficient);
-        let mut potentials = [[c64::default(); 4]; N];
-        for a in 0..N {
-            for b in 0..N {
-                let block = matrix.block(a, b);
-                for i in 0..4 {
-                    for j in 0..4 {
-                        potentials[b][j] += conjugate[a][i] * block[i][j];
-                    }
-                }
-            }
-        }
-        let products = potentials.as_flattened().iter().zip(field.as_flattened());
-        let value = products.map(|(p, u)| (p * u).re).sum();
-        let positions =
-            self.shape_derivative(vertices, coefficient, &conjugate, field).map(|row| row.map(|c| c.re));
-        ElementIntegral { value, potentials, positions }
+        let field: &[[c64; 4]; N] = field.try_into().expect("one entry a carrier");
+        quadratic_form(&self.matrix(vertices, coefficient), field, |conjugate| {
+            self.shape_derivative(vertices, coefficient, conjugate, field)
+        })
     }
 }
 
@@ -175,7 +125,7 @@ mod tests {
     use super::super::super::impedance::surface_coefficient;
     use super::super::{Ascending, EdgeShape};
     use super::*;
-    use fluxmorph_geometry::tet4::Tet4;
+    use fluxmorph_geometry::tet4::{Tet4, area_vector, norm};
 
     const TRIANGLE: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
 

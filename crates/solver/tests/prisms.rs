@@ -1,0 +1,170 @@
+//! Fields that are known exactly on any planar polygon: `H = (0, 0, T + c)` between flux-normal planes.
+//!
+//! Side walls are flux-parallel, and a coil along z that is longer than the domain is high has the potential `T(x, y)`.
+//! `c` follows from the induction law around the domain, `∫μ(T + c) + Σ Zs/(jω) ∮(T + c) ds = 0` over all blocks with an
+//! impedance surface; a perfect conductor has `Zs = 0`. Every block has an edge that the field goes around, where a nodal
+//! `A` with zero tangential parts fails.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SurfaceLaw,
+};
+
+/// `∫T dS` of the coil [A m]: 1 kA over 0.4 m, half window 0.15 m, winding 0.1 m wide.
+const MOMENT: f64 = 2500.0 * 0.163_333_333_333_333_33;
+
+/// The square of 2 m without its quarter x > 0, y < 0, and the faces that the quarter left.
+fn square_without_a_quarter() -> (Mesh, Vec<[fluxmorph_geometry::NodeId; 3]>) {
+    let line = |n: i32, from: f64| (0..=n).map(|i| from + 0.1 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(20, -1.0), line(20, -1.0), vec![0.0, 0.05, 0.1]]).expect("a grid");
+    let topology = grid
+        .topology(&["air", "block"], |x| RegionId(u32::from(x[0] > 0.0 && x[1] < 0.0)))
+        .expect("two regions");
+    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    mesh.without_region(RegionId(1)).expect("what is left")
+}
+
+fn setup(order: Order, frequency: f64) -> FieldModelSetup {
+    let shape = Racetrack::new([0.5, 0.5, 0.05], 2, [0.15; 2], 0.1, 0.4, Corner::Mitred).expect("a coil");
+    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
+        names.iter().map(|&name| (name.to_owned(), boundary)).collect()
+    };
+    let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
+    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
+    FieldModelSetup {
+        frequency,
+        order,
+        materials: vec![Material::AIR; 2],
+        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1e3, 0.0), shape: shape.into() }],
+        boundaries,
+        ..FieldModelSetup::default()
+    }
+}
+
+fn block(surface: &[[fluxmorph_geometry::NodeId; 3]], law: SurfaceLaw) -> Conductor {
+    Conductor { name: "block".to_owned(), surface: surface.to_vec(), law }
+}
+
+/// `μ0 c` [T] behind surfaces with `Zs/(jω)` [H] along so many metres.
+fn far_field(reactance: c64, perimeter: f64) -> c64 {
+    -MOMENT * VACUUM_PERMEABILITY / (3.0 + reactance / VACUUM_PERMEABILITY * perimeter)
+}
+
+/// The largest error of `B` in the arm x < −0.4 m, y < −0.4 m, of the exact field there.
+fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
+    let model = FieldModel::new(mesh, setup).expect("a sound problem");
+    let (solution, _) = model.solve(mesh).expect("it converges");
+    let centre = |e| {
+        let vertices = mesh.vertices(e);
+        [0, 1].map(|d| vertices.iter().map(|x| x[d]).sum::<f64>() / 4.0)
+    };
+    let far = mesh.topology().elements().filter(|&e| centre(e).iter().all(|&c| c < -0.4));
+    let far: Vec<_> = far.collect();
+    let errors = solution.flux_densities_of(&model, mesh, &far).into_iter().map(|b| {
+        let squares = [b[0], b[1], b[2] - exact].map(|c| c.norm_sqr());
+        (squares.iter().sum::<f64>() / exact.norm_sqr()).sqrt()
+    });
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn the_field_goes_around_the_edge_of_an_impedance_surface() {
+    let (mesh, surface) = square_without_a_quarter();
+    let frequency = 25.330_295_91;
+    for (skin_depth, order, tolerance) in [
+        (0.1, Order::Linear, 0.03),
+        (0.1, Order::Quadratic, 0.01),
+        (0.01, Order::Linear, 0.03),
+        (0.01, Order::Quadratic, 0.01),
+        (1e-5, Order::Linear, 0.05),
+    ] {
+        let conductivity =
+            2.0 / (2.0 * std::f64::consts::PI * frequency * VACUUM_PERMEABILITY * skin_depth * skin_depth);
+        let material = Material { relative_permeability: 1.0, conductivity };
+        let setup = FieldModelSetup {
+            impedance_surfaces: vec![block(&surface, SurfaceLaw::Impedance(material))],
+            ..setup(order, frequency)
+        };
+        // Zs/(jω) = μ δ (1 − j)/2.
+        let reactance = 0.5 * VACUUM_PERMEABILITY * skin_depth * c64::new(1.0, -1.0);
+        let error = error(&mesh, setup, far_field(reactance, 2.0));
+        println!("skin depth {skin_depth} m, {order:?}: {error:.2e}");
+        assert!(error < tolerance, "skin depth {skin_depth} m, {order:?}: {error:.2e}");
+    }
+}
+
+#[test]
+fn the_field_goes_around_a_perfect_conductor() {
+    let (mesh, surface) = square_without_a_quarter();
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        for order in [Order::Linear, Order::Quadratic] {
+            for frequency in [0.0, 50.0] {
+                let setup = FieldModelSetup {
+                    family,
+                    impedance_surfaces: vec![block(&surface, SurfaceLaw::Perfect)],
+                    ..setup(order, frequency)
+                };
+                let error = error(&mesh, setup, far_field(c64::default(), 0.0));
+                let case = format!("{family:?}, {order:?}, {frequency} Hz: {error:.2e}");
+                println!("{case}");
+                assert!(error < if order == Order::Linear { 0.03 } else { 0.01 }, "{case}");
+            }
+        }
+    }
+}
+
+/// The quarter's faces are then part of a flux-parallel wall with a re-entrant edge.
+#[test]
+fn the_field_goes_around_the_edge_of_a_wall() {
+    let (mesh, surface) = square_without_a_quarter();
+    let topology = (**mesh.topology()).clone().with_surface("wall", surface).expect("faces of the mesh");
+    let mesh = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("the same mesh");
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        for order in [Order::Linear, Order::Quadratic] {
+            let mut setup = FieldModelSetup { family, ..setup(order, 0.0) };
+            setup.boundaries.push(("wall".to_owned(), Boundary::FluxParallel));
+            let error = error(&mesh, setup, far_field(c64::default(), 0.0));
+            let case = format!("{family:?}, {order:?}: {error:.2e}");
+            println!("{case}");
+            assert!(error < if order == Order::Linear { 0.03 } else { 0.01 }, "{case}");
+        }
+    }
+}
+
+/// Without a flux-parallel surface, where `A = ∇χ` and `ψ = −χ` must not be left undetermined.
+#[test]
+fn a_cavity_in_an_impedance_has_one_field() {
+    let (mesh, _) = square_without_a_quarter();
+    let topology = mesh.topology();
+    let planes: std::collections::HashSet<_> = ["z_min", "z_max"]
+        .into_iter()
+        .flat_map(|name| topology.surface(name).expect("a side"))
+        .map(|&triangle| face_key(triangle))
+        .collect();
+    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
+    let surface: Vec<_> = outer.filter(|&nodes| !planes.contains(&face_key(nodes))).collect();
+    let material = Material { relative_permeability: 1.0, conductivity: 1e8 };
+    let frequency = 25.330_295_91;
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        for order in [Order::Linear, Order::Quadratic] {
+            let mut setup = FieldModelSetup {
+                family,
+                impedance_surfaces: vec![block(&surface, SurfaceLaw::Impedance(material))],
+                ..setup(order, frequency)
+            };
+            setup.boundaries.retain(|(_, boundary)| *boundary == Boundary::FluxNormal);
+            let reactance = 0.5 * VACUUM_PERMEABILITY * 0.01 * c64::new(1.0, -1.0);
+            let error = error(&mesh, setup, far_field(reactance, 8.0));
+            let case = format!("{family:?}, {order:?}: {error:.2e}");
+            println!("{case}");
+            assert!(error < if order == Order::Linear { 0.03 } else { 0.01 }, "{case}");
+        }
+    }
+}
