@@ -82,7 +82,6 @@ pub(in crate::config) fn property<T: Value<K>, K: Kind>(
     property.extend(T::schema(kind, definitions));
     for also in field.also {
         let (keyword, value) = match also {
-            Also::not_empty => ("minItems", 1.into()),
             Also::each_once => ("uniqueItems", true.into()),
             Also::not_zero => ("not", definitions.zero().into()),
             Also::not_all_zero => ("contains", json!({ "not": definitions.zero() })),

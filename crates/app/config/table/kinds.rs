@@ -6,7 +6,9 @@ pub(in crate::config) use super::unread::{overlay, unread};
 use crate::config::text::dimension::Dimension;
 pub(in crate::config) use crate::config::text::dimension::Dimension::*;
 use crate::config::value::range::Range;
-use crate::config::value::{Column, Flag, NameOrNames, Names, Number, PerAxis, Text, Whole, Word, ZeroOr};
+use crate::config::value::{
+    Column, Flag, NameOrNames, Names, NotEmpty, Number, PerAxis, Text, Whole, Word, ZeroOr,
+};
 
 /// A text that is not empty.
 pub(in crate::config) const TEXT: Text = Text;
@@ -68,6 +70,11 @@ pub(in crate::config) const fn length_per_axis(range: Range) -> PerAxis {
 /// A number, or 0 for none.
 pub(in crate::config) const fn zero_or(range: Range) -> ZeroOr {
     ZeroOr(range)
+}
+
+/// A list with at least one item.
+pub(in crate::config) const fn not_empty<K>(kind: K) -> NotEmpty<K> {
+    NotEmpty(kind)
 }
 
 /// Two different names; `expected` says which.
