@@ -22,8 +22,7 @@ mod remesh;
 pub use analysis::{Analysis, ElementOrder, Frequencies};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
-    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,
-    RegionCoil, ShapeWord,
+    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
 };
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
