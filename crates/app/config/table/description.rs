@@ -43,7 +43,7 @@ impl Description {
     }
 
     /// The schema of the table.
-    pub(in crate::config) fn into_schema(self, about: &[&str]) -> Json {
+    pub(in crate::config) fn into_schema(self, about: &[&str]) -> Keywords {
         let mut schema = Keywords::new();
         if !about.is_empty() {
             schema.insert("description".into(), described(about).into());
@@ -57,7 +57,7 @@ impl Description {
         if !self.rules.is_empty() {
             schema.insert("allOf".into(), self.rules.into());
         }
-        schema.into()
+        schema
     }
 }
 

@@ -1,6 +1,6 @@
 //! The vocabulary of `table!`: what a key may hold, its unit and its range.
 
-use super::nested::{Keys, NamedTables, SubTable, Tables};
+use super::nested::{InlineTable, Keys, NamedTables, SubTable, Tables};
 use super::unread::{OneOf, SomeQuantity};
 pub(in crate::config) use super::unread::{overlay, unread};
 use crate::config::text::dimension::Dimension;
@@ -24,6 +24,8 @@ pub(in crate::config) const WORD: Word = Word;
 pub(in crate::config) const FLAG: Flag = Flag;
 /// A table `[key]`.
 pub(in crate::config) const TABLE: SubTable = SubTable;
+/// A table `key = { … }`, described where it stands.
+pub(in crate::config) const INLINE: InlineTable = InlineTable;
 /// Tables `[[key]]`.
 pub(in crate::config) const TABLES: Tables = Tables;
 /// Tables `[key.NAME]`.
