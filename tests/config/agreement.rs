@@ -11,6 +11,7 @@ use fluxmorph::schema;
 
 use crate::changes::{CHANGES, Change, changed};
 use crate::places::{Step, all, schema_at, tables};
+use crate::sound::value_at;
 use crate::verdict::{bases, judge, validator};
 
 /// Changed configurations.
@@ -60,9 +61,8 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 8] = [
 ];
 
 /// Faults of the keys of a table, which the schema sees, but not where a case lays its table over another.
-const OF_A_CASE: [&str; 8] = [
+const OF_A_CASE: [&str; 7] = [
     "is a table, not a list",
-    "and has no keys",
     "is not the number of an item",
     "are both given",
     "has both `",
@@ -81,24 +81,16 @@ fn beyond_a_schema(config: &toml::Table, path: &str, message: &str) -> Option<&'
         return Some(kind);
     }
     // A radius of zero is none, and the schema does not see it in a text.
-    let radius = written_at(config, "mesh.sphere.inner_radius");
-    if message.contains("divides the wall") && radius.is_some_and(toml::Value::is_str) {
+    let radius = || written_at(config, "mesh.sphere.inner_radius");
+    if message.contains("divides the wall") && radius().into_iter().any(toml::Value::is_str) {
         return Some("the size of a number in a text");
     }
-    let value = written_at(config, path);
-    let cases = config.get("morph").and_then(|morph| morph.get("case"));
-    if let Some(cases) = cases
-        && (holds(&OF_A_CASE) || message.starts_with("missing key") || changes_items(cases))
+    if let Some(cases) = cases_of(config)
+        && (holds(&OF_A_CASE) || message.starts_with("missing key") || cases.iter().any(changes_items))
     {
         return Some("a table of a case laid over another");
     }
-    // The value may stand in a case, where its path does not lead.
-    let in_a_case = cases.is_some() && value.is_none();
-    if in_a_case && (holds(&SIZES) || message.contains("is a date") || message.contains("not a whole number"))
-    {
-        return Some("the form of a value in a case");
-    }
-    form_of_a_number(value?, message)
+    written_at(config, path).into_iter().find_map(|value| form_of_a_number(value, message))
 }
 
 /// Whether a case changes lists item by item, `subregions.0.young = 5`: what is in an item the schema leaves open.
@@ -134,14 +126,18 @@ fn form_of_a_number(value: &toml::Value, message: &str) -> Option<&'static str> 
     }
 }
 
-/// The value at a key path such as `coils[0].center[1]`.
-fn written_at<'a>(config: &'a toml::Table, path: &str) -> Option<&'a toml::Value> {
-    let mut steps = path.split(['.', '[']).map(|step| step.trim_end_matches(']'));
-    let first = config.get(steps.next()?)?;
-    steps.try_fold(first, |value, step| match value {
-        toml::Value::Array(items) => items.get(step.parse::<usize>().ok()?),
-        other => other.get(step),
-    })
+/// The cases as they are written.
+fn cases_of(config: &toml::Table) -> Option<&[toml::Value]> {
+    Some(config.get("morph")?.get("case")?.as_array()?)
+}
+
+/// The values that a fault at a key path such as `coils[0].center[1]` may be about: that of the configuration, and those of the
+/// cases, since a fault of a case has the path that its value has once it is laid over the configuration.
+fn written_at<'a>(config: &'a toml::Table, path: &str) -> Vec<&'a toml::Value> {
+    let path = path.replace('[', ".").replace(']', "");
+    let of_a_case = path.strip_prefix("morph.").unwrap_or(&path);
+    let cases = cases_of(config).into_iter().flatten().filter_map(toml::Value::as_table);
+    value_at(config, &path).into_iter().chain(cases.filter_map(|case| value_at(case, of_a_case))).collect()
 }
 
 /// Changes are made where a base has something to change.

@@ -35,7 +35,7 @@ fn configuration(case: &Case) -> (Config, SourceMap, String) {
 }
 
 /// The value at a path such as `coils.0.center`.
-fn value_at<'a>(table: &'a toml::Table, path: &str) -> Option<&'a toml::Value> {
+pub(crate) fn value_at<'a>(table: &'a toml::Table, path: &str) -> Option<&'a toml::Value> {
     let (first, rest) = path.split_once('.').unwrap_or((path, ""));
     rest.split('.').filter(|step| !step.is_empty()).try_fold(table.get(first)?, |value, step| match value {
         toml::Value::Array(items) => items.get(step.parse::<usize>().ok()?),

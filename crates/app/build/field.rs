@@ -210,10 +210,6 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
             let frame = frame(r.center, r.axis, r.direction)?;
             Racetrack::in_frame(frame, r.half_window, r.width, r.height, corner)?.into()
         }
-        config::CoilShape::Rectangular(r) => {
-            let frame = frame(r.center, r.axis, r.direction)?;
-            Racetrack::in_frame(frame, r.half_window, r.width, r.height, coil::Corner::Mitred)?.into()
-        }
         config::CoilShape::Circular(c) => {
             Racetrack::circular(frame(c.center, c.axis, None)?, c.radius, c.width, c.height)?.into()
         }

@@ -44,10 +44,10 @@ impl Config {
             .map_err(|source| ConfigError::Read { path: path.to_owned(), source })?;
         let directory = absolute.parent().map(Path::to_owned).unwrap_or_default();
         let stem = path.file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
-        read(path.display().to_string(), text, directory, &stem, overrides)
+        Self::again(path.display().to_string(), text, directory, &stem, overrides)
     }
 
-    /// Read again the text of a configuration that a run has saved: `name` stands for the file in messages, paths are
+    /// Read a text, such as that which a run has saved: `name` stands for the file in messages, paths are
     /// relative to `directory`, `stem` is the name of the file that it was read from, without extension.
     ///
     /// # Errors
@@ -59,7 +59,33 @@ impl Config {
         stem: &str,
         overrides: &[String],
     ) -> Result<(Self, SourceMap), ConfigError> {
-        read(name, text, directory, stem, overrides)
+        let mut documents = vec![Document::whole(name, text)];
+        documents.extend(overrides.iter().map(|typed| Document::of_override(typed)));
+        let bare = SourceMap::of_documents(documents, directory, stem);
+        let root = parse_documents(&bare).map_err(|diagnostics| bare.error(diagnostics))?;
+        let mut source = bare.of_tree(&root);
+        let (mut config, mut diagnostics) = read_tree(&root, &source);
+        let (count, values) = (case_count(&root), tree::value_count(&root));
+        if count.saturating_mul(values) > MOST_REPEATED {
+            let message = format!("{count} cases repeat a configuration of {values} values");
+            let most = format!("at most {MOST_REPEATED} values in all cases together");
+            diagnostics.push(source.diagnostic("morph.case", message).expected(most));
+            diagnostic::sort(&mut diagnostics);
+            return Err(source.error(diagnostics));
+        }
+        if diagnostics.len() > MANY_FAULTS {
+            return Err(source.error(diagnostics));
+        }
+        source.cases = read_cases(root, &bare, config.as_mut(), &mut diagnostics).into();
+        match config {
+            Some(config) if diagnostics.is_empty() => Ok((config, source)),
+            unfinished => {
+                diagnostic::sort(&mut diagnostics);
+                let unfinished = unfinished.map(Box::new);
+                let report = DiagnosticReport { unfinished, ..DiagnosticReport::new(source, diagnostics) };
+                Err(ConfigError::Invalid(Box::new(report)))
+            }
+        }
     }
 
     /// Read a text; `name` stands for the file in messages, and paths stay relative.
@@ -68,7 +94,7 @@ impl Config {
     /// All faults of the text at once.
     pub fn from_str(text: &str, name: &str) -> Result<(Self, SourceMap), ConfigError> {
         let stem = Path::new(name).file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
-        read(name.to_owned(), text.to_owned(), PathBuf::new(), &stem, &[])
+        Self::again(name.to_owned(), text.to_owned(), PathBuf::new(), &stem, &[])
     }
 }
 
@@ -94,42 +120,6 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
         path: path.to_owned(),
         offset: error.utf8_error().valid_up_to(),
     })
-}
-
-fn read(
-    name: String,
-    text: String,
-    directory: PathBuf,
-    stem: &str,
-    overrides: &[String],
-) -> Result<(Config, SourceMap), ConfigError> {
-    let mut documents = vec![Document::whole(name, text)];
-    documents.extend(overrides.iter().map(|typed| Document::of_override(typed)));
-    let bare = SourceMap::of_documents(documents, directory, stem);
-    let root = parse_documents(&bare).map_err(|diagnostics| bare.error(diagnostics))?;
-    let mut source = bare.of_tree(&root);
-    let (mut config, mut diagnostics) = read_tree(&root, &source);
-    let (count, values) = (case_count(&root), tree::value_count(&root));
-    if count.saturating_mul(values) > MOST_REPEATED {
-        let message = format!("{count} cases repeat a configuration of {values} values");
-        let most = format!("at most {MOST_REPEATED} values in all cases together");
-        diagnostics.push(source.diagnostic("morph.case", message).expected(most));
-        diagnostic::sort(&mut diagnostics);
-        return Err(source.error(diagnostics));
-    }
-    if diagnostics.len() > MANY_FAULTS {
-        return Err(source.error(diagnostics));
-    }
-    source.cases = read_cases(root, &bare, config.as_mut(), &mut diagnostics).into();
-    match config {
-        Some(config) if diagnostics.is_empty() => Ok((config, source)),
-        unfinished => {
-            diagnostic::sort(&mut diagnostics);
-            let unfinished = unfinished.map(Box::new);
-            let report = DiagnosticReport { unfinished, ..DiagnosticReport::new(source, diagnostics) };
-            Err(ConfigError::Invalid(Box::new(report)))
-        }
-    }
 }
 
 /// Reads the cases of a sweep, and enters them; the places of each.

@@ -14,6 +14,7 @@ mod manifest;
 mod names;
 mod result;
 mod run_directory;
+mod run_files;
 mod synced;
 
 use std::path::PathBuf;

@@ -1,5 +1,5 @@
-//! The run directory: which folder may become one, and the names of the files in it; those of the fields are in
-//! `field_files`.
+//! The run directory: which folder may become one, and how files get into it and out of it. Their names are in `run_files`,
+//! those of the fields in `field_files`.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,8 @@ use super::OutputError;
 use super::disk::Disk;
 use super::field_files::is_fields;
 use super::manifest::Manifest;
-use super::names::{is_case, is_surface, morph_name};
+use super::names::{is_case, is_surface};
+use super::run_files::{FILES, OLDER_JOURNAL};
 use super::synced::{SyncedLog, UNFINISHED, folder_of, write_whole};
 
 /// What to do with an earlier run in the same folder.
@@ -27,36 +28,6 @@ pub struct RunDirectory {
     disk: Arc<dyn Disk>,
     path: PathBuf,
 }
-
-const MANIFEST: &str = "manifest.json";
-const JOURNAL: &str = "journal.jsonl";
-const CONFIG: &str = "config.toml";
-/// What a damaged journal is kept as.
-const DAMAGED_JOURNAL: &str = "journal.damaged.jsonl";
-/// The journal of earlier versions.
-const OLDER_JOURNAL: &str = "journal.bin";
-/// The files of a run beside its manifest, at last those of earlier versions. The journal goes first: it must not be taken
-/// for that of a new run.
-const FILES: &[&str] = &[
-    JOURNAL,
-    DAMAGED_JOURNAL,
-    CONFIG,
-    "resolved.toml",
-    "history.csv",
-    "fields.pvd",
-    "result.json",
-    "before.vtu",
-    "after.vtu",
-    "morph.csv",
-    "tuned.toml",
-    OPTIMUM,
-    REPORT,
-    OLDER_JOURNAL,
-    "journal.damaged.bin",
-    "history.jsonl",
-];
-const OPTIMUM: &str = "optimum.msh";
-const REPORT: &str = "report.html";
 
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
@@ -87,7 +58,7 @@ impl RunDirectory {
 
     /// Whether the configuration of a run has been saved, without which it cannot be resumed.
     pub fn holds_configuration(&self) -> bool {
-        self.holds(CONFIG)
+        self.holds(&self.config())
     }
 
     /// Refuses a run whose journal has the form of earlier versions.
@@ -95,15 +66,16 @@ impl RunDirectory {
     /// # Errors
     /// [`OutputError::OlderJournal`].
     pub fn refuse_older_journal(&self) -> Result<(), OutputError> {
-        if self.holds(JOURNAL) || !self.holds(OLDER_JOURNAL) {
+        let older = self.path.join(OLDER_JOURNAL);
+        if self.holds(&self.journal()) || !self.holds(&older) {
             return Ok(());
         }
         let version = Manifest::read(self).map(|manifest| manifest.version).unwrap_or_default();
-        Err(OutputError::OlderJournal { path: self.path.join(OLDER_JOURNAL), version })
+        Err(OutputError::OlderJournal { path: older, version })
     }
 
-    fn holds(&self, file: &str) -> bool {
-        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| name == file))
+    fn holds(&self, file: &Path) -> bool {
+        self.disk.names(&self.path).is_ok_and(|names| names.iter().any(|name| file.ends_with(name)))
     }
 
     /// The same without a folder for fields.
@@ -297,81 +269,6 @@ impl RunDirectory {
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
-    }
-
-    /// `manifest.json`.
-    pub fn manifest(&self) -> PathBuf {
-        self.path.join(MANIFEST)
-    }
-
-    /// `config.toml`, the configuration as given.
-    pub fn config(&self) -> PathBuf {
-        self.path.join(CONFIG)
-    }
-
-    /// `resolved.toml`, with every default.
-    pub fn resolved(&self) -> PathBuf {
-        self.path.join("resolved.toml")
-    }
-
-    /// `history.csv`.
-    pub fn history_csv(&self) -> PathBuf {
-        self.path.join("history.csv")
-    }
-
-    /// `journal.jsonl`, all evaluations to the last bit.
-    pub fn journal(&self) -> PathBuf {
-        self.path.join(JOURNAL)
-    }
-
-    /// `journal.damaged.jsonl`, what a damaged journal is kept as.
-    pub fn damaged_journal(&self) -> PathBuf {
-        self.path.join(DAMAGED_JOURNAL)
-    }
-
-    /// `result.json`.
-    pub fn result(&self) -> PathBuf {
-        self.path.join("result.json")
-    }
-
-    /// The undeformed mesh of a prescribed motion; `case` is the number of a case of a sweep, from 0.
-    pub fn before(&self, case: Option<usize>) -> PathBuf {
-        self.path.join(morph_name(case, "before"))
-    }
-
-    /// The mesh after a prescribed motion.
-    pub fn after(&self, case: Option<usize>) -> PathBuf {
-        self.path.join(morph_name(case, "after"))
-    }
-
-    /// `morph.csv`, one row for each case of a prescribed motion.
-    pub fn morph_csv(&self) -> PathBuf {
-        self.path.join("morph.csv")
-    }
-
-    /// `tuned.toml`, the configuration that the tuner found.
-    pub fn tuned(&self) -> PathBuf {
-        self.path.join("tuned.toml")
-    }
-
-    /// `report.html`, one page about the run.
-    pub fn report(&self) -> PathBuf {
-        self.path.join(REPORT)
-    }
-
-    /// `optimum.msh`, the mesh of the best design.
-    pub fn optimum(&self) -> PathBuf {
-        self.path.join(OPTIMUM)
-    }
-
-    /// A surface of the best design, by the name that [`surface_files`] gives its file.
-    pub fn surface(&self, file: &str) -> PathBuf {
-        self.path.join(file)
-    }
-
-    /// `fields.pvd`, the collection of the field files.
-    pub fn collection(&self) -> PathBuf {
-        self.path.join("fields.pvd")
     }
 }
 

@@ -64,7 +64,6 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
 fn widest(coil: &Coil) -> Option<f64> {
     match &coil.shape {
         CoilShape::Racetrack(c) => Some(2.0 * (c.half_window[0].max(c.half_window[1]) + c.width)),
-        CoilShape::Rectangular(c) => Some(2.0 * (c.half_window[0].max(c.half_window[1]) + c.width)),
         CoilShape::Circular(c) => Some(2.0 * (c.radius + c.width)),
         CoilShape::Region(_) => None,
     }

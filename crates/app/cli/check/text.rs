@@ -195,14 +195,6 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
                     at(c.center)
                 )
             }
-            CoilShape::Rectangular(c) => {
-                format!(
-                    "rectangular, {}, {}, {}",
-                    window(c.half_window),
-                    section(c.width, c.height),
-                    at(c.center)
-                )
-            }
             CoilShape::Circular(c) => {
                 let radius = millimetre(c.radius);
                 format!(

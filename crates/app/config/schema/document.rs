@@ -20,9 +20,7 @@ pub fn document() -> Value {
     ];
     let mut document: Map<String, Value> =
         head.into_iter().map(|(keyword, value)| (keyword.to_owned(), value.into())).collect();
-    if let Value::Object(root) = root {
-        document.extend(root);
-    }
+    document.extend(root);
     document.insert("$defs".into(), definitions.into_value());
     document.into()
 }

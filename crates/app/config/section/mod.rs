@@ -49,13 +49,6 @@ impl<'a> Section<'a> {
         matches!(content, Some(Content::Array(_) | Content::Table(_)))
     }
 
-    /// Record that a list is written with no item.
-    pub(super) fn check_not_empty(&self, key: &str, expected: &str) {
-        if self.table.get(key).and_then(|node| node.content.list()).is_some_and(<[Node]>::is_empty) {
-            self.wrong(key, format!("`{}` is an empty list", join(&self.path, key)), expected);
-        }
-    }
-
     /// Whether a value below a key path of the whole configuration, which was read before, has a fault.
     pub(super) fn is_faulty(&self, path: &str) -> bool {
         self.context.sink.any_below(path)

@@ -43,7 +43,7 @@ impl Description {
     }
 
     /// The schema of the table.
-    pub(in crate::config) fn into_schema(self, about: &[&str]) -> Json {
+    pub(in crate::config) fn into_schema(self, about: &[&str]) -> Keywords {
         let mut schema = Keywords::new();
         if !about.is_empty() {
             schema.insert("description".into(), described(about).into());
@@ -57,7 +57,7 @@ impl Description {
         if !self.rules.is_empty() {
             schema.insert("allOf".into(), self.rules.into());
         }
-        schema.into()
+        schema
     }
 }
 
@@ -82,7 +82,6 @@ pub(in crate::config) fn property<T: Value<K>, K: Kind>(
     property.extend(T::schema(kind, definitions));
     for also in field.also {
         let (keyword, value) = match also {
-            Also::not_empty => ("minItems", 1.into()),
             Also::each_once => ("uniqueItems", true.into()),
             Also::not_zero => ("not", definitions.zero().into()),
             Also::not_all_zero => ("contains", json!({ "not": definitions.zero() })),

@@ -15,8 +15,6 @@ pub(in crate::config) struct Field<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(non_camel_case_types, reason = "they are written as words of a declaration")]
 pub(in crate::config) enum Also {
-    /// At least one item.
-    not_empty,
     /// No item twice.
     each_once,
     /// Not 0.

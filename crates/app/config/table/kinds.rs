@@ -1,12 +1,14 @@
 //! The vocabulary of `table!`: what a key may hold, its unit and its range.
 
-use super::nested::{Keys, NamedTables, SubTable, Tables};
+use super::nested::{InlineTable, Keys, NamedTables, SubTable, Tables};
 use super::unread::{OneOf, SomeQuantity};
 pub(in crate::config) use super::unread::{overlay, unread};
 use crate::config::text::dimension::Dimension;
 pub(in crate::config) use crate::config::text::dimension::Dimension::*;
 use crate::config::value::range::Range;
-use crate::config::value::{Column, Flag, NameOrNames, Names, Number, PerAxis, Text, Whole, Word, ZeroOr};
+use crate::config::value::{
+    Column, Flag, NameOrNames, Names, NotEmpty, Number, PerAxis, Text, Whole, Word, ZeroOr,
+};
 
 /// A text that is not empty.
 pub(in crate::config) const TEXT: Text = Text;
@@ -22,6 +24,8 @@ pub(in crate::config) const WORD: Word = Word;
 pub(in crate::config) const FLAG: Flag = Flag;
 /// A table `[key]`.
 pub(in crate::config) const TABLE: SubTable = SubTable;
+/// A table `key = { … }`, described where it stands.
+pub(in crate::config) const INLINE: InlineTable = InlineTable;
 /// Tables `[[key]]`.
 pub(in crate::config) const TABLES: Tables = Tables;
 /// Tables `[key.NAME]`.
@@ -68,6 +72,11 @@ pub(in crate::config) const fn length_per_axis(range: Range) -> PerAxis {
 /// A number, or 0 for none.
 pub(in crate::config) const fn zero_or(range: Range) -> ZeroOr {
     ZeroOr(range)
+}
+
+/// A list with at least one item.
+pub(in crate::config) const fn not_empty<K>(kind: K) -> NotEmpty<K> {
+    NotEmpty(kind)
 }
 
 /// Two different names; `expected` says which.

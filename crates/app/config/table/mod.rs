@@ -13,4 +13,4 @@ pub(super) mod unread;
 pub(super) use declaration::{Table, describe, left_out};
 pub(super) use declare::{one_of, table};
 pub(super) use nested::Group;
-pub(super) use unread::{OneOf, Unread};
+pub(super) use unread::Unread;

@@ -31,8 +31,24 @@ impl<G: Group> Value<SubTable> for G {
 
     fn schema(_: &SubTable, definitions: &mut Definitions) -> Keywords {
         definitions.reference(G::Written::NAME, |definitions| {
-            describe::<G::Written>(definitions).into_schema(G::Written::ABOUT)
+            describe::<G::Written>(definitions).into_schema(G::Written::ABOUT).into()
         })
+    }
+}
+
+/// A table `key = { … }`, described where it stands.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::config) struct InlineTable;
+
+impl Kind for InlineTable {}
+
+impl<G: Group> Value<InlineTable> for G {
+    fn read(_: &InlineTable, entry: &Entry<'_>) -> Option<Self> {
+        Self::read(&SubTable, entry)
+    }
+
+    fn schema(_: &InlineTable, definitions: &mut Definitions) -> Keywords {
+        describe::<G::Written>(definitions).into_schema(G::Written::ABOUT)
     }
 }
 

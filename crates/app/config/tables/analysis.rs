@@ -50,8 +50,8 @@ table! {
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
         /// Several frequencies, each once: one field problem each, all on the same mesh. The first is the one whose fields and
         /// results have plain names. Instead of `frequency`.
-        #[also(not_empty, each_once)]
-        frequencies: Option<Vec<f64>> = quantity(Frequency, NOT_NEGATIVE);
+        #[also(each_once)]
+        frequencies: Option<Vec<f64>> = not_empty(quantity(Frequency, NOT_NEGATIVE));
     }
     rules = |rules| rules.exactly_one(&["frequency", "frequencies"]);
 }
@@ -143,10 +143,6 @@ impl Group for Frequencies {
         }
         // A list with a fault is not handed out.
         let several = written.frequencies.unwrap_or_else(|| vec![f64::NAN]);
-        if several.is_empty() {
-            section.check_not_empty("frequencies", "at least one frequency");
-            return Self::One(f64::NAN);
-        }
         if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {
             let message = format!("`analysis.frequencies` has {} Hz twice", several[twice]);
             section.wrong(&format!("frequencies[{twice}]"), message, "each frequency once");

@@ -142,10 +142,8 @@ fn keys_of_the_shape(rules: Rules) -> Rules {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "shape", rename_all = "lowercase")]
 pub enum CoilShape {
-    /// Four straight sides.
+    /// Four straight sides; `"rectangular"` is one with mitred corners.
     Racetrack(Racetrack),
-    /// Four straight sides with mitred corners.
-    Rectangular(Rectangular),
     /// A circle.
     Circular(Circular),
     /// A region of the mesh.
@@ -172,19 +170,6 @@ pub struct Racetrack {
     /// How the straight sides meet. Default mitred: the rectangular coil of the paper.
     #[serde(flatten)]
     pub corner: Corner,
-}
-
-/// A rectangular coil, as analytic source; fields as those of [`Racetrack`].
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[allow(missing_docs, reason = "the fields are those of the racetrack")]
-pub struct Rectangular {
-    pub center: [f64; 3],
-    pub axis: Axis,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub direction: Option<[f64; 3]>,
-    pub half_window: [f64; 2],
-    pub width: f64,
-    pub height: f64,
 }
 
 /// A circular coil, as analytic source.
@@ -371,16 +356,12 @@ impl CoilShape {
         let [radius, width, height] = [radius, width, height].map(|value| value.unwrap_or(f64::NAN));
         let direction = direction.filter(|direction| check_direction(*direction, axis, section));
         let half_window = half_window.unwrap_or([f64::NAN; 2]);
-        match shape {
-            ShapeWord::Circular => Self::Circular(Circular { center, axis, radius, width, height }),
-            ShapeWord::Rectangular => {
-                Self::Rectangular(Rectangular { center, axis, direction, half_window, width, height })
-            }
-            ShapeWord::Racetrack => {
-                let corner = Corner::of(written.corner, written.inner_radius, half_window, section);
-                Self::Racetrack(Racetrack { center, axis, direction, half_window, width, height, corner })
-            }
+        if shape == ShapeWord::Circular {
+            return Self::Circular(Circular { center, axis, radius, width, height });
         }
+        // A rectangular coil has the keys of neither corner: it is mitred.
+        let corner = Corner::of(written.corner, written.inner_radius, half_window, section);
+        Self::Racetrack(Racetrack { center, axis, direction, half_window, width, height, corner })
     }
 }
 

@@ -59,7 +59,7 @@ table! {
         /// Where the optimisation starts, between `lower` and `upper`: all variables alike, each with its own value in the order
         /// of `design.points_m` of the result, or each anywhere between its bounds. The default is the mesh as it is.
         initial: InitialDesign = ONE_OF => InitialDesign::Uniform(0.0);
-        /// Planes over which mirrored variables are tied.
+        /// Planes over which mirrored variables are constrained to be equal.
         symmetry: Vec<SymmetryPlane> = TABLES => Vec::new();
     }
     check = Design::check;

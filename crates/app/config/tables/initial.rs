@@ -1,60 +1,25 @@
 //! `design.initial`: where an optimisation starts.
 
-use serde::Serialize;
-
 use crate::config::section::Section;
-use crate::config::table::description::property;
-use crate::config::table::field::Field;
-use crate::config::table::kinds::{FINITE, TABLE, length};
-use crate::config::table::{OneOf, Table, describe, table};
-use crate::config::value::definitions::{Definitions, Keywords, any_of};
-use crate::config::value::{Entry, Value};
+use crate::config::table::{one_of, table};
 
-/// The design an optimisation starts from.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum InitialDesign {
-    /// All variables alike [m]. Default 0: the mesh as it is.
-    Uniform(f64),
-    /// Every variable [m], in the order of `design.points_m` in `result.json`.
-    Values(Vec<f64>),
-    /// Every variable anywhere between its bounds, all equally likely.
-    Random {
-        /// Seed: the same number gives the same design.
-        random: usize,
-    },
+one_of! {
+    /// The design an optimisation starts from.
+    pub enum InitialDesign {
+        /// All variables alike [m]. Default 0: the mesh as it is.
+        Uniform(f64) = length(FINITE);
+        /// Every variable [m], in the order of `design.points_m` in `result.json`.
+        Values(Vec<f64>) = length(FINITE), if list;
+        /// Every variable anywhere between its bounds, all equally likely.
+        Random(RandomDesign) = INLINE, if table;
+    }
 }
 
 table! {
     /// Every variable anywhere between its bounds, all equally likely.
-    struct RandomDesign {
+    pub struct RandomDesign {
         /// Seed: the same number gives the same design.
         random: usize = integer(0, u32::MAX as usize), need "1";
-    }
-}
-
-impl Value<OneOf> for InitialDesign {
-    fn read(_: &OneOf, entry: &Entry<'_>) -> Option<Self> {
-        if entry.node.content.table().is_some() {
-            return <RandomDesign as Value<_>>::read(&TABLE, entry)
-                .map(|RandomDesign { random }| Self::Random { random });
-        }
-        if entry.node.content.list().is_some() {
-            return Value::read(&length(FINITE), entry).map(Self::Values);
-        }
-        Value::read(&length(FINITE), entry).map(Self::Uniform)
-    }
-
-    fn schema(_: &OneOf, definitions: &mut Definitions) -> Keywords {
-        let form = |meaning| Field { key: "", meaning, also: &[] };
-        let uniform = form(&[" All variables alike [m]. Default 0: the mesh as it is."]);
-        let values = form(&[" Every variable [m], in the order of `design.points_m` in `result.json`."]);
-        let random = describe::<RandomDesign>(definitions).into_schema(RandomDesign::ABOUT);
-        any_of(vec![
-            property::<f64, _>(&length(FINITE), uniform, None, definitions).into(),
-            property::<Vec<f64>, _>(&length(FINITE), values, None, definitions).into(),
-            random,
-        ])
     }
 }
 
@@ -86,7 +51,7 @@ impl InitialDesign {
                     section.wrong(&format!("initial[{k}]"), message, within);
                 }
             }
-            Self::Uniform(_) | Self::Random { .. } => {}
+            Self::Uniform(_) | Self::Random(_) => {}
         }
     }
 
@@ -95,7 +60,7 @@ impl InitialDesign {
         match self {
             Self::Uniform(value) => Some(vec![*value; count]),
             Self::Values(values) => (values.len() == count).then(|| values.clone()),
-            Self::Random { random } => {
+            Self::Random(RandomDesign { random }) => {
                 let mut numbers = fastrand::Rng::with_seed(*random as u64);
                 Some((0..count).map(|_| lower + (upper - lower) * numbers.f64()).collect())
             }
@@ -109,7 +74,10 @@ mod tests {
 
     #[test]
     fn a_random_design_fills_the_bounds_and_a_seed_repeats_it() {
-        let design = |random| InitialDesign::Random { random }.values(500, -5e-3, 20e-3).expect("any number");
+        let design = |random| {
+            let start = InitialDesign::Random(RandomDesign { random });
+            start.values(500, -5e-3, 20e-3).expect("any number")
+        };
         let values = design(3);
         assert_eq!(values, design(3));
         assert_ne!(values, design(4));

@@ -22,14 +22,13 @@ mod remesh;
 pub use analysis::{Analysis, ElementOrder, Elements, Frequencies};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
-    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, Rectangular,
-    RegionCoil, ShapeWord,
+    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
 };
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use functional::{Functional, ObjectiveKind, Weighting};
-pub use initial::InitialDesign;
+pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use material::{Material, Region, RegionModel};
 pub use mesh::{

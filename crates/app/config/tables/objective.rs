@@ -44,8 +44,7 @@ table! {
         #[also(not_zero)]
         weight: f64 = number(FINITE) => 1.0;
         /// The terms of a weighted sum, instead of the other keys.
-        #[also(not_empty)]
-        terms: Option<Vec<Term>> = TABLES;
+        terms: Option<Vec<Term>> = not_empty(TABLES);
     }
     rules = |rules| rules
         .with("terms", Then { required: &[], refused: &OF_A_TERM })
@@ -116,10 +115,8 @@ table! {
         /// The points [m], at least one. The flux density is recovered from the potentials around a point, within one material
         /// (`docs/theory.md`, section 3). A point outside the mesh at the start is a fault; one that the moving mesh leaves behind
         /// is `null` in the result, with a warning.
-        #[also(not_empty)]
-        points: Vec<[f64; 3]> = length(FINITE), need "[[\"0 mm\", \"0 mm\", \"-50 mm\"]]";
+        points: Vec<[f64; 3]> = not_empty(length(FINITE)), need "[[\"0 mm\", \"0 mm\", \"-50 mm\"]]";
     }
-    check = |_, section| section.check_not_empty("points", "at least one point of three lengths");
 }
 
 impl Objective {
@@ -160,9 +157,6 @@ impl Group for Sum {
         for key in OF_A_TERM.into_iter().filter(|key| section.has(key)) {
             let message = format!("`objective` has both `terms` and `{key}`");
             section.wrong(key, message, format!("`{key}` inside [[objective.terms]]"));
-        }
-        if terms.as_ref().is_some_and(Vec::is_empty) {
-            section.wrong("terms", "`objective.terms` has no term", "at least one [[objective.terms]]");
         }
         Self::Several { terms: terms.unwrap_or_default() }
     }

@@ -16,7 +16,7 @@ pub(in crate::config) fn case_count(root: &Table) -> usize {
 }
 
 /// The trees of the cases, made one at a time: each the root with the tables of the case laid over it and without cases,
-/// with what was laid; the fault of a case that goes through something that is not a table.
+/// with what was laid; the fault of a case that goes past the end of a list.
 pub(in crate::config) fn case_trees(
     mut root: Table,
 ) -> impl Iterator<Item = Result<(Table, toml::Table), Box<Diagnostic>>> {

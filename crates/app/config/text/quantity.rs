@@ -77,8 +77,7 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
         });
     }
     let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
-        let known: Vec<_> =
-            UNITS.iter().filter(|unit| unit.dimension == dimension).map(|unit| unit.name).collect();
+        let known: Vec<_> = dimension.units().collect();
         let hint = match meant(unit_text, &known) {
             Some(name) => format!("did you mean \"{} {name}\"? ", number.written),
             None => String::new(),

@@ -218,10 +218,11 @@ pub(in crate::config) fn join(path: &str, key: &str) -> String {
     if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") }
 }
 
-/// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list.
+/// Lay an override over the tree: tables are merged, an index replaces or enters one item of a list, and all else is replaced,
+/// so that a value may be of another form than the one it takes the place of.
 ///
 /// # Errors
-/// When the override goes through something that is not a table or list, or past the end of a list.
+/// When the override goes past the end of a list.
 pub(in crate::config) fn overlay(base: &mut Table, over: Table, path: &str) -> Result<(), Box<Diagnostic>> {
     for (key, node) in over {
         let path = join(path, &key);
@@ -236,37 +237,25 @@ pub(in crate::config) fn overlay(base: &mut Table, over: Table, path: &str) -> R
 }
 
 fn overlay_node(existing: &mut Node, node: Node, path: &str) -> Result<(), Box<Diagnostic>> {
-    let fault = |span: &Span, message: String, help: String| {
-        let span = span.clone();
-        Err(Box::new(Diagnostic::new(path, span, message).help(help)))
-    };
-    let Content::Table(inner) = node.content else {
-        *existing = node;
-        return Ok(());
-    };
-    match &mut existing.content {
-        Content::Table(table) => overlay(table, inner, path),
-        Content::Array(items) => {
-            let count = items.len();
-            for (key, node) in inner {
-                let item = key.parse::<usize>().ok().and_then(|index| items.get_mut(index));
-                match item {
-                    Some(item) => overlay_node(item, node, &format!("{path}[{key}]"))?,
-                    None => {
-                        return fault(
-                            &node.key_span,
-                            format!("`{key}` is not the number of an item of `{path}`"),
-                            format!("`{path}` has {count} items, counted from 0: write {path}[0]"),
-                        );
-                    }
-                }
-            }
+    match (&mut existing.content, node.content) {
+        (Content::Table(table), Content::Table(over)) => overlay(table, over, path),
+        (Content::Array(items), Content::Table(over)) => overlay_items(items, over, path),
+        (_, content) => {
+            *existing = Node { content, ..node };
             Ok(())
         }
-        other => {
-            let what = other.describe();
-            let place = inner.values().next().map_or(&node.key_span, |first| &first.key_span);
-            fault(place, format!("`{path}` is {what} and has no keys"), format!("set `{path}` itself"))
-        }
     }
+}
+
+fn overlay_items(items: &mut [Node], over: Table, path: &str) -> Result<(), Box<Diagnostic>> {
+    let count = items.len();
+    for (key, node) in over {
+        let Some(item) = key.parse::<usize>().ok().and_then(|index| items.get_mut(index)) else {
+            let message = format!("`{key}` is not the number of an item of `{path}`");
+            let help = format!("`{path}` has {count} items, counted from 0: write {path}[0]");
+            return Err(Box::new(Diagnostic::new(path, node.key_span, message).help(help)));
+        };
+        overlay_node(item, node, &format!("{path}[{key}]"))?;
+    }
+    Ok(())
 }

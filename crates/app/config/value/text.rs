@@ -10,6 +10,7 @@ use super::definitions::{Definitions, Keywords, described, list_of};
 use super::entry::Entry;
 use super::kind::{Kind, Single, Value};
 use super::limits::LONGEST_LIST;
+use super::list::NotEmpty;
 use crate::config::text::diagnostic::Diagnostic;
 use crate::config::text::message::shown;
 use crate::config::text::tree::Content;
@@ -160,11 +161,7 @@ impl Kind for NameOrNames {}
 impl Value<NameOrNames> for Vec<String> {
     fn read(_: &NameOrNames, entry: &Entry<'_>) -> Option<Self> {
         match &entry.node.content {
-            Content::Array(items) if items.is_empty() => {
-                entry.wrong(format!("`{}` is an empty list", entry.path), "at least one name", None);
-                None
-            }
-            Content::Array(_) => Self::read(&Names { expected: None }, entry),
+            Content::Array(_) => Self::read(&NotEmpty(Names { expected: None }), entry),
             _ => String::read(&Text, entry).map(|name| vec![name]),
         }
     }
@@ -201,13 +198,10 @@ impl<T: Choice> Value<Word> for T {
     }
 }
 
-/// A list of different words, not empty.
+/// A list of different words.
 impl<T: Choice> Value<Word> for Vec<T> {
     fn read(_: &Word, entry: &Entry<'_>) -> Option<Self> {
         let names = Vec::read(&Names { expected: None }, entry)?;
-        if names.is_empty() {
-            entry.wrong(format!("`{}` is an empty list", entry.path), "at least one word", None);
-        }
         let items = entry.items("names")?;
         let found = items.iter().zip(&names).map(|(item, name)| {
             let found = choice_named(name);
@@ -222,7 +216,9 @@ impl<T: Choice> Value<Word> for Vec<T> {
     }
 
     fn schema(kind: &Word, definitions: &mut Definitions) -> Keywords {
-        list_of(T::schema(kind, definitions))
+        let mut list = list_of(T::schema(kind, definitions));
+        list.insert("uniqueItems".into(), true.into());
+        list
     }
 }
 

@@ -132,7 +132,7 @@ pub struct Inversion {
 ///
 /// A single motion that leaves inverted elements has failed; a sweep has stopped at a limit, since its other rows are worth
 /// having, and so has a motion that goes no further and leaves a valid mesh.
-pub(super) fn verdict(cases: &[CaseReport]) -> (RunStatus, StopReason) {
+fn verdict(cases: &[CaseReport]) -> (RunStatus, StopReason) {
     let inverted = |case: &CaseReport| case.result.as_ref().is_some_and(|result| result.inverted > 0);
     match cases {
         cases if cases.iter().all(|case| case.valid) => (RunStatus::Done, StopReason::Done),
@@ -142,6 +142,22 @@ pub(super) fn verdict(cases: &[CaseReport]) -> (RunStatus, StopReason) {
 }
 
 impl MorphReport {
+    /// Of the cases, none of them left out; without the tuner, and with no time and memory.
+    pub(super) fn of(cases: Vec<CaseReport>) -> Self {
+        let (status, stop_reason) = verdict(&cases);
+        Self {
+            schema_version: 1,
+            command: "morph",
+            status,
+            stop_reason,
+            quality_of: "elastic body",
+            cases,
+            tuned: None,
+            timings_s: BTreeMap::new(),
+            peak_memory_bytes: 0,
+        }
+    }
+
     /// 0 where every mesh is valid, 4 where that of a single motion is inverted, that of a signal where one came; else 1.
     pub fn exit_code(&self) -> ExitCode {
         match self.status {

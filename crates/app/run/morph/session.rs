@@ -13,7 +13,6 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_remesh::{ElasticMap, RemeshSetup, SolverChoice};
 use serde::Serialize;
 
-use super::report::verdict;
 use super::tune::{Found, nothing_to_search, tune};
 use super::{CaseReport, LoadStepping, MorphReport, Parameters, csv, step_along};
 use crate::build::{MotionSetup, set_up_motion};
@@ -208,21 +207,15 @@ impl Session<'_> {
             }
         }
         let left_out = self.left_out(&cases, tuned.as_ref(), cut_short);
-        let (status, stop_reason) = match &left_out {
-            Some(_) => (RunStatus::Interrupted, StopReason::Interrupted),
-            None => verdict(&cases),
-        };
-        let report = MorphReport {
-            schema_version: 1,
-            command: "morph",
-            status,
-            stop_reason,
-            quality_of: "elastic body",
-            cases,
+        let mut report = MorphReport {
             tuned: tuned.map(|found| found.report),
             timings_s: BTreeMap::from([("total".to_owned(), self.clock.elapsed().as_secs_f64())]),
             peak_memory_bytes: peak_memory_bytes(),
+            ..MorphReport::of(cases)
         };
+        if left_out.is_some() {
+            (report.status, report.stop_reason) = (RunStatus::Interrupted, StopReason::Interrupted);
+        }
         directory.write(&directory.morph_csv(), csv(&report).as_bytes())?;
         directory.write(&directory.result(), &to_json(&report))?;
         if let Some(left_out) = left_out {

@@ -248,7 +248,6 @@ fn number(value: Option<f64>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::verdict;
     use super::*;
     use crate::exit_code::ExitCode;
     use crate::files::{RunStatus, StopReason, to_json};
@@ -266,24 +265,9 @@ mod tests {
         }
     }
 
-    fn report(cases: Vec<CaseReport>) -> MorphReport {
-        let (status, stop_reason) = verdict(&cases);
-        MorphReport {
-            schema_version: 1,
-            command: "morph",
-            status,
-            stop_reason,
-            quality_of: "elastic body",
-            cases,
-            tuned: None,
-            timings_s: [].into(),
-            peak_memory_bytes: 0,
-        }
-    }
-
     #[test]
     fn a_case_that_could_not_be_computed_is_a_row_with_its_error() {
-        let report = report(vec![broken(), broken()]);
+        let report = MorphReport::of(vec![broken(), broken()]);
         let csv = csv(&report);
         let rows: Vec<&str> = csv.lines().collect();
         assert_eq!(rows[0].split(',').count(), COLUMNS.len());
@@ -300,12 +284,12 @@ mod tests {
 
     #[test]
     fn a_broken_case_stops_a_sweep_and_a_single_motion_fails_only_if_inverted() {
-        let stopped = report(vec![broken(), CaseReport { valid: true, ..broken() }]);
+        let stopped = MorphReport::of(vec![broken(), CaseReport { valid: true, ..broken() }]);
         assert_eq!((stopped.status, stopped.stop_reason), (RunStatus::Stopped, StopReason::MeshLimit));
         assert_eq!(stopped.exit_code(), ExitCode::Stopped);
-        assert_eq!(report(vec![broken()]).exit_code(), ExitCode::Stopped);
-        assert_eq!(report(Vec::new()).exit_code(), ExitCode::Success);
-        let failed = MorphReport { status: RunStatus::Failed, ..report(vec![broken()]) };
+        assert_eq!(MorphReport::of(vec![broken()]).exit_code(), ExitCode::Stopped);
+        assert_eq!(MorphReport::of(Vec::new()).exit_code(), ExitCode::Success);
+        let failed = MorphReport { status: RunStatus::Failed, ..MorphReport::of(vec![broken()]) };
         assert_eq!(failed.exit_code(), ExitCode::Numerical);
     }
 }

@@ -84,9 +84,6 @@ fn winding(coil: &Coil) -> Option<Winding> {
         CoilShape::Racetrack(c) if c.direction.is_none() => {
             of(c.center, c.axis, c.half_window, c.width, c.height, false)
         }
-        CoilShape::Rectangular(c) if c.direction.is_none() => {
-            of(c.center, c.axis, c.half_window, c.width, c.height, false)
-        }
         CoilShape::Circular(c) => of(c.center, c.axis, [c.radius; 2], c.width, c.height, true),
         _ => None,
     }

@@ -50,8 +50,7 @@ table! {
         least_quality: f64 = number(QUALITIES) => 0.0;
         /// What moves and how; later entries win at nodes of several.
         #[serde(skip_serializing_if = "Vec::is_empty")]
-        #[also(not_empty)]
-        motion: Vec<PrescribedMotion> = TABLES, else Vec::new();
+        motion: Vec<PrescribedMotion> = not_empty(TABLES), else Vec::new();
         /// What the tuner may change.
         tune: Tune = TABLE => Tune::default();
         /// The cases of a sweep. Without them the configuration itself is the only one.
@@ -122,8 +121,7 @@ table! {
         /// Keys of `[design]` that are other than outside of the cases.
         design: Option<Unread> = overlay::<Design>();
         /// What moves in this case, instead of `[[morph.motion]]`.
-        #[also(not_empty)]
-        motion: Option<Unread> = unread::<Vec<PrescribedMotion>, _>(TABLES);
+        motion: Option<Unread> = unread::<Vec<PrescribedMotion>, _>(not_empty(TABLES));
         /// As in `[morph]`.
         increments: Option<Unread> = unread::<Increments, _>(ONE_OF);
         /// As in `[morph]`.
@@ -166,7 +164,6 @@ impl Morph {
                 "[[morph.motion]] with surface = \"top\" and displacement = [\"0 mm\", \"0 mm\", \"5 mm\"]",
             );
         }
-        section.check_not_empty("motion", "at least one table [[morph.motion]]");
         section.named_twice("case", self.cases.iter().map(|case| &case.name), "cases", "each name once");
     }
 }

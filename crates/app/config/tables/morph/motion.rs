@@ -49,8 +49,7 @@ table! {
         /// All nodes on the segment between two points [m].
         line: Option<Corners> = length(FINITE);
         /// The nodes at these points [m].
-        #[also(not_empty)]
-        nodes: Option<Vec<[f64; 3]>> = length(FINITE);
+        nodes: Option<Vec<[f64; 3]>> = not_empty(length(FINITE));
         /// All nodes between two corners [m], the lower one first; the box may be flat.
         corners["box"]: Option<Corners> = length(FINITE);
         /// The nodes of `[design]`, moved by a design.
@@ -165,7 +164,6 @@ impl Group for Target {
                 "one of surface, line, nodes, box and design",
             ),
         }
-        section.check_not_empty("nodes", "at least one point of three lengths");
         let corners = written.corners.and_then(|corners| flat_box(section, "box", corners));
         let TargetKeys { surface, line, nodes, design, .. } = written;
         let target = design.map(Self::Design).or(line.map(Self::Line)).or(nodes.map(Self::Nodes));

@@ -20,8 +20,7 @@ table! {
     /// ```
     pub struct Tune: Default {
         /// Which parameters of every region of the body are searched; each once. The modulus of the first region is kept.
-        #[also(not_empty, each_once)]
-        parameters: Vec<TunedParameter> = WORD => vec![TunedParameter::Young, TunedParameter::Poisson];
+        parameters: Vec<TunedParameter> = not_empty(WORD) => vec![TunedParameter::Young, TunedParameter::Poisson];
         /// Evaluations of the worst quality, for each stiffness. Three regions have five parameters, and the quadratic model of
         /// the search needs about twice that to begin.
         evaluations: usize = integer(1, 100_000) => 60;
