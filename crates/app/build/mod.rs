@@ -388,7 +388,7 @@ fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Me
 }
 
 /// A point for messages, to a micrometre.
-fn millimetres([x, y, z]: [f64; 3]) -> String {
+pub(crate) fn millimetres([x, y, z]: [f64; 3]) -> String {
     let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
     format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
 }

@@ -37,7 +37,11 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
         }
         let shape = setup.problem.shape().expect("an optimisation has a shape");
         let p = match &args.design {
-            Some(path) => read_design(path, shape.surface().variable_count())?,
+            Some(path) => {
+                let design = read_design(path, shape.surface().variable_count())?;
+                design.check_places(shape.surface(), setup.problem.original().bounding_box())?;
+                design.values
+            }
             None => shape.initial().to_vec(),
         };
         setup.problem.continue_to(&p, &interrupted)?;

@@ -10,7 +10,7 @@ use super::{Observer, Optimised, Record, Recorder, Settings, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::objective::Goal;
-use crate::problem::{Analysis, Problem, RoundEvent, Shape, SolverCache, Timings};
+use crate::problem::{Analysis, Problem, RoundEvent, RoundStart, Shape, SolverCache, Timings};
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
@@ -37,6 +37,8 @@ pub(super) struct Run<'a> {
     rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
+    /// How every round began.
+    pub(super) starts: Vec<RoundStart>,
     /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
@@ -72,6 +74,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             rounds: Vec::new(),
             begun: 0,
+            starts: Vec::new(),
             is_shared_out,
         }
     }
@@ -164,7 +167,9 @@ impl<'a> Run<'a> {
                 shape.next_round(&best.values, moved.mesh, moved.displacement)?
             }
         };
+        let design_m = best.values.clone();
         self.shape_mut().set_motion(motion);
+        self.starts.push(RoundStart::Reference { design_m });
         Ok(())
     }
 
@@ -180,10 +185,12 @@ impl<'a> Run<'a> {
         }
         self.rebase_at_best()?;
         let shape = self.shape();
+        let start = RoundStart::fallback(level, wanted);
         let escalated = shape.motion().escalate(&shape.displacement(wanted), level, &shape.limits)?;
         Ok(escalated.map(|(motion, report, level)| {
             self.best_is_stale = report.fallback.changes_mesh();
             self.shape_mut().set_motion(motion);
+            self.starts.push(start);
             (report, level)
         }))
     }
@@ -254,6 +261,7 @@ impl<'a> Run<'a> {
                 violation: violation(&sample),
                 sample,
                 round: record.row.round,
+                starts: self.starts.len(),
                 field,
             });
         }
