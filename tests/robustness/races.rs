@@ -51,7 +51,12 @@ enum Start {
 /// The block on so many elements that a run takes a fraction of a second.
 fn device(home: &Path) -> Device {
     let finer = ("cells = [2, 2, 1]", "cells = [6, 6, 3]");
-    let changes = [("cells = [1, 1, 1]", "cells = [3, 3, 3]"), finer, finer, ("max_evaluations = 6", "max_evaluations = 4")];
+    let changes = [
+        ("cells = [1, 1, 1]", "cells = [3, 3, 3]"),
+        finer,
+        finer,
+        ("max_evaluations = 6", "max_evaluations = 4"),
+    ];
     written("race", home, &changes).with("design.upper=\"3 mm\"")
 }
 
@@ -80,7 +85,9 @@ impl Track {
             }
             Resume => command(&[&"resume", &run, &"--max-evaluations", &EVALUATIONS]),
             Report => command(&[&"report", &run]),
-            Sweep => command(&[&"sweep", &self.device.config, &"--out", &sweep, &"--set", &"design.upper=3 mm"]),
+            Sweep => {
+                command(&[&"sweep", &self.device.config, &"--out", &sweep, &"--set", &"design.upper=3 mm"])
+            }
         };
         command.stdout(Stdio::null()).stderr(Stdio::piped());
         command
@@ -94,16 +101,19 @@ impl Track {
             finish(self.device.command("run", &run).args(["--max-evaluations", "2"])).completed();
         }
         // All commands are ready before the first is started.
-        let mut commands: Vec<Command> = racers.iter().map(|racer| self.command(*racer, &sweep, &run)).collect();
+        let mut commands: Vec<Command> =
+            racers.iter().map(|racer| self.command(*racer, &sweep, &run)).collect();
         let processes: Vec<Child> =
             commands.iter_mut().map(|command| command.spawn().expect("the program starts")).collect();
         let mut winners = 0;
         for (racer, process) in racers.iter().zip(processes) {
             let output = process.wait_with_output().expect("it ends");
-            let said = String::from_utf8_lossy(&output.stderr) + logs(&sweep).as_str();
+            let said = String::from_utf8_lossy(&output.stderr).into_owned() + &logs(&sweep);
             match output.status.code() {
                 Some(0 | 1) => winners += usize::from(!matches!(racer, Report)),
-                Some(5) => assert!(REFUSALS.iter().any(|text| said.contains(text)), "{context}, {racer:?}: {said}"),
+                Some(5) => {
+                    assert!(REFUSALS.iter().any(|text| said.contains(text)), "{context}, {racer:?}: {said}")
+                }
                 other => panic!("{context}, {racer:?}: {other:?}: {said}"),
             }
         }

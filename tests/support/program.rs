@@ -144,7 +144,8 @@ pub(crate) fn send(signal: &str, process: u32) {
 #[track_caller]
 pub(crate) fn wait_for_lock(directory: &Path) {
     for name in [LOCK, JOURNAL] {
-        let file = std::fs::OpenOptions::new().write(true).open(directory.join(name)).expect("a file of a run");
+        let file =
+            std::fs::OpenOptions::new().write(true).open(directory.join(name)).expect("a file of a run");
         wait_until("the lock of the run", || file.try_lock().is_ok());
     }
 }

@@ -15,6 +15,7 @@ use signal_hook::iterator::Signals;
 use super::ranks::is_worker;
 use super::{ExitCode, launcher};
 use crate::error::Error;
+use crate::printable::printable;
 use crate::show;
 
 /// What is shown at the first signal of a run.
@@ -52,7 +53,7 @@ impl Signal {
                 Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)),
                 Some(code),
             ) => {
-                let _ = writeln!(std::io::stderr(), "{error}");
+                let _ = writeln!(std::io::stderr(), "{}", printable(&error.to_string()));
                 Ok(code)
             }
             (outcome, _) => outcome,

@@ -10,6 +10,7 @@ use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{OutputError, OverwritePolicy, Sharing, shell_word, system_disk};
+use crate::printable::printable;
 use crate::run::sweep::{
     Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
 };
@@ -106,14 +107,14 @@ fn report_faults(error: &Error) {
     let Error::Sweep(SweepError::Faults { reports, .. }) = error else { return };
     let mut stderr = std::io::stderr();
     for (name, fault) in reports {
-        let _ = writeln!(stderr, "combination `{name}`:\n{}\n", render(fault));
+        let _ = writeln!(stderr, "combination `{}`:\n{}\n", printable(name), render(fault));
     }
 }
 
 fn render(fault: &ConfigError) -> String {
     match fault {
         ConfigError::Invalid(report) => diagnostics::render(report, Style::for_stderr()),
-        other => other.to_string(),
+        other => printable(&other.to_string()).into_owned(),
     }
 }
 

@@ -73,7 +73,8 @@ fn follow(
         Err(error @ OptimizerError::Interrupted) => Err(error.into()),
         // Under another configuration the mesh may go another way.
         Err(error) => {
-            observer.warning(&format!("the rounds in which the design was found cannot be followed: {error}"));
+            observer
+                .warning(&format!("the rounds in which the design was found cannot be followed: {error}"));
             problem.restart()?;
             Ok(Vec::new())
         }

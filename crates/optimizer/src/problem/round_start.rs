@@ -25,12 +25,8 @@ pub enum RoundStart {
 }
 
 /// The levels in their order.
-const LEVELS: [FallbackLevel; 4] = [
-    FallbackLevel::None,
-    FallbackLevel::Policies,
-    FallbackLevel::Smoothing,
-    FallbackLevel::AxisConstraint,
-];
+const LEVELS: [FallbackLevel; 4] =
+    [FallbackLevel::None, FallbackLevel::Policies, FallbackLevel::Smoothing, FallbackLevel::AxisConstraint];
 
 impl RoundStart {
     /// A fallback beyond a level, after a design was refused.
