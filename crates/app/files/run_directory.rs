@@ -4,6 +4,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use super::OutputError;
 use super::disk::{Disk, DiskLock, Sharing};
@@ -29,6 +30,9 @@ pub struct RunDirectory {
     /// What keeps other processes out while this or a copy of it lives; `None` where it is only looked into.
     lock: Option<Arc<dyn DiskLock>>,
 }
+
+/// How long a directory in use is waited for.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// The file that a process locks before it touches a directory. It stays: whoever removed it could not know who has it open.
 pub(crate) const LOCK: &str = ".fluxmorph-lock";
@@ -165,8 +169,17 @@ impl RunDirectory {
         Ok(self)
     }
 
+    /// A process that is about to end, or only writes a report, is waited for.
     fn acquire(&mut self) -> Result<(), OutputError> {
-        let locked = self.disk.lock(&self.path.join(LOCK), Sharing::Exclusive);
+        let began = Instant::now();
+        let locked = loop {
+            match self.disk.lock(&self.path.join(LOCK), Sharing::Exclusive) {
+                Err(error) if error.kind() == io::ErrorKind::ResourceBusy && began.elapsed() < PATIENCE => {
+                    std::thread::sleep(PATIENCE / 50);
+                }
+                locked => break locked,
+            }
+        };
         self.lock = locked.map_err(OutputError::io("lock", &self.path))?.map(Arc::from);
         Ok(())
     }

@@ -93,18 +93,17 @@ impl ReportedRun {
         (&self.config, &self.source)
     }
 
-    /// Writes the page into the directory, which is held against other processes meanwhile, or to `out`; where it is
-    /// written.
+    /// Writes the page into the directory, unless another process works in it, or to `out`; where it is written.
     ///
     /// # Errors
     /// Damaged files, a directory in use or changed meanwhile, or when the operating system refuses.
-    pub fn write(mut self, out: Option<&Path>) -> Result<PathBuf, Error> {
-        if out.is_none() {
-            self.directory = self.directory.locked()?;
-        }
-        let (directory, manifest) = (self.directory.clone(), self.manifest.clone());
+    pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
+        let (mut directory, manifest) = (self.directory.clone(), self.manifest.clone());
         let path = out.map_or_else(|| directory.report(), Path::to_owned);
         let data = RunData::read(self)?;
+        if out.is_none() {
+            directory = directory.locked()?;
+        }
         manifest.check_current(&directory)?;
         let page = page::page(&data, &link_prefix(&path, directory.path()));
         directory.write(&path, page.as_bytes())?;

@@ -5,6 +5,7 @@ use std::time::Instant;
 use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
+use super::promised_gain::promised_gain;
 use super::search::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, StopReason};
 use crate::error::Error;
@@ -37,6 +38,8 @@ pub(super) struct Run<'a> {
     rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
+    /// What the gradient promised at the first design.
+    promised: Option<f64>,
     /// How every round began.
     pub(super) starts: Vec<RoundStart>,
     /// Whether several ranks compute, or computed what is replayed.
@@ -74,6 +77,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             rounds: Vec::new(),
             begun: 0,
+            promised: None,
             starts: Vec::new(),
             is_shared_out,
         }
@@ -252,6 +256,9 @@ impl<'a> Run<'a> {
         self.timings += record.timings;
         self.best_is_stale = false;
         self.last.clone_from(&record.design);
+        if self.promised.is_none() {
+            self.promised = Some(self.promised_gain(&sample, &record.design));
+        }
         if comparison.is_improved() {
             let field = field(self);
             self.best = Some(Incumbent {
@@ -267,13 +274,24 @@ impl<'a> Run<'a> {
         }
     }
 
+    fn promised_gain(&self, sample: &Sample, design: &[f64]) -> f64 {
+        let shape = self.shape();
+        promised_gain(sample, design, shape.lower(), shape.upper())
+    }
+
+    /// What the gradient promised at the first design, and promises at the best one.
+    pub(super) fn promised_gains(&self) -> Option<[f64; 2]> {
+        let best = self.best.as_ref()?;
+        Some([self.promised?, self.promised_gain(&best.sample, &best.values)])
+    }
+
     /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.
     ///
     /// # Errors
     /// The error itself, where there is no best design or it is another one.
     pub(super) fn salvage(&mut self, error: Error) -> Result<StopReason, Error> {
         let reason = match &error {
-            Error::Remesh(_) => StopReason::MeshLimit,
+            Error::Remesh(_) => StopReason::MeshLimited,
             other if other.is_numerical() => StopReason::NumericalFailure,
             _ => return Err(error),
         };
