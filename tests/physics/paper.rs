@@ -154,7 +154,7 @@ fn reaches_the_papers_ratio(optimised: &Optimised, rows: &[Evaluation]) {
     assert!(rows.len() <= 13);
     let ratio = optimised.best.objective / optimised.initial;
     assert!(ratio <= 0.5116, "{ratio}");
-    assert_ne!(optimised.stop_reason, StopReason::MeshLimit);
+    assert_ne!(optimised.stop_reason, StopReason::MeshLimited);
     let framed = ShieldReference::read().framed_design;
     let differing: Vec<usize> =
         (0..framed.len()).filter(|&k| (framed[k] - optimised.best.values[k]).abs() > 5e-3).collect();

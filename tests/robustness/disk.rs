@@ -8,7 +8,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use fluxmorph::files::{Disk, DiskFile};
+use fluxmorph::files::{Disk, DiskFile, DiskLock, Sharing};
 
 /// What happens at one operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,8 +226,8 @@ impl Disk for SimulatedDisk {
         Ok(Box::new(SimulatedFile { disk: self.clone(), id }))
     }
 
-    fn hold(&self, _: &Path) -> io::Result<()> {
-        Ok(())
+    fn lock(&self, _: &Path, _: Sharing) -> io::Result<Option<Box<dyn DiskLock>>> {
+        Ok(None)
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {

@@ -21,7 +21,7 @@ fn a_directory_in_use_is_refused_to_others_even_while_its_run_stands_still() {
     let (device, out) = (endless(), home.path().join("out"));
     let run = device.command("run", &out).stderr(Stdio::null()).spawn().expect("the program starts");
     let mut run = under_way(&out, run);
-    let in_use = ["is written by another process", "journal.jsonl"];
+    let in_use = ["/out` is written by another process of fluxmorph", "wait for it or stop it"];
     for signal in ["CONT", "STOP"] {
         send(signal, run.id());
         finish(&mut resume(&out)).with(5, &in_use);

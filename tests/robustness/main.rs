@@ -2,7 +2,7 @@
 //! where a run without a break does, to the last bit.
 //!
 //! On a disk in memory, which fails on request: `algorithms`, `resume`, `faults`. With the system's disks and
-//! processes: `signals`, `kills`, `disks`, `intruders`, `reopened`, `determinism`. Long series are written into
+//! processes: `signals`, `kills`, `disks`, `intruders`, `races`, `reopened`, `determinism`. Long series are written into
 //! docs/robustness.md: `just torture-runs`.
 #![cfg(unix)]
 #![allow(missing_docs)]
@@ -18,6 +18,7 @@ mod intruders;
 mod kills;
 mod lint;
 mod page;
+mod races;
 mod reopened;
 mod resume;
 mod signals;

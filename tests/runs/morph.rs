@@ -86,7 +86,7 @@ fn a_motion_that_stops_short_on_a_valid_mesh_has_stopped_and_not_failed() {
     for increments in ["", "increments = 10\n"] {
         let text = pressed(&format!("{increments}least_quality = 0.3"));
         let result = morph(home.path(), &text, &["--json", "--force"]).exits_with(1).json();
-        assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limit".into()));
+        assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limited".into()));
         let case = &result["cases"][0];
         assert!(number(case, "/reached") < 1.0 && count(case, "/inverted") == 0, "{case}");
         assert!(case["valid"] == false, "{case}");
@@ -129,7 +129,7 @@ fn a_sweep_is_one_table_with_published_values_beside() {
     }
     let out = home.path().join("out");
     let result = read_json(&out.join("result.json"));
-    assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limit".into()));
+    assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limited".into()));
     assert_eq!(count(&result, "/cases/1/tets"), 3072);
     assert_eq!(count(&result, "/cases/0/paper/poor"), 7);
     let csv = std::fs::read_to_string(out.join("morph.csv")).expect("read");

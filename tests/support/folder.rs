@@ -7,7 +7,10 @@ use std::path::{Path, PathBuf};
 use fluxmorph_geometry::io::{VtuArray, VtuContents, read_vtu};
 use serde_json::Value;
 
-/// All files below a folder with their content, by their paths in it.
+/// The file that a process locks while it works in a directory; it stays there.
+pub(crate) const LOCK: &str = ".fluxmorph-lock";
+
+/// All files but locks below a folder with their content, by their paths in it.
 pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -16,7 +19,7 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
             let path = entry.expect("an entry").path();
             if path.is_dir() {
                 folders.push(path);
-            } else {
+            } else if !path.ends_with(LOCK) {
                 let name = path.strip_prefix(folder).expect("below it").to_owned();
                 found.insert(name, fs::read(&path).expect("a file"));
             }

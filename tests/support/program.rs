@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use super::folder::LOCK;
+
 /// Far longer than anything here takes, on any machine under any load: only what hangs is ended by it.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(600);
 
-/// The file that a run locks while it is written.
+/// The record of a run's evaluations.
 pub(crate) const JOURNAL: &str = "journal.jsonl";
 
 /// How a command ended, and what it wrote.
@@ -141,6 +143,9 @@ pub(crate) fn send(signal: &str, process: u32) {
 /// Waits until nobody writes a run any more: a process keeps its lock until the system has cleared it away.
 #[track_caller]
 pub(crate) fn wait_for_lock(directory: &Path) {
-    let journal = std::fs::OpenOptions::new().write(true).open(directory.join(JOURNAL)).expect("a journal");
-    wait_until("the lock of the run", || journal.try_lock().is_ok());
+    for name in [LOCK, JOURNAL] {
+        let file =
+            std::fs::OpenOptions::new().write(true).open(directory.join(name)).expect("a file of a run");
+        wait_until("the lock of the run", || file.try_lock().is_ok());
+    }
 }

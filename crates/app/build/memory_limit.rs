@@ -9,6 +9,9 @@
 
 use std::path::{Path, PathBuf};
 
+use fluxmorph_optimizer::memory_estimate::{needs_workspace, of_evaluation};
+use fluxmorph_optimizer::problem::Problem;
+
 use crate::config::{Config, ConfigError, MeshConfig, SourceMap};
 use crate::files::OverwritePolicy;
 
@@ -27,6 +30,8 @@ struct Room {
     bytes: u64,
     /// What limits it.
     by: &'static str,
+    /// Whether addresses count that are not used.
+    is_of_addresses: bool,
 }
 
 /// Refuses a mesh that cannot fit, before it is made; of a sweep the meshes of all cases.
@@ -34,7 +39,7 @@ struct Room {
 /// # Errors
 /// A fault at the key of the mesh.
 pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), ConfigError> {
-    let Some(room) = room() else { return Ok(()) };
+    let Some(room) = room(0) else { return Ok(()) };
     let cases = config.morph.iter().flat_map(|morph| &morph.cases).enumerate();
     let cases = cases.filter_map(|(i, case)| Some((&case.config.as_ref()?.mesh, source.case(i))));
     for (mesh, source) in std::iter::once((&config.mesh, source)).chain(cases) {
@@ -57,27 +62,56 @@ pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), Conf
     Ok(())
 }
 
-/// Refuses a problem whose solution needs about `estimate` bytes and cannot fit, unless an earlier run is to be replaced:
-/// `--force` means both.
+/// Refuses a problem whose solution on the threads of this pool cannot fit, unless an earlier run is to be replaced: `--force`
+/// means both.
 ///
 /// # Errors
 /// A fault at the mesh.
 pub(crate) fn check_problem(
-    estimate: usize,
+    problem: &Problem,
     source: &SourceMap,
     overwrite: OverwritePolicy,
 ) -> Result<(), ConfigError> {
-    match room() {
-        Some(room) if overwrite == OverwritePolicy::Keep => {
-            refuse_beyond(room, source, ("mesh", "solving the problem"), estimate as u64)
-        }
-        _ => Ok(()),
+    if overwrite == OverwritePolicy::Replace {
+        return Ok(());
     }
+    let threads = if needs_workspace(problem) { rayon::current_num_threads() } else { 0 };
+    check_estimate(of_evaluation(problem) as u64, threads, source)
+}
+
+/// The same for a problem of about so many bytes, with this many threads in dense kernels.
+fn check_estimate(estimate: u64, threads: usize, source: &SourceMap) -> Result<(), ConfigError> {
+    let workspace = threads as u64 * workspace_of_thread();
+    let Some(room) = room(workspace) else { return Ok(()) };
+    let what = match workspace {
+        _ if !room.is_of_addresses => "solving the problem".to_owned(),
+        0 => "solving the problem".to_owned(),
+        bytes => format!(
+            "solving the problem (beside {} for the dense kernels of {threads} threads)",
+            mebibytes(bytes)
+        ),
+    };
+    refuse_beyond(room, source, ("mesh", &what), estimate)
+}
+
+/// Addresses that a thread takes for dense kernels of large factors: both operands in packed form, each as large as the cache
+/// that the threads share.
+fn workspace_of_thread() -> u64 {
+    let text = std::fs::read_to_string("/sys/devices/system/cpu/cpu0/cache/index3/size").unwrap_or_default();
+    2 * cache_bytes(&text).unwrap_or(SHARED_CACHE)
+}
+
+/// The shared cache, where the system does not say [bytes].
+const SHARED_CACHE: u64 = 32 << 20;
+
+/// A size as the kernel writes it: `32768K`.
+fn cache_bytes(text: &str) -> Option<u64> {
+    text.trim().strip_suffix('K')?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// Why so many bytes cannot be held; `None` where they can, or nothing is known.
 pub(crate) fn shortage(needed: usize) -> Option<String> {
-    room().filter(|room| needed as u64 > room.bytes).map(|room| beyond(room, needed as u64))
+    room(0).filter(|room| needed as u64 > room.bytes).map(|room| beyond(room, needed as u64))
 }
 
 fn beyond(room: Room, needed: u64) -> String {
@@ -105,23 +139,26 @@ fn mebibytes(bytes: u64) -> String {
     format!("{} MiB", bytes.div_ceil(1 << 20))
 }
 
-/// The memory that this process may have; `None` where the system does not say.
-fn room() -> Option<Room> {
+/// The memory that this process may have beside so many bytes of addresses that it takes and does not use; `None` where the
+/// system does not say.
+fn room(addresses: u64) -> Option<Room> {
     let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let [status, limits] = ["/proc/self/status", "/proc/self/limits"].map(read);
     let held = kibibytes(&status, "VmRSS:").unwrap_or(0);
     let own = |size: &str, row: &str| {
         let beyond_held = kibibytes(&status, size).unwrap_or(0).saturating_sub(held);
-        soft_limit(&limits, row).map(|limit| limit.saturating_sub(beyond_held))
+        soft_limit(&limits, row).map(|limit| limit.saturating_sub(beyond_held).saturating_sub(addresses))
     };
     let machine = kibibytes(&read("/proc/meminfo"), "MemAvailable:").map(|free| free.saturating_add(held));
     let candidates = [
-        (machine, "available on this machine"),
-        (group_room(&read("/proc/self/cgroup"), held), "allowed by the control group"),
-        (own("VmSize:", "Max address space"), "allowed by the limit on the address space"),
-        (own("VmData:", "Max data size"), "allowed by the limit on data"),
+        (machine, "available on this machine", false),
+        (group_room(&read("/proc/self/cgroup"), held), "allowed by the control group", false),
+        (own("VmSize:", "Max address space"), "allowed by the limit on the address space", true),
+        (own("VmData:", "Max data size"), "allowed by the limit on data", true),
     ];
-    let known = candidates.into_iter().filter_map(|(bytes, by)| Some(Room { bytes: bytes?, by }));
+    let known = candidates
+        .into_iter()
+        .filter_map(|(bytes, by, is_of_addresses)| Some(Room { bytes: bytes?, by, is_of_addresses }));
     known.min_by_key(|room| room.bytes)
 }
 
@@ -215,6 +252,16 @@ mod tests {
     }
 
     #[test]
+    fn what_threads_take_for_dense_kernels_is_left_out_of_the_room() {
+        assert_eq!(cache_bytes("32768K\n"), Some(32 << 20));
+        assert_eq!(cache_bytes(""), None);
+        let (all, less) = (room(0), room(1 << 20));
+        if let (Some(all), Some(less)) = (all, less) {
+            assert!(less.bytes <= all.bytes);
+        }
+    }
+
+    #[test]
     fn a_group_leaves_what_its_limit_and_its_cache_say() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
@@ -232,16 +279,15 @@ mod tests {
     fn what_does_not_fit_is_refused_unless_forced() {
         let text = "[mesh]\ngenerator = \"block\"\n[analysis]\nfrequency = 0\n";
         let (_, source) = Config::from_str(text, "block.toml").expect("complete");
-        let small = Room { bytes: 1 << 20, by: "by the test" };
+        let small = Room { bytes: 1 << 20, by: "by the test", is_of_addresses: false };
         assert!(refuse_beyond(small, &source, ("mesh", "it"), 1 << 20).is_ok());
         let error = refuse_beyond(small, &source, ("mesh", "it"), (1 << 20) + 1).expect_err("too much");
         assert!(
             error.to_string().contains("about 2 MiB of memory, and there are 1 MiB (by the test)"),
             "{error}"
         );
-        assert!(check_problem(usize::MAX, &source, OverwritePolicy::Replace).is_ok());
-        if room().is_some() {
-            assert!(check_problem(usize::MAX, &source, OverwritePolicy::Keep).is_err());
+        if room(0).is_some() {
+            assert!(check_estimate(u64::MAX, 2, &source).is_err());
         }
     }
 }

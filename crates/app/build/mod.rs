@@ -2,7 +2,7 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `plausible` what cannot be meant, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod design;
 mod elastic_body;
@@ -13,6 +13,7 @@ pub(crate) mod memory_limit;
 pub(crate) mod mesh;
 mod motion;
 mod outline;
+mod plausible;
 mod shape;
 mod share;
 
@@ -59,9 +60,22 @@ pub struct Audited {
 impl Audited {
     /// The warning for the user, if there is one.
     pub fn warning(&self) -> Option<String> {
+        let (coarse, thin) = (self.audit.volume_warning(), self.audit.impedance_warning());
+        let depths = self.audit.thickness_in_skin_depths;
         match self.model {
-            RegionModel::Volume => self.audit.volume_warning(),
-            RegionModel::Impedance => self.audit.impedance_warning(),
+            // Neither model must send to the other where that one has an objection too.
+            RegionModel::Volume if thin.is_some() => coarse.map(|text| {
+                let what = text.split(". Refine the skin").next().unwrap_or_default();
+                format!(
+                    "{what}. Refine the skin: at {depths:.1} skin depths on average the region is too thin for an impedance \
+                     surface"
+                )
+            }),
+            RegionModel::Volume => coarse,
+            RegionModel::Impedance if coarse.is_some() => thin.map(|text| {
+                format!("{text} with thinner elements at its surface: these are too thick for the skin depth")
+            }),
+            RegionModel::Impedance => thin,
             RegionModel::Perfect => None,
         }
     }
@@ -135,6 +149,12 @@ fn build_problem(
     progress.stage(Stage::Unknowns);
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
+    if !motion_alone {
+        let coils = coils.as_deref().unwrap_or_default();
+        let faults = plausible::coil_faults(config, source, &full_mesh, coils);
+        sink.take(source.check(faults).map_err(Error::from))?;
+        warnings.extend(plausible::warnings(config, &full_mesh));
+    }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());
     let design = config.design.as_ref().zip(config.remesh.as_ref()).map(|(design, remesh)| shape::Inputs {
         source,
@@ -390,7 +410,7 @@ fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Me
 }
 
 /// A point for messages, to a micrometre.
-fn millimetres([x, y, z]: [f64; 3]) -> String {
+pub(crate) fn millimetres([x, y, z]: [f64; 3]) -> String {
     let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
     format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
 }

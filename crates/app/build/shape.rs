@@ -12,7 +12,7 @@ use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits}
 use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{guidance, regions_at, remesh_setup};
-use super::millimetres;
+use super::{millimetres, plausible};
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
 use crate::error::Error;
 
@@ -107,6 +107,9 @@ pub(super) fn shape(
         let fault = source.diagnostic("optimizer.minimum_quality", message);
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
+    if let Some(thickness) = &thickness {
+        faults.extend(vanishing_faults(source, design, &surface, thickness));
+    }
     source.check(faults)?;
     let limits = StepLimits {
         inversion_share: inputs.remesh.inversion_share,
@@ -140,6 +143,30 @@ pub(super) fn thickened_region(mesh: &Mesh, surface: &DesignSurface, config: &Co
     let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
     let region = topology.region_of()[element.index()];
     config.regions.contains_key(&topology.region_names()[region.index()]).then_some(region)
+}
+
+/// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness.
+fn vanishing_faults(
+    source: &SourceMap,
+    design: &Design,
+    surface: &DesignSurface,
+    thickness: &WallThickness,
+) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    for (key, bound) in [("design.lower", design.lower), ("design.upper", design.upper)] {
+        let displacements = surface.normal_displacements(&vec![bound; surface.variable_count()]);
+        let left = |(i, thickness): (usize, f64)| (thickness + displacements[i], thickness);
+        let thinnest = thickness.at_nodes().map(left).min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((least, thickness)) = thinnest.filter(|(least, _)| *least <= 0.0) else { continue };
+        let message = format!(
+            "`{key}` is {:.3} mm, and the body is {:.3} mm thick there: nothing would be left of it",
+            bound * 1e3,
+            thickness * 1e3
+        );
+        let fault = source.diagnostic(key, message);
+        faults.push(fault.expected(format!("less by more than {:.3} mm", -least * 1e3)));
+    }
+    faults
 }
 
 /// Whether a node is a design node or has a component that the elastic map decides.
@@ -177,7 +204,10 @@ fn overlap_faults(
                 .expected(
                     "coils and their windows outside the remesh region: a coil does not move with the mesh",
                 )
-                .help("shrink the remesh region, or move the coil"),
+                .help(match plausible::unit_hint(config, inputs.full_mesh) {
+                    Some(hint) => format!("{hint}; else shrink the remesh region, or move the coil"),
+                    None => "shrink the remesh region, or move the coil".to_owned(),
+                }),
         );
     }
     faults

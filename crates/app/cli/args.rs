@@ -354,8 +354,28 @@ fn whole_number(text: &str, most: usize) -> Result<usize, String> {
     }
 }
 
+/// Most threads of a process.
+const MOST_THREADS: usize = 1024;
+
 fn threads(text: &str) -> Result<usize, String> {
-    whole_number(text, 1024)
+    whole_number(text, MOST_THREADS)
+}
+
+/// Whether the environment, where the library of threads looks as well, asks for no more of them than `--threads` may.
+///
+/// # Errors
+/// What is wrong, in words.
+pub(super) fn check_environment(variable: impl Fn(&str) -> Option<String>) -> Result<(), String> {
+    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+        // What is no number has no effect.
+        let asked = variable(name).and_then(|text| text.parse::<usize>().ok()).unwrap_or(0);
+        if asked > MOST_THREADS {
+            return Err(format!(
+                "{name} asks for {asked} threads: must be at most {MOST_THREADS}; set it lower, or take --threads"
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn evaluations(text: &str) -> Result<usize, String> {
@@ -382,6 +402,20 @@ mod tests {
     use clap::CommandFactory;
 
     use super::*;
+
+    #[test]
+    fn the_environment_may_ask_for_as_many_threads_as_the_command_line() {
+        let with = |name: &'static str, value: &'static str| {
+            check_environment(move |asked| (asked == name).then(|| value.to_owned()))
+        };
+        for value in ["", "0", "1024", "many", "-1"] {
+            assert_eq!(with("RAYON_NUM_THREADS", value), Ok(()), "{value}");
+        }
+        for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+            let cause = with(name, "5000").expect_err("too many");
+            assert!(cause.contains(name) && cause.contains("at most 1024"), "{cause}");
+        }
+    }
 
     #[test]
     fn the_definition_is_sound() {

@@ -1,6 +1,5 @@
 //! `fluxmorph gradient`.
 
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::verify::{Certificate, Certificates, Settings, certify};
 
 use super::args::GradientArgs;
@@ -31,13 +30,17 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
         observer.phase("setting up mesh and matrices");
         let progress = &mut |stage| observer.stage(stage);
         let mut setup = set_up_watched(&config, &source, Mode::Optimisation, ranks.group(), progress)?;
-        memory_limit::check_problem(of_evaluation(&setup.problem), &source, args.common.overwrite_policy())?;
+        memory_limit::check_problem(&setup.problem, &source, args.common.overwrite_policy())?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
         let shape = setup.problem.shape().expect("an optimisation has a shape");
         let p = match &args.design {
-            Some(path) => read_design(path, shape.surface().variable_count())?,
+            Some(path) => {
+                let design = read_design(path, shape.surface().variable_count())?;
+                design.check_places(shape.surface(), setup.problem.original().bounding_box())?;
+                design.values
+            }
             None => shape.initial().to_vec(),
         };
         setup.problem.continue_to(&p, &interrupted)?;

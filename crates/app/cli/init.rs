@@ -10,6 +10,7 @@ use super::template::Template;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{OutputError, shell_word, system_disk, write_whole};
+use crate::printable::printable;
 
 /// Do what the command line says.
 ///
@@ -40,7 +41,8 @@ pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
     }
     if !args.quiet {
         let written: Vec<&Path> = files.iter().map(|(path, _)| path.as_path()).collect();
-        let _ = writeln!(std::io::stderr(), "{}", next_commands(&written, place.template));
+        let next = next_commands(&written, place.template);
+        let _ = writeln!(std::io::stderr(), "{}", printable(&next));
     }
     Ok(ExitCode::Success)
 }

@@ -15,6 +15,8 @@ use signal_hook::iterator::Signals;
 use super::ranks::is_worker;
 use super::{ExitCode, launcher};
 use crate::error::Error;
+use crate::printable::printable;
+use crate::run::sweep::ENDS_WITH_STDIN;
 use crate::show;
 
 /// What is shown at the first signal of a run.
@@ -52,7 +54,7 @@ impl Signal {
                 Err(error @ Error::Optimizer(OptimizerError::Interrupted | OptimizerError::InterruptedRun)),
                 Some(code),
             ) => {
-                let _ = writeln!(std::io::stderr(), "{error}");
+                let _ = writeln!(std::io::stderr(), "{}", printable(&error.to_string()));
                 Ok(code)
             }
             (outcome, _) => outcome,
@@ -84,6 +86,13 @@ pub(super) fn watch(message: &'static str) -> Signal {
                 show::clear();
                 let _ = writeln!(std::io::stderr(), "{message}");
             }
+        });
+    }
+    if std::env::var_os(ENDS_WITH_STDIN).is_some() {
+        std::thread::spawn(|| {
+            // Whoever started this process holds the other end and writes nothing: it has ended.
+            let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
+            let _ = signal_hook::low_level::raise(SIGTERM);
         });
     }
     Signal { number }

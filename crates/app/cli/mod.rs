@@ -30,6 +30,7 @@ use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::DesignFileError;
+use crate::printable::printable;
 use crate::run::launcher;
 use crate::show::{Bar, Console, Quiet, RunObserver};
 use args::{Cli, Command, Progress, WorkArgs};
@@ -37,6 +38,10 @@ use args::{Cli, Command, Progress, WorkArgs};
 /// Do what the arguments of this process say.
 pub fn main() -> std::process::ExitCode {
     interrupt::survive_file_size_limits();
+    if let Err(cause) = args::check_environment(|name| std::env::var(name).ok()) {
+        let _ = writeln!(std::io::stderr(), "error: {}", printable(&cause));
+        return ExitCode::Usage.into();
+    }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -91,10 +96,11 @@ fn message(error: &Error) -> String {
         Error::Config(ConfigError::Invalid(report)) | Error::Design(DesignFileError::Fault(report)) => {
             diagnostics::render(report, Style::for_stderr())
         }
-        other => match locate_error::keys_of_advice(other) {
-            Some(keys) => format!("error: {other} ({keys})"),
-            None => format!("error: {other}"),
-        },
+        other => {
+            let keys = locate_error::keys_of_advice(other);
+            let keys = keys.map_or_else(String::new, |keys| format!(" ({keys})"));
+            printable(&format!("error: {other}{keys}")).into_owned()
+        }
     }
 }
 

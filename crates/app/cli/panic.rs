@@ -10,6 +10,7 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::exit_code::ExitCode;
+use crate::printable::printable;
 use crate::show;
 
 /// Does the work; a panic is reported once, and ends as a numerical failure.
@@ -23,7 +24,7 @@ pub(super) fn report_panics(work: impl FnOnce() -> ExitCode) -> ExitCode {
         show::clear();
         let backtrace = Backtrace::capture();
         let mut stderr = std::io::stderr();
-        let _ = writeln!(stderr, "{}", message(info));
+        let _ = writeln!(stderr, "{}", printable(&message(info)));
         if backtrace.status() == BacktraceStatus::Captured {
             let _ = writeln!(stderr, "{backtrace}");
         }

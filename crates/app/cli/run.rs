@@ -2,7 +2,6 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Arc;
 
 use super::args::{ResumeArgs, RunArgs};
 use super::interrupt::{self, Signal};
@@ -12,8 +11,8 @@ use crate::build::{Mode, memory_limit};
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{Disk, RunResult, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::{self, Options, RunLimits, SavedRun};
+use crate::files::{RunStatus, StopReason, extend_command, resume_command, system_disk};
+use crate::run::{self, Concluded, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
 
@@ -36,9 +35,8 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
         let options =
             Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
         let mut observer = observer(&args.common.work);
-        let result = run::run(&config, &source, options, &mut *observer);
-        let report = config.output.report.then_some(&disk);
-        let json = args.common.work.json;
+        let result = run::run_held(&config, &source, options, &mut *observer);
+        let (report, json) = (config.output.report, args.common.work.json);
         let ended = Ended { directory: &config.output.directory, report, json };
         conclude(result, &ended, &signal, &mut *observer)
     });
@@ -70,11 +68,11 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         let group = ranks.group();
         let options =
             Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
-        let report = config.output.report.then_some(&disk);
+        let report = config.output.report;
         let limits =
             RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
         let mut observer = observer(&args.work);
-        let result = run::resume(saved, limits, options, &mut *observer);
+        let result = run::resume_held(saved, limits, options, &mut *observer);
         let ended = Ended { directory: &args.directory, report, json: args.work.json };
         conclude(result, &ended, &signal, &mut *observer)
     });
@@ -84,26 +82,25 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
 /// What to do when a run has ended.
 struct Ended<'a> {
     directory: &'a Path,
-    /// Where the report is written to; `None` where there is to be none.
-    report: Option<&'a Arc<dyn Disk>>,
+    /// Whether there is to be a report.
+    report: bool,
     json: bool,
 }
 
 /// Prints the result, writes the report, and says how to continue.
 fn conclude(
-    result: Result<RunResult, Error>,
+    concluded: Result<Concluded, Error>,
     ended: &Ended<'_>,
     signal: &Signal,
     observer: &mut dyn RunObserver,
 ) -> Result<ExitCode, Error> {
-    let result = result?;
+    let Concluded { result, directory: held } = concluded?;
     let directory = ended.directory;
-    if ended.json {
-        stdout::print_json(&result)?;
-    }
-    if let Some(disk) = ended.report {
+    // Whoever reads standard output may have no room for it: what belongs into the directory comes there all the same.
+    let printed = if ended.json { stdout::print_json(&result) } else { Ok(()) };
+    if ended.report {
         // The result is worth more than a page about it: not even a bug in the page changes how the run ends.
-        match catch_unwind(AssertUnwindSafe(|| ReportedRun::open(disk, directory)?.write(None))) {
+        match catch_unwind(AssertUnwindSafe(|| ReportedRun::of(held)?.write(None))) {
             Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
             Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
             Err(_) => observer.warning("the report is not written: a bug in the program, shown above"),
@@ -121,6 +118,7 @@ fn conclude(
         }
         _ => {}
     }
+    printed?;
     // A signal that came too late to stop anything does not change how the run ended.
     let stopped_by = signal.received().filter(|_| interrupted);
     Ok(stopped_by.unwrap_or_else(|| result.stop_reason.into()))

@@ -6,14 +6,19 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::files::OutputError;
+use crate::printable::{printable, printable_json};
 
-/// Print a text as it is.
+/// Print a text; letters in it that would act on a terminal are written out.
 ///
 /// A reader that has closed its end, such as `head`, has what it wanted: that is no error.
 ///
 /// # Errors
 /// When standard output cannot be written to.
 pub fn print(text: &str) -> Result<(), Error> {
+    write(&printable(text))
+}
+
+fn write(text: &str) -> Result<(), Error> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
@@ -29,5 +34,5 @@ pub fn print(text: &str) -> Result<(), Error> {
 /// When standard output cannot be written to.
 pub fn print_json(value: &impl Serialize) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(value).expect("structs of numbers and text have a JSON form");
-    print(&format!("{text}\n"))
+    write(&format!("{}\n", printable_json(&text)))
 }

@@ -9,7 +9,8 @@ use crate::config::ConfigError;
 use crate::diagnostics::{self, Style};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{OutputError, OverwritePolicy, shell_word, system_disk};
+use crate::files::{OutputError, OverwritePolicy, Sharing, shell_word, system_disk};
+use crate::printable::printable;
 use crate::run::sweep::{
     Comparison, Ending, Event, Layout, Row, ScriptFile, State, States, Sweep, SweepError, Task, Workers,
 };
@@ -43,13 +44,22 @@ pub(super) fn sweep(args: &SweepArgs) -> Result<ExitCode, Error> {
         Some(index) => index..index + 1,
         None => 0..count,
     };
-    let mut states = States::new(&disk, &sweep);
-    let left = chosen.map(|index| Ok((index, left_to_do(&mut states, &sweep, index)?)));
-    let left = left.collect::<Result<Vec<_>, Error>>()?;
+    let left = || {
+        let mut states = States::new(&disk, &sweep);
+        let left = chosen.clone().map(|index| Ok((index, left_to_do(&mut states, &sweep, index)?)));
+        left.collect::<Result<Vec<_>, Error>>()
+    };
+    // What is wrong is found before anything is written, and what is left is looked at again when no other has it.
+    left()?;
     let layout = match args.only {
-        Some(_) => Layout::open(&disk, &sweep)?,
+        Some(_) => {
+            let mut layout = Layout::open(&disk, &sweep)?;
+            layout.acquire(Sharing::Shared)?;
+            layout
+        }
         None => Layout::create(&disk, &sweep)?,
     };
+    let left = left()?;
     if let Some(path) = &args.script {
         let script = ScriptFile { path, program: program()?, jobs: args.jobs, threads: args.threads };
         script.write(&disk, &sweep)?;
@@ -73,8 +83,8 @@ enum Left {
 fn left_to_do(states: &mut States<'_>, sweep: &Sweep, index: usize) -> Result<Left, Error> {
     let planned = &sweep.combinations[index];
     Ok(match states.of(planned)? {
-        State::Missing => Left::Task(Task::Begin(OverwritePolicy::Keep)),
-        State::Unstarted => Left::Task(Task::Begin(OverwritePolicy::Replace)),
+        // One that has nothing to keep is replaced without force: with it, so would be one that another process has begun.
+        State::Missing | State::Unstarted => Left::Task(Task::Begin(OverwritePolicy::Keep)),
         State::Resumable => Left::Task(Task::Resume),
         State::Finished(reason) => Left::Finished(reason.into()),
         State::InUse => Left::InUse,
@@ -97,14 +107,14 @@ fn report_faults(error: &Error) {
     let Error::Sweep(SweepError::Faults { reports, .. }) = error else { return };
     let mut stderr = std::io::stderr();
     for (name, fault) in reports {
-        let _ = writeln!(stderr, "combination `{name}`:\n{}\n", render(fault));
+        let _ = writeln!(stderr, "combination `{}`:\n{}\n", printable(name), render(fault));
     }
 }
 
 fn render(fault: &ConfigError) -> String {
     match fault {
         ConfigError::Invalid(report) => diagnostics::render(report, Style::for_stderr()),
-        other => other.to_string(),
+        other => printable(&other.to_string()).into_owned(),
     }
 }
 

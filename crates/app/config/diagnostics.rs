@@ -11,6 +11,7 @@ use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Renderer, Snip
 use super::error::DiagnosticReport;
 use super::text::diagnostic::{Diagnostic, Span};
 use super::text::document::Document;
+use crate::printable::{masked, printable};
 
 /// Most faults shown at once: a screen or two, and later ones often follow from earlier ones.
 const MOST_SHOWN: usize = 20;
@@ -59,7 +60,7 @@ pub fn render(report: &DiagnosticReport, style: Style) -> String {
     let faults = if count == 1 { "1 fault".to_owned() } else { format!("{count} faults") };
     let rest = count.saturating_sub(MOST_SHOWN);
     let not_shown = if rest > 0 { format!(", {rest} of them not shown") } else { String::new() };
-    blocks.push(format!("{faults} in the {} `{name}`{not_shown}", report.of.name()));
+    blocks.push(format!("{faults} in the {} `{}`{not_shown}", report.of.name(), printable(name)));
     blocks.join("\n\n")
 }
 
@@ -70,8 +71,8 @@ impl fmt::Display for DiagnosticReport {
 }
 
 fn render_one(report: &DiagnosticReport, diagnostic: &Diagnostic, renderer: &Renderer) -> String {
-    let mut group: Group<'_> = Group::with_title(Level::ERROR.primary_title(&*diagnostic.message));
-    let expected = diagnostic.expected.as_deref().unwrap_or("");
+    let mut group: Group<'_> = Group::with_title(Level::ERROR.primary_title(printable(&diagnostic.message)));
+    let expected = printable(diagnostic.expected.as_deref().unwrap_or(""));
     let documents = report.source.documents();
     let excerpt =
         |span: &Span| documents.get(span.document).map(|document| (document, excerpt(document, span)));
@@ -80,17 +81,18 @@ fn render_one(report: &DiagnosticReport, diagnostic: &Diagnostic, renderer: &Ren
         let is_label = expected.chars().count() <= LONGEST_LABEL;
         shown = is_label;
         let primary = AnnotationKind::Primary.span(underlined);
-        let primary = if is_label && !expected.is_empty() { primary.label(expected) } else { primary };
-        let mut snippet = snippet.path(&*document.name).annotation(primary);
+        let primary =
+            if is_label && !expected.is_empty() { primary.label(expected.clone()) } else { primary };
+        let mut snippet = snippet.path(printable(&document.name)).annotation(primary);
         let mut further = None;
         if let Some((span, label)) = &diagnostic.secondary
             && let Some((other_document, (other, underlined))) = excerpt(span)
         {
-            let context = AnnotationKind::Context.span(underlined).label(&**label);
+            let context = AnnotationKind::Context.span(underlined).label(printable(label));
             if span.document == diagnostic.span.document && document.text.len() <= LONGEST_LINE {
                 snippet = snippet.annotation(context);
             } else {
-                further = Some(other.path(&*other_document.name).annotation(context));
+                further = Some(other.path(printable(&other_document.name)).annotation(context));
             }
         }
         group = group.element(snippet).elements(further);
@@ -99,7 +101,7 @@ fn render_one(report: &DiagnosticReport, diagnostic: &Diagnostic, renderer: &Ren
         group = group.element(Level::NOTE.message(expected));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(&**help));
+        group = group.element(Level::HELP.message(printable(help)));
     }
     // What is shown leaves no blanks at the ends of lines.
     let text = renderer.render(&[group]);
@@ -111,13 +113,13 @@ fn excerpt<'d>(document: &'d Document, place: &Span) -> (Snippet<'d, Annotation<
     let text = &document.text;
     let span = visible(text, &place.range);
     if text.len() <= LONGEST_LINE {
-        return (Snippet::source(&**text).line_start(document.first_line), span);
+        return (Snippet::source(masked(text)).line_start(document.first_line), span);
     }
     // Of a long text the lines around the place, so that a report of many faults costs no more than its excerpts.
     let start = text[..span.start].rfind('\n').map_or(0, |end| end + 1);
     let end = text[span.end..].find('\n').map_or(text.len(), |length| span.end + length);
     let line = document.first_line + text[..start].matches('\n').count();
-    (Snippet::source(&text[start..end]).line_start(line), span.start - start..span.end - start)
+    (Snippet::source(masked(&text[start..end])).line_start(line), span.start - start..span.end - start)
 }
 
 /// A range that lies in the text, on character boundaries, and ends on the line where it starts.

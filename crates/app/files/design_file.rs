@@ -4,9 +4,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::open_regular;
+use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::problem::RoundStart;
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::json_place;
+use crate::build::millimetres;
 use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
@@ -50,13 +54,72 @@ pub enum DesignFileError {
         /// Values needed.
         expected: usize,
     },
+    /// The design is that of another device.
+    #[error(
+        "the design `{path}` is that of another device: its variable {index} acts at {}, that of this configuration at {} \
+         (`design.points_m`); give a result of this device, or the list `design.values_m` alone to take its values all the \
+         same",
+        millimetres(*.found), millimetres(*.expected)
+    )]
+    Places {
+        /// The file.
+        path: PathBuf,
+        /// The first variable that acts elsewhere.
+        index: usize,
+        /// Where it acts by the file [m].
+        found: [f64; 3],
+        /// Where it acts here [m].
+        expected: [f64; 3],
+    },
 }
 
-/// The design variables in a file [m]; there must be `expected` of them.
+/// Largest distance between two places of a variable, relative to the diagonal of the mesh: far above what writing and
+/// reading leave, and far below an element.
+const SAME_PLACE: f64 = 1e-6;
+
+/// A design as a file holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DesignFile {
+    path: PathBuf,
+    /// The variables [m].
+    pub values: Vec<f64>,
+    /// The rounds through which a run came to it; empty where the file does not say.
+    pub rounds: Vec<RoundStart>,
+    /// Where the variables act [m]; `None` where the file does not say.
+    points: Option<Vec<[f64; 3]>>,
+}
+
+impl DesignFile {
+    /// Whether its variables act where those of a surface do; a list without places does.
+    ///
+    /// # Errors
+    /// [`DesignFileError::Places`].
+    pub fn check_places(
+        &self,
+        surface: &DesignSurface,
+        [lower, upper]: [[f64; 3]; 2],
+    ) -> Result<(), DesignFileError> {
+        let Some(points) = &self.points else { return Ok(()) };
+        let distance =
+            |a: &[f64; 3], b: &[f64; 3]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let most = SAME_PLACE * distance(&lower, &upper);
+        match points.iter().zip(surface.points()).position(|(found, own)| distance(found, own) > most) {
+            None => Ok(()),
+            Some(index) => Err(DesignFileError::Places {
+                path: self.path.clone(),
+                index,
+                found: points[index],
+                expected: surface.points()[index],
+            }),
+        }
+    }
+}
+
+/// The design in a file; there must be `expected` variables.
 ///
 /// # Errors
 /// When the file cannot be read, is no design, or has another number of values.
-pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileError> {
+pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFileError> {
     let content = |message: String| DesignFileError::Content { path: path.to_owned(), message };
     let unreadable = |source| DesignFileError::Read { path: path.to_owned(), source };
     let mut bytes = Vec::new();
@@ -95,7 +158,24 @@ pub fn read_design(path: &Path, expected: usize) -> Result<Vec<f64>, DesignFileE
     if values.len() != expected {
         return Err(DesignFileError::Count { path: path.to_owned(), found: values.len(), expected });
     }
-    Ok(values)
+    let points = match value.pointer("/design/points_m") {
+        None | Some(Value::Null) => None,
+        Some(points) => {
+            let points = Vec::<[f64; 3]>::deserialize(points)
+                .map_err(|error| content(format!("`design.points_m` is no list of points: {error}")))?;
+            Some(points).filter(|points| points.len() == expected)
+        }
+    };
+    let rounds = match value.pointer("/design/rounds") {
+        None | Some(Value::Null) => Vec::new(),
+        Some(rounds) => Vec::<RoundStart>::deserialize(rounds)
+            .map_err(|error| content(format!("`design.rounds` is no list of rounds: {error}")))?,
+    };
+    if let Some(start) = rounds.iter().find(|start| start.design().len() != expected) {
+        let found = start.design().len();
+        return Err(content(format!("a design of `design.rounds` has {found} values, expected {expected}")));
+    }
+    Ok(DesignFile { path: path.to_owned(), values, rounds, points })
 }
 
 #[cfg(test)]
@@ -108,7 +188,7 @@ mod tests {
         let path = folder.path().join("design.json");
         let read = |text: &str| {
             std::fs::write(&path, text).expect("written");
-            read_design(&path, 2).map_err(|error| error.to_string())
+            read_design(&path, 2).map(|design| design.values).map_err(|error| error.to_string())
         };
         assert_eq!(read("[0.01, -5e-3]"), Ok(vec![0.01, -5e-3]));
         assert_eq!(read(r#"{"design": {"values_m": [1, 2.5]}}"#), Ok(vec![1.0, 2.5]));
@@ -120,6 +200,12 @@ mod tests {
             ("5", "no list"),
             ("[1e999, 0]", "number out of range"),
             ("[1, ", "line 1"),
+            (r#"{"design": {"values_m": [1, 2], "points_m": [[1, 2]]}}"#, "no list of points"),
+            (r#"{"design": {"values_m": [1, 2], "rounds": [{"kind": "dance"}]}}"#, "no list of rounds"),
+            (
+                r#"{"design": {"values_m": [1, 2], "rounds": [{"kind": "reference", "design_m": [1]}]}}"#,
+                "a design of `design.rounds` has 1 values, expected 2",
+            ),
         ];
         for (text, fragment) in cases {
             let message = read(text).expect_err(text);

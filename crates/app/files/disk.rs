@@ -31,11 +31,12 @@ pub trait Disk: Debug + Send + Sync {
     /// [`io::ErrorKind::ResourceBusy`] when another process holds it, or when the operating system refuses.
     fn append(&self, path: &Path, length: u64) -> io::Result<Box<dyn DiskFile>>;
 
-    /// Whether a file can be held against other processes now.
+    /// Locks a file, which is made where it is missing, until the lock is dropped; `None` where nothing can be written or the
+    /// file system knows no locks.
     ///
     /// # Errors
-    /// As [`Disk::append`].
-    fn hold(&self, path: &Path) -> io::Result<()>;
+    /// [`io::ErrorKind::ResourceBusy`] when another process has locked it, or when the operating system refuses.
+    fn lock(&self, path: &Path, sharing: Sharing) -> io::Result<Option<Box<dyn DiskLock>>>;
 
     /// Gives a file another name, in place of what had it.
     ///
@@ -76,6 +77,20 @@ pub trait Disk: Debug + Send + Sync {
     /// Whether a link is there, wherever it leads.
     fn is_link(&self, path: &Path) -> bool;
 }
+
+/// Who may hold a lock at the same time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// One process alone.
+    Exclusive,
+    /// All that share.
+    Shared,
+}
+
+/// A lock, held until it is dropped or its process ends.
+pub trait DiskLock: Debug + Send + Sync {}
+
+impl DiskLock for File {}
 
 /// A file that is written.
 pub trait DiskFile: Write + Debug + Send {
@@ -119,9 +134,27 @@ impl Disk for SystemDisk {
         Ok(Box::new(file))
     }
 
-    fn hold(&self, path: &Path) -> io::Result<()> {
-        plain(&fs::symlink_metadata(path)?)?;
-        hold(&OpenOptions::new().write(true).open(path)?)
+    fn lock(&self, path: &Path, sharing: Sharing) -> io::Result<Option<Box<dyn DiskLock>>> {
+        match fs::symlink_metadata(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            entry => drop(plain(&entry?)?),
+        }
+        let file = match OpenOptions::new().write(true).create(true).truncate(false).open(path) {
+            Err(error) if is_write_protected(&error) => match File::open(path) {
+                Ok(file) => file,
+                Err(_) => return Ok(None),
+            },
+            other => other?,
+        };
+        let locked = match sharing {
+            Sharing::Exclusive => file.try_lock(),
+            Sharing::Shared => file.try_lock_shared(),
+        };
+        match locked {
+            Ok(()) => Ok(Some(Box::new(file))),
+            Err(TryLockError::WouldBlock) => Err(io::ErrorKind::ResourceBusy.into()),
+            Err(TryLockError::Error(_)) => Ok(None),
+        }
     }
 
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
@@ -165,6 +198,10 @@ impl Disk for SystemDisk {
     }
 }
 
+fn is_write_protected(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem)
+}
+
 /// The length of a plain file [bytes]. A pipe would be waited for without end, a device may have none, and a link leads out
 /// of the run directory.
 fn plain(entry: &fs::Metadata) -> io::Result<u64> {
@@ -206,6 +243,21 @@ mod tests {
         assert!(SystemDisk.append(&path, 0).is_ok());
     }
 
+    #[test]
+    fn a_lock_is_one_process_s_or_shared() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("lock");
+        let lock = |sharing| SystemDisk.lock(&path, sharing);
+        let busy = |sharing| lock(sharing).is_err_and(|error| error.kind() == io::ErrorKind::ResourceBusy);
+        let alone = lock(Sharing::Exclusive).expect("locked").expect("a lock");
+        assert!(busy(Sharing::Exclusive) && busy(Sharing::Shared));
+        drop(alone);
+        let shared = [lock(Sharing::Shared).expect("locked"), lock(Sharing::Shared).expect("locked")];
+        assert!(busy(Sharing::Exclusive));
+        drop(shared);
+        assert!(lock(Sharing::Exclusive).is_ok());
+    }
+
     #[cfg(unix)]
     #[test]
     fn links_and_devices_are_not_taken_for_files_of_a_run() {
@@ -213,7 +265,7 @@ mod tests {
         let (file, link) = (folder.path().join("file"), folder.path().join("link"));
         std::fs::write(&file, "theirs").expect("written");
         std::os::unix::fs::symlink(&file, &link).expect("linked");
-        assert!(SystemDisk.append(&link, 0).is_err() && SystemDisk.hold(&link).is_err());
+        assert!(SystemDisk.append(&link, 0).is_err() && SystemDisk.lock(&link, Sharing::Exclusive).is_err());
         assert_eq!(SystemDisk.read(&link, 100).expect("read"), b"theirs");
         // It would fill the memory to the limit.
         let error = SystemDisk.read(Path::new("/dev/zero"), u64::MAX).expect_err("a device");

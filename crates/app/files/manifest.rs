@@ -240,6 +240,17 @@ impl Manifest {
         value.is_some_and(|value| value.get("program").and_then(|name| name.as_str()) != Some(PROGRAM))
     }
 
+    /// Whether this still is the manifest of a directory.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] where another process has been at work since it was read.
+    pub fn check_current(&self, directory: &RunDirectory) -> Result<(), OutputError> {
+        match Self::read(directory)? == *self {
+            true => Ok(()),
+            false => Err(OutputError::InUse { path: directory.path().to_owned() }),
+        }
+    }
+
     /// Write the manifest into a run directory, replacing an older one.
     ///
     /// # Errors

@@ -20,8 +20,8 @@ mod synced;
 use std::path::PathBuf;
 
 pub(crate) use csv::csv_text;
-pub use design_file::{DesignFileError, read_design};
-pub use disk::{Disk, DiskFile, system_disk};
+pub use design_file::{DesignFile, DesignFileError, read_design};
+pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};
 pub use field_files::FieldForm;
 pub(crate) use finite::check_finite;
 pub use fluxmorph_optimizer::driver::StopReason;
@@ -35,6 +35,7 @@ pub use result::{
     ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, ProbeResult, RunResult,
     StateResult, TermResult, Verification,
 };
+pub(crate) use run_directory::LOCK;
 pub use run_directory::{OverwritePolicy, RunDirectory};
 pub use synced::SyncedLog;
 pub(crate) use synced::write_whole;
@@ -75,12 +76,13 @@ pub enum OutputError {
         /// The directory.
         path: PathBuf,
     },
-    /// Another process writes into the run directory.
+    /// Another process writes into the directory.
     #[error(
-        "`{path}` is written by another process: wait for it or stop it; a new run may write elsewhere with --out"
+        "`{path}` is written by another process of fluxmorph: wait for it or stop it; a new run may write elsewhere with \
+         --out"
     )]
     InUse {
-        /// The file that it holds.
+        /// The directory, or the file in it that is held.
         path: PathBuf,
     },
     /// A folder of a run is a link.

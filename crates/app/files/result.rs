@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::problem::RoundEvent;
+use fluxmorph_optimizer::problem::{RoundEvent, RoundStart};
 use serde::{Deserialize, Serialize};
 
 use super::manifest::RunStatus;
@@ -142,6 +142,9 @@ pub struct DesignResult {
     pub upper_m: Vec<f64>,
     /// Where they act on the undeformed mesh [m].
     pub points_m: Vec<[f64; 3]>,
+    /// The rounds through which the mesh came to it, for `solve --design`; empty where one reference mesh was enough.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rounds: Vec<RoundStart>,
 }
 
 /// The mesh of a run.
@@ -261,6 +264,7 @@ pub(crate) mod tests {
                 lower_m: vec![-0.005],
                 upper_m: vec![0.02],
                 points_m: vec![[0.0, 0.0, -0.01]],
+                rounds: vec![RoundStart::Reference { design_m: vec![0.01] }],
             }),
             mesh: MeshResult {
                 nodes: 100,

@@ -4,9 +4,10 @@
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use super::OutputError;
-use super::disk::Disk;
+use super::disk::{Disk, DiskLock, Sharing};
 use super::field_files::is_fields;
 use super::manifest::Manifest;
 use super::names::{is_case, is_surface};
@@ -27,6 +28,28 @@ pub enum OverwritePolicy {
 pub struct RunDirectory {
     disk: Arc<dyn Disk>,
     path: PathBuf,
+    /// What keeps other processes out while this or a copy of it lives; `None` where it is only looked into.
+    lock: Option<Arc<dyn DiskLock>>,
+}
+
+/// How long a directory in use is waited for.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// The file that a process locks before it touches a directory. It stays: whoever removed it could not know who has it open.
+pub(crate) const LOCK: &str = ".fluxmorph-lock";
+
+/// What a folder holds that a run may begin in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Contents {
+    /// Nothing, or what an interrupted start left.
+    Leftovers,
+    /// An earlier run.
+    Run,
+}
+
+/// Whether a name is that of a file which a run leaves behind its manifest.
+fn is_of_run(name: &str) -> bool {
+    FILES.contains(&name) || is_case(name)
 }
 
 impl RunDirectory {
@@ -42,7 +65,7 @@ impl RunDirectory {
         path: &Path,
         overwrite: OverwritePolicy,
     ) -> Result<Self, OutputError> {
-        Self { disk: Arc::clone(disk), path: path.to_owned() }.refuse_link()?;
+        Self::at(disk, path).refuse_link()?;
         let directory = Self::create_flat(disk, path, overwrite)?;
         directory.make_fields()?;
         Ok(directory)
@@ -87,17 +110,56 @@ impl RunDirectory {
         path: &Path,
         overwrite: OverwritePolicy,
     ) -> Result<Self, OutputError> {
-        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        let mut directory = Self::at(disk, path);
         match disk.names(path) {
-            Ok(names) if names.is_empty() => {}
-            Ok(_) => directory.clear(overwrite)?,
+            // Nothing, not even a lock, is written where this run does not belong.
+            Ok(_) => drop(directory.contents(overwrite)?),
             Err(error) if error.kind() == io::ErrorKind::NotFound => directory.make(path)?,
             Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
                 return Err(OutputError::NotADirectory { path: path.to_owned() });
             }
             Err(error) => return Err(OutputError::io("read", path)(error)),
         }
+        directory.acquire()?;
+        // Another process may have come and gone between the look and the lock.
+        directory.clear(overwrite)?;
         Ok(directory)
+    }
+
+    fn at(disk: &Arc<dyn Disk>, path: &Path) -> Self {
+        Self { disk: Arc::clone(disk), path: path.to_owned(), lock: None }
+    }
+
+    /// The same, with other processes kept out; what was read before may be another's since.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`] where one works in it, or when the operating system refuses.
+    pub fn locked(mut self) -> Result<Self, OutputError> {
+        if self.lock.is_none() {
+            self.acquire()?;
+        }
+        Ok(self)
+    }
+
+    /// A process that is about to end, or only writes a report, is waited for.
+    fn acquire(&mut self) -> Result<(), OutputError> {
+        let began = Instant::now();
+        let locked = loop {
+            match self.disk.lock(&self.path.join(LOCK), Sharing::Exclusive) {
+                Err(error) if error.kind() == io::ErrorKind::ResourceBusy && began.elapsed() < PATIENCE => {
+                    std::thread::sleep(PATIENCE / 50);
+                }
+                locked => break locked,
+            }
+        };
+        self.lock = locked.map_err(OutputError::io("lock", &self.path))?.map(Arc::from);
+        Ok(())
+    }
+
+    /// Whether another process works in it now.
+    pub fn is_in_use(&self) -> bool {
+        let locked = self.disk.lock(&self.path.join(LOCK), Sharing::Exclusive);
+        locked.is_err_and(|error| error.kind() == io::ErrorKind::ResourceBusy)
     }
 
     /// The folder of an earlier run.
@@ -105,7 +167,7 @@ impl RunDirectory {
     /// # Errors
     /// When the folder does not hold one.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, OutputError> {
-        let directory = Self { disk: Arc::clone(disk), path: path.to_owned() };
+        let directory = Self::at(disk, path);
         match Manifest::read(&directory) {
             Ok(manifest) if manifest.is_ours() => {}
             // One that cannot be understood is that of a run all the same, unless it says that it is another program's.
@@ -149,19 +211,32 @@ impl RunDirectory {
         Manifest::read(self).is_ok_and(|manifest| manifest.is_ours())
     }
 
-    fn clear(&self, overwrite: OverwritePolicy) -> Result<(), OutputError> {
+    /// What is in the folder, where a run may begin in it.
+    fn contents(&self, overwrite: OverwritePolicy) -> Result<Contents, OutputError> {
         if !self.holds_run() {
             // What is left of a start that was interrupted before its manifest was complete is ours as well.
             return if self.holds_only_leftovers()? {
-                self.remove_unfinished(&self.path)
+                Ok(Contents::Leftovers)
             } else {
                 Err(OutputError::NotOurs { path: self.path.clone() })
             };
         }
-        if overwrite == OverwritePolicy::Keep {
+        // One that was interrupted before its configuration was saved has nothing to lose.
+        let holds_files = || {
+            let names = self.entries(&self.path)?;
+            Ok::<_, OutputError>(names.iter().any(|name| is_of_run(name)) || !self.has_no_fields()?)
+        };
+        if overwrite == OverwritePolicy::Keep && holds_files()? {
             return Err(OutputError::HoldsRun { path: self.path.clone() });
         }
-        self.check_unused()?;
+        Ok(Contents::Run)
+    }
+
+    /// Removes what may be replaced.
+    fn clear(&self, overwrite: OverwritePolicy) -> Result<(), OutputError> {
+        if self.contents(overwrite)? == Contents::Leftovers {
+            return self.remove_unfinished(&self.path);
+        }
         let surfaces = Manifest::read(self).map(|manifest| manifest.surfaces).unwrap_or_default();
         // The list is a file's content: only names that this program gives are taken from it.
         let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
@@ -173,19 +248,6 @@ impl RunDirectory {
         }
         self.remove_unfinished(&self.path)?;
         self.remove_fields(&[])
-    }
-
-    /// Whether no other process writes a run here.
-    ///
-    /// # Errors
-    /// [`OutputError::InUse`] where one does.
-    fn check_unused(&self) -> Result<(), OutputError> {
-        let path = self.journal();
-        match self.disk.hold(&path) {
-            Err(error) if error.kind() == io::ErrorKind::ResourceBusy => Err(OutputError::InUse { path }),
-            // What cannot be opened is found out by whoever needs it.
-            _ => Ok(()),
-        }
     }
 
     /// Removes what a killed process left half-written, and the fields of all evaluations but some.
@@ -208,7 +270,8 @@ impl RunDirectory {
     }
 
     pub(super) fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
-        for name in self.entries(folder)?.iter().filter(|name| name.starts_with(UNFINISHED)) {
+        let is_unfinished = |name: &&String| name.starts_with(UNFINISHED) && *name != LOCK;
+        for name in self.entries(folder)?.iter().filter(is_unfinished) {
             self.remove(&folder.join(name))?;
         }
         Ok(())
@@ -300,6 +363,29 @@ mod tests {
     }
 
     #[test]
+    fn one_process_at_a_time_has_the_directory() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let create = |overwrite| RunDirectory::create(&system_disk(), folder.path(), overwrite);
+        let open = || RunDirectory::open(&system_disk(), folder.path()).expect("a run");
+        // Before the first file as after it.
+        let first = create(OverwritePolicy::Keep).expect("free");
+        for overwrite in [OverwritePolicy::Keep, OverwritePolicy::Replace] {
+            assert!(matches!(create(overwrite), Err(OutputError::InUse { .. })));
+        }
+        Manifest::new("run", 2).write(&first).expect("a manifest");
+        assert!(matches!(create(OverwritePolicy::Replace), Err(OutputError::InUse { .. })));
+        assert!(open().is_in_use() && matches!(open().locked(), Err(OutputError::InUse { .. })));
+        // A copy holds it too.
+        let copy = first.clone();
+        drop(first);
+        assert!(open().is_in_use());
+        drop(copy);
+        assert!(open().locked().is_ok());
+        // A start that was interrupted before there was anything to keep is replaced without being asked.
+        assert!(create(OverwritePolicy::Keep).is_ok());
+    }
+
+    #[test]
     fn a_foreign_folder_is_left_alone_even_when_forced() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let note = folder.path().join("thesis.txt");
@@ -313,6 +399,7 @@ mod tests {
             fs::write(folder.path().join("manifest.json"), manifest).expect("written");
         }
         assert!(note.exists());
+        assert!(!folder.path().join(LOCK).exists());
         let error =
             RunDirectory::create(&system_disk(), &note, OverwritePolicy::Replace).expect_err("a file");
         assert!(matches!(error, OutputError::NotADirectory { .. }), "{error}");

@@ -41,10 +41,10 @@ pub(crate) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<
     written.and_then(|()| disk.sync_dir(folder)).map_err(OutputError::io("write", path))
 }
 
-/// The temporary name of a file, in its folder.
+/// The temporary name of a file, in its folder; another process has another one.
 fn unfinished(path: &Path) -> PathBuf {
     let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-    path.with_file_name(format!("{UNFINISHED}{name}"))
+    path.with_file_name(format!("{UNFINISHED}{}-{name}", std::process::id()))
 }
 
 pub(super) fn folder_of(path: &Path) -> &Path {
@@ -111,8 +111,8 @@ mod tests {
     fn a_file_is_written_whole_and_leaves_nothing_beside_it() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("result.json");
-        // What a killed process left does no harm.
-        std::fs::write(folder.path().join(".fluxmorph-result.json"), "half").expect("written");
+        // What a killed process of the same number left does no harm.
+        std::fs::write(unfinished(&path), "half").expect("written");
         for content in ["one", "two"] {
             write_whole(&*system_disk(), &path, content.as_bytes()).expect("written");
             assert_eq!(std::fs::read_to_string(&path).expect("read"), content);

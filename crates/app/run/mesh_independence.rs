@@ -412,7 +412,7 @@ mod tests {
         let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
         let shapes = ShapePair::of(&config, &setup, &[0.0; 91]).expect("a design");
         assert_eq!(shapes, ShapePair::Unchanged);
-        let (objective, recorded) = verified(&config, &source, &shapes, StopReason::MeshLimit, false);
+        let (objective, recorded) = verified(&config, &source, &shapes, StopReason::MeshLimited, false);
         assert_eq!((objective.verified_ratio, objective.verification), (Some(1.0), None));
         assert!(recorded.notices.is_empty() && recorded.warnings.is_empty());
     }

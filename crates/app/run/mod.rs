@@ -41,6 +41,7 @@ use crate::files::{
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
+pub(crate) use resume::resume_held;
 pub use resume::{RunLimits, SavedRun, resume};
 pub use solve::solve;
 use summary::{constraints, linear_solver, terms};
@@ -70,6 +71,22 @@ pub fn run(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
+    run_held(config, source, options, observer).map(|concluded| concluded.result)
+}
+
+/// What a run has come to, in a directory that is still held against other processes.
+pub(crate) struct Concluded {
+    pub(crate) result: RunResult,
+    pub(crate) directory: RunDirectory,
+}
+
+/// [`run`], with the directory still held.
+pub(crate) fn run_held(
+    config: &Config,
+    source: &SourceMap,
+    options: Options<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<Concluded, Error> {
     let prepared = Prepared::new(config, source, Mode::Optimisation, options, observer)?;
     let session = prepared.continue_to_initial()?.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
@@ -180,7 +197,7 @@ impl Session<'_> {
             ..self.result(
                 optimised.stop_reason,
                 &best.analysis,
-                Some(&best.values),
+                Some((&best.values, &best.starts)),
                 optimised.initial_quality,
                 &optimised.timings,
                 observer,
@@ -198,7 +215,7 @@ impl Session<'_> {
         mut self,
         observer: &mut dyn RunObserver,
         work: impl FnOnce(&mut Self, &mut dyn RunObserver) -> Result<RunResult, Error>,
-    ) -> Result<RunResult, Error> {
+    ) -> Result<Concluded, Error> {
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             self.write_configuration()?;
             let result = work(&mut self, observer).map_err(|error| match error {
@@ -230,7 +247,7 @@ impl Session<'_> {
         let result = outcome?;
         completed?;
         observer.finished(&result);
-        Ok(result)
+        Ok(Concluded { result, directory: self.directory })
     }
 
     fn write_configuration(&self) -> Result<(), Error> {

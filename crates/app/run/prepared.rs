@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::problem::RoundEvent;
 
 use super::{Options, Session, mesh_hash};
@@ -40,7 +39,7 @@ impl<'a> Prepared<'a> {
         observer.phase("setting up mesh and matrices");
         let stages = &mut |stage| observer.stage(stage);
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
-        memory_limit::check_problem(of_evaluation(&setup.problem), source, options.overwrite_policy)?;
+        memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
         Ok(Self { setup, continuation: Vec::new(), config, source, options, clock })
     }

@@ -8,7 +8,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Options, Session};
+use super::{Concluded, Options, Session};
 use crate::build::Mode;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
@@ -78,13 +78,25 @@ pub fn resume(
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
+    resume_held(saved, limits, options, observer).map(|concluded| concluded.result)
+}
+
+/// [`resume`], with the directory still held against other processes.
+pub(crate) fn resume_held(
+    saved: SavedRun,
+    limits: RunLimits,
+    options: Options<'_>,
+    observer: &mut dyn RunObserver,
+) -> Result<Concluded, Error> {
     let SavedRun { directory, manifest, mut config, source } = saved;
+    let directory = directory.locked()?;
+    manifest.check_current(&directory)?;
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));
     config.optimizer.max_evaluations = limits.max_evaluations.unwrap_or(in_force.max_evaluations);
     config.optimizer.max_time = limits.max_time.or(in_force.max_time_s);
     if let Some(result) = finished_result(&directory, &manifest, config.optimizer.max_evaluations) {
         observer.note(&format!("nothing to resume: {}", advice(&result)));
-        return Ok(result);
+        return Ok(Concluded { result, directory });
     }
     let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer)
         .and_then(Prepared::continue_to_initial)
@@ -97,7 +109,6 @@ pub fn resume(
     session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;
-    // Before the manifest is touched: the journal holds the directory against other processes.
     let (journal, records) = match contents {
         Some(contents) => (Journal::reopen(&directory, &contents)?, contents.records),
         None => {

@@ -1,6 +1,7 @@
 //! One analysis with its directory: the field of a single design.
 
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, RoundStart, SolverCache, Stage};
 
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
@@ -9,7 +10,7 @@ use super::{Options, Session};
 use crate::build::Mode;
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, RunResult, StopReason, exports};
+use crate::files::{DesignFile, ObjectiveResult, RunResult, StopReason, exports};
 use crate::show::RunObserver;
 
 /// Analyses one design and writes its field and result.
@@ -19,26 +20,65 @@ use crate::show::RunObserver;
 pub fn solve(
     config: &Config,
     source: &SourceMap,
-    design: Option<Vec<f64>>,
+    design: Option<DesignFile>,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
     let mut prepared = Prepared::new(config, source, Mode::Analysis, options, observer)?;
-    let values = design_values(&prepared.setup.problem, design, observer);
+    let problem = &mut prepared.setup.problem;
+    if let (Some(shape), Some(design)) = (problem.shape(), &design) {
+        design.check_places(shape.surface(), problem.original().bounding_box())?;
+    }
+    let rounds = design.as_ref().map(|design| design.rounds.clone()).unwrap_or_default();
+    let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    let problem = &mut prepared.setup.problem;
-    prepared.continuation = problem.continue_to(p, options.interrupted)?;
+    let rounds = follow(problem, rounds, options.interrupted, observer)?;
+    if rounds.is_empty() {
+        prepared.continuation = problem.continue_to(p, options.interrupted)?;
+    }
+    let problem = &prepared.setup.problem;
     let moved = problem.moved(p)?;
     let session = prepared.begin("solve", observer)?;
-    session.conclude(observer, |session, observer| {
+    let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
         session.continuation.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut |stage| observer.stage(stage));
         let analysis = problem.analyse(moved, p, Derivatives::First, cache, stages)?;
-        session.write_analysis(values.as_deref(), &analysis, observer)
-    })
+        let design = values.as_deref().map(|values| (values, rounds.as_slice()));
+        session.write_analysis(design, &analysis, observer)
+    })?;
+    Ok(concluded.result)
+}
+
+/// Takes the mesh through the rounds in which a run came to its design; those that were followed.
+///
+/// # Errors
+/// [`OptimizerError::Interrupted`], and what the elastic system fails with.
+fn follow(
+    problem: &mut Problem,
+    rounds: Vec<RoundStart>,
+    interrupted: &dyn Fn() -> bool,
+    observer: &mut dyn RunObserver,
+) -> Result<Vec<RoundStart>, Error> {
+    let initial = problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
+    if rounds.is_empty() {
+        return Ok(rounds);
+    }
+    observer.phase(&format!("following the {} rounds in which the design was found", rounds.len()));
+    let followed = problem.continue_to(&initial, interrupted);
+    match followed.and_then(|_| problem.follow(&rounds, interrupted)) {
+        Ok(()) => Ok(rounds),
+        Err(error @ OptimizerError::Interrupted) => Err(error.into()),
+        // Under another configuration the mesh may go another way.
+        Err(error) => {
+            observer
+                .warning(&format!("the rounds in which the design was found cannot be followed: {error}"));
+            problem.restart()?;
+            Ok(Vec::new())
+        }
+    }
 }
 
 /// The design to analyse: the one given, or the initial one; `None` without a design surface.
@@ -60,7 +100,7 @@ impl Session<'_> {
     /// Writes the field and the exports of an analysis; returns its result.
     fn write_analysis(
         &self,
-        values: Option<&[f64]>,
+        design: Option<(&[f64], &[RoundStart])>,
         analysis: &Analysis,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
@@ -69,7 +109,7 @@ impl Session<'_> {
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
         }
-        let bounds = problem.bounds(values.unwrap_or_default(), analysis)?;
+        let bounds = problem.bounds(design.map(|(values, _)| values).unwrap_or_default(), analysis)?;
         if config.output.fields != FieldsKept::Nothing {
             write_field(&self.directory, self.pieces().as_ref(), 0, problem, analysis)?;
             write_collection(&self.directory, &[0])?;
@@ -90,7 +130,7 @@ impl Session<'_> {
             }),
             constraints: constraints(problem, analysis, &bounds),
             rounds: self.continuation.clone(),
-            ..self.result(reason, analysis, values, initial_quality, timings, observer)?
+            ..self.result(reason, analysis, design, initial_quality, timings, observer)?
         })
     }
 }

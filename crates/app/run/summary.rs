@@ -6,7 +6,7 @@ use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Timings};
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timings};
 use fluxmorph_solver::{SolverError, recovery};
 
 use super::Session;
@@ -23,7 +23,7 @@ impl Session<'_> {
         &self,
         stop_reason: StopReason,
         analysis: &Analysis,
-        values: Option<&[f64]>,
+        design: Option<(&[f64], &[RoundStart])>,
         initial_quality: f64,
         timings: &Timings,
         observer: &mut dyn RunObserver,
@@ -36,11 +36,12 @@ impl Session<'_> {
             .map(|index| self.state_result(index, analysis, &located, observer))
             .collect();
         let StateResult { probes, losses_w, .. } = states[0].clone();
-        let design = problem.shape().zip(values).map(|(shape, values)| DesignResult {
+        let design = problem.shape().zip(design).map(|(shape, (values, rounds))| DesignResult {
             values_m: values.to_vec(),
             lower_m: shape.lower().to_vec(),
             upper_m: shape.upper().to_vec(),
             points_m: shape.surface().points().to_vec(),
+            rounds: rounds.to_vec(),
         });
         let topology = mesh.topology();
         Ok(RunResult {

@@ -14,6 +14,7 @@ use super::lines::Lines;
 use super::table::Columns;
 use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::files::RunResult;
+use crate::printable::printable;
 
 /// How often times on the bar move on.
 const TICK: Duration = Duration::from_millis(200);
@@ -77,8 +78,18 @@ impl<W: Write> Bar<W> {
         // Whoever cleared the bar wants it gone for good: a change would draw it again.
         if !self.bar.is_finished() {
             self.bar.set_style(style(template));
-            self.bar.set_message(what.to_owned());
+            self.bar.set_message(printable(what).into_owned());
             self.bar.reset_elapsed();
+        }
+    }
+
+    /// Shows a line that may have styles, above the bar.
+    fn styled_line(&mut self, text: &str) {
+        let Self { bar, writer, .. } = self;
+        if bar.is_finished() {
+            show(writer, text);
+        } else {
+            bar.suspend(|| show(writer, text));
         }
     }
 }
@@ -91,14 +102,8 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 impl<W: Write> Observer for Bar<W> {
-    // Above the bar.
     fn line(&mut self, text: &str) {
-        let Self { bar, writer, .. } = self;
-        if bar.is_finished() {
-            show(writer, text);
-        } else {
-            bar.suspend(|| show(writer, text));
-        }
+        self.styled_line(&printable(text));
     }
 
     fn phase(&mut self, name: &str) {
@@ -110,7 +115,7 @@ impl<W: Write> Observer for Bar<W> {
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
-        self.lines.evaluation(row).iter().for_each(|line| self.line(line));
+        self.lines.evaluation(row).iter().for_each(|line| self.styled_line(line));
         if self.bar.is_finished() {
             return;
         }
@@ -126,13 +131,13 @@ impl<W: Write> Observer for Bar<W> {
 
     fn warning(&mut self, message: &str) {
         let line = self.lines.warning(message);
-        self.line(&line);
+        self.styled_line(&line);
     }
 }
 
 impl<W: Write> RunObserver for Bar<W> {
     fn started(&mut self, started: &Started<'_>) {
-        self.lines.started(started).iter().for_each(|line| self.line(line));
+        self.lines.started(started).iter().for_each(|line| self.styled_line(line));
         if let Some(optimizer) = started.optimizer {
             self.bar.set_length(optimizer.max_evaluations as u64);
             self.template = RUN;
@@ -141,7 +146,7 @@ impl<W: Write> RunObserver for Bar<W> {
 
     fn finished(&mut self, result: &RunResult) {
         self.bar.finish_and_clear();
-        self.lines.finished(result).iter().for_each(|line| self.line(line));
+        self.lines.finished(result).iter().for_each(|line| self.styled_line(line));
     }
 }
 

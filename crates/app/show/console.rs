@@ -9,6 +9,7 @@ use super::lines::Lines;
 use super::table::Columns;
 use super::{Evaluation, Observer, RunObserver, Started, Styles, show};
 use crate::files::RunResult;
+use crate::printable::printable;
 
 /// A stage that takes longer [s] is shown with its time, outside of evaluations: people begin to wonder then.
 const LONG_STAGE: f64 = 2.0;
@@ -46,11 +47,16 @@ impl<W: Write> Console<W> {
             }
         }
     }
+
+    /// Shows a line that may have styles.
+    fn styled_line(&mut self, text: &str) {
+        show(&mut self.writer, text);
+    }
 }
 
 impl<W: Write> Observer for Console<W> {
     fn line(&mut self, text: &str) {
-        show(&mut self.writer, text);
+        self.styled_line(&printable(text));
     }
 
     fn phase(&mut self, name: &str) {
@@ -66,12 +72,12 @@ impl<W: Write> Observer for Console<W> {
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
-        self.lines.evaluation(row).iter().for_each(|line| self.line(line));
+        self.lines.evaluation(row).iter().for_each(|line| self.styled_line(line));
     }
 
     fn warning(&mut self, message: &str) {
         let line = self.lines.warning(message);
-        self.line(&line);
+        self.styled_line(&line);
     }
 }
 
@@ -79,12 +85,12 @@ impl<W: Write> RunObserver for Console<W> {
     fn started(&mut self, started: &Started<'_>) {
         self.end_stage();
         self.has_evaluations = started.optimizer.is_some();
-        self.lines.started(started).iter().for_each(|line| self.line(line));
+        self.lines.started(started).iter().for_each(|line| self.styled_line(line));
     }
 
     fn finished(&mut self, result: &RunResult) {
         self.end_stage();
-        self.lines.finished(result).iter().for_each(|line| self.line(line));
+        self.lines.finished(result).iter().for_each(|line| self.styled_line(line));
     }
 }
 

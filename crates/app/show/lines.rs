@@ -5,6 +5,7 @@ use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Evaluation, Started};
 use crate::files::RunResult;
+use crate::printable::printable;
 
 /// What has been said so far, as far as later lines depend on it.
 #[derive(Debug)]
@@ -34,7 +35,7 @@ impl Lines {
             lines.push(format!("optimisation: {variables} design variables, {algorithm}"));
         }
         if let Some(directory) = started.directory {
-            lines.push(format!("writing to {}", directory.display()));
+            lines.push(format!("writing to {}", printable(&directory.display().to_string())));
         }
         lines
     }
@@ -43,7 +44,8 @@ impl Lines {
     pub(super) fn evaluation(&mut self, row: &Evaluation) -> Vec<String> {
         let is_first = !std::mem::replace(&mut self.header_is_shown, true);
         let header = is_first.then(|| styled(self.styles.faint, &table::header(row, self.columns)));
-        header.into_iter().chain([table::row(row, self.columns)]).collect()
+        let row = printable(&table::row(row, self.columns)).into_owned();
+        header.into_iter().chain([row]).collect()
     }
 
     /// Something the user should know.

@@ -1,6 +1,7 @@
 //! The flux density at probes as a small table.
 
 use crate::files::ProbeResult;
+use crate::printable::printable;
 
 /// Points of a probe that are shown; all are in `result.json`.
 const MOST_POINTS: usize = 8;
@@ -28,7 +29,7 @@ pub(super) fn lines(probes: &[ProbeResult], frequency: f64) -> Vec<String> {
     let mut lines = Vec::new();
     for probe in probes {
         let heads = names.map(|name| format!("{:>10}", format!("{name} {unit}"))).concat();
-        lines.push(format!("{:<30}{heads}", format!("probe {:.22}", probe.name)));
+        lines.push(format!("{:<30}{heads}", format!("probe {:.22}", printable(&probe.name))));
         for (k, point) in probe.points_m.iter().enumerate().take(MOST_POINTS) {
             let [x, y, z] = point.map(|c| (c * 1e6).round() / 1e3 + 0.0);
             let at = format!("  ({x}, {y}, {z}) mm");

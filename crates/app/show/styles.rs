@@ -3,6 +3,7 @@
 use anstyle::{AnsiColor, Style};
 
 use crate::diagnostics;
+use crate::printable::printable;
 
 /// What a text looks like by its meaning. Without colours, as by default, all of them change nothing.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -39,13 +40,13 @@ impl Styles {
 
     /// The line of a warning.
     pub fn warning_line(&self, message: &str) -> String {
-        format!("{} {message}", styled(self.warning, "warning:"))
+        format!("{} {}", styled(self.warning, "warning:"), printable(message))
     }
 }
 
-/// A text in a style.
+/// A text in a style; of its own letters none acts on a terminal.
 pub(super) fn styled(style: Style, text: &str) -> String {
-    format!("{style}{text}{style:#}")
+    format!("{style}{}{style:#}", printable(text))
 }
 
 #[cfg(test)]

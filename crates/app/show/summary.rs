@@ -4,6 +4,7 @@ use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Goal, Objective};
 use crate::files::{ConstraintResult, ObjectiveResult, RunResult, RunStatus};
+use crate::printable::printable;
 
 /// What the objective of a run is called, and its unit.
 #[derive(Debug, Clone, Default)]
@@ -33,6 +34,7 @@ impl Named {
             }
             _ => format!("{goal} a sum of {} terms", terms.len()),
         };
+        let name = printable(&name).into_owned();
         Self { name, unit: if is_one_unit { format!(" {unit}") } else { String::new() } }
     }
 }
@@ -47,7 +49,11 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, styles)));
     for (frequency, losses) in states(result) {
         let at = if result.states.len() > 1 { format!(" at {frequency} Hz") } else { String::new() };
-        rows.extend(losses.iter().map(|(region, loss)| ("loss", format!("{loss:.6e} W in {region}{at}"))));
+        rows.extend(
+            losses
+                .iter()
+                .map(|(region, loss)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)))),
+        );
     }
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
@@ -56,7 +62,11 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     } else {
         rows.push(("worst quality", format!("{last:.4}")));
     }
-    let method = result.linear_solver.methods.first().map_or(String::new(), |method| format!(", {method}"));
+    let method = result
+        .linear_solver
+        .methods
+        .first()
+        .map_or(String::new(), |method| format!(", {}", printable(method)));
     rows.push(("worst residual", format!("{:.1e}{method}", result.linear_solver.worst_residual)));
     rows.push(("time", times(result)));
     rows.push(("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0))));
@@ -104,7 +114,7 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
 fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
     let ConstraintResult { name, value, bound, satisfied } = constraint;
     let verdict = if *satisfied { "satisfied".to_owned() } else { styled(styles.bad, "VIOLATED") };
-    ("constraint", format!("{name}: {value:.6e}, bound {bound:.6e}, {verdict}"))
+    ("constraint", format!("{}: {value:.6e}, bound {bound:.6e}, {verdict}", printable(name)))
 }
 
 /// Losses by frequency [Hz].

@@ -6,7 +6,7 @@
 //!
 //! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
 
-use fluxmorph_solver::linear::{Method, Reuse, TWO_LEVELS_FROM};
+use fluxmorph_solver::linear::{Method, Reuse, SystemAnalysis, TWO_LEVELS_FROM};
 use fluxmorph_solver::{FieldModel, Order};
 
 use crate::problem::Problem;
@@ -106,6 +106,19 @@ fn is_factor(method: Method) -> bool {
 /// Bytes that the process holds at the peak of one evaluation, about.
 pub fn of_evaluation(problem: &Problem) -> usize {
     PROCESS + Evaluation::of(problem).bytes()
+}
+
+/// Least bytes of a factor in which products are so large that the dense kernels take a workspace of their own.
+const LARGE_FACTOR: usize = 4 << 20;
+
+/// Whether a factor of the problem is so large that every thread asks for the workspace of the dense kernels: addresses, of
+/// which it uses a small part. Limits on addresses count them, the memory of the machine does not.
+pub fn needs_workspace(problem: &Problem) -> bool {
+    let is_large = |solver: &SystemAnalysis| {
+        let bytes = solver.preconditioner_bytes(solver.method()).unwrap_or_default();
+        is_factor(solver.method()) && bytes >= LARGE_FACTOR
+    };
+    problem.states().iter().filter_map(FieldModel::linear_solver).any(is_large)
 }
 
 /// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the

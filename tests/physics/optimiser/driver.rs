@@ -135,7 +135,7 @@ fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
         optimised(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut events);
     println!("{:?} after {} rows: {:#?}", optimised.stop_reason, rows.len(), events.0);
     check_rows(&optimised, &rows, least);
-    assert_eq!(optimised.stop_reason, StopReason::MeshLimit, "{} rows", rows.len());
+    assert_eq!(optimised.stop_reason, StopReason::MeshLimited, "{} rows", rows.len());
     // The trust region halves three times, and no fallback makes a step possible.
     assert!(events.0.iter().all(|event| event.kind == RoundKind::SmallerSteps), "{:?}", events.0);
     assert_eq!(events.0.len(), 3);

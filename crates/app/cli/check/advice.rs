@@ -5,14 +5,11 @@
 use fluxmorph_geometry::tet4::{norm, sub};
 
 use crate::build::Setup;
-use crate::config::{Coil, CoilShape, Config, ElementOrder, MeshConfig};
+use crate::config::{Config, ElementOrder, MeshConfig};
 
 /// Worst quality (Eq. 4) below which a mesh from a file should be regenerated. Generated meshes are layered on purpose, and
 /// move along their layers.
 const POOR: f64 = 0.05;
-
-/// Share of the mesh's size below which a coil looks like one in another unit.
-const TINY: f64 = 1e-2;
 
 /// Sentences for what looks unlike what is meant; none for most configurations.
 pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
@@ -34,15 +31,6 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
             "the worst element has a quality of {worst:.4}; regenerate a mesh file whose worst quality is below {POOR}"
         ));
     }
-    all.extend(config.coils.iter().filter_map(|coil| {
-        let extent = widest(coil)?;
-        (extent < TINY * size).then(|| {
-            format!(
-                "the coil `{}` is {extent} m wide in a mesh of {size:.4} m: check its sizes and the mesh's unit",
-                coil.name
-            )
-        })
-    }));
     if let Some(design) = &config.design {
         let lengths = [
             ("lower", Some(-design.lower)),
@@ -58,15 +46,6 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
         }
     }
     all
-}
-
-/// Largest width of an analytic coil [m].
-fn widest(coil: &Coil) -> Option<f64> {
-    match &coil.shape {
-        CoilShape::Racetrack(c) => Some(2.0 * (c.half_window[0].max(c.half_window[1]) + c.width)),
-        CoilShape::Circular(c) => Some(2.0 * (c.radius + c.width)),
-        CoilShape::Region(_) => None,
-    }
 }
 
 #[cfg(test)]

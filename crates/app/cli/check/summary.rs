@@ -152,7 +152,7 @@ pub(super) fn summary<'a>(
     progress: &mut dyn Progress,
 ) -> Result<Summary<'a>, Error> {
     let setup: Setup = set_up_watched(config, source, Mode::Inspection, None, progress)?;
-    memory_limit::check_problem(of_evaluation(&setup.problem), source, overwrite)?;
+    memory_limit::check_problem(&setup.problem, source, overwrite)?;
     let motions = morph::inspect(config, source)?;
     let mesh = &setup.full_mesh;
     let problem = &setup.problem;

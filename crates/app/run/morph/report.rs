@@ -24,7 +24,7 @@ pub struct MorphReport {
     /// `done` where all cases end on a valid mesh; `failed` where that of a single motion is inverted; else `stopped`, or
     /// `interrupted`.
     pub status: RunStatus,
-    /// `done`, `mesh_limit` or `interrupted`.
+    /// `done`, `mesh_limited` or `interrupted`.
     pub stop_reason: StopReason,
     /// Which elements qualities are of.
     pub quality_of: &'static str,
@@ -136,8 +136,8 @@ fn verdict(cases: &[CaseReport]) -> (RunStatus, StopReason) {
     let inverted = |case: &CaseReport| case.result.as_ref().is_some_and(|result| result.inverted > 0);
     match cases {
         cases if cases.iter().all(|case| case.valid) => (RunStatus::Done, StopReason::Done),
-        [case] if inverted(case) => (RunStatus::Failed, StopReason::MeshLimit),
-        _ => (RunStatus::Stopped, StopReason::MeshLimit),
+        [case] if inverted(case) => (RunStatus::Failed, StopReason::MeshLimited),
+        _ => (RunStatus::Stopped, StopReason::MeshLimited),
     }
 }
 

@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn a_broken_case_stops_a_sweep_and_a_single_motion_fails_only_if_inverted() {
         let stopped = MorphReport::of(vec![broken(), CaseReport { valid: true, ..broken() }]);
-        assert_eq!((stopped.status, stopped.stop_reason), (RunStatus::Stopped, StopReason::MeshLimit));
+        assert_eq!((stopped.status, stopped.stop_reason), (RunStatus::Stopped, StopReason::MeshLimited));
         assert_eq!(stopped.exit_code(), ExitCode::Stopped);
         assert_eq!(MorphReport::of(vec![broken()]).exit_code(), ExitCode::Stopped);
         assert_eq!(MorphReport::of(Vec::new()).exit_code(), ExitCode::Success);

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
-use crate::files::{Disk, FileHash, OutputError, OverwritePolicy, shell_word, to_json, write_whole};
+use crate::files::{
+    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, shell_word, to_json, write_whole,
+};
 
 /// The mark by which a directory is known as ours.
 const PROGRAM: &str = "fluxmorph";
@@ -23,6 +25,8 @@ const LARGEST: u64 = 1 << 28;
 pub struct Layout {
     disk: Arc<dyn Disk>,
     path: PathBuf,
+    /// Keeps other sweeps out while it lives.
+    lock: Option<Arc<dyn DiskLock>>,
 }
 
 /// The content of `sweep.json`.
@@ -65,20 +69,12 @@ impl Layout {
     /// # Errors
     /// [`SweepError::NotASweep`], [`SweepError::OtherSweep`], or when the operating system refuses.
     pub fn create(disk: &Arc<dyn Disk>, sweep: &Sweep) -> Result<Self, Error> {
-        let layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone() };
-        match layout.description() {
-            Ok(earlier) if sweep.overwrite == OverwritePolicy::Keep => {
-                layout.check_continues(&earlier, sweep)?
-            }
-            Ok(_) => {}
-            Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
-                layout.is_free()?;
-            }
-            Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotADirectory => {
-                return Err(OutputError::NotADirectory { path: layout.path }.into());
-            }
-            Err(error) => return Err(error.into()),
-        }
+        let mut layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone(), lock: None };
+        layout.check_free(sweep)?;
+        disk.create_dir(&layout.path).map_err(OutputError::io("create", &layout.path))?;
+        layout.acquire(Sharing::Exclusive)?;
+        // Another process may have come and gone between the look and the lock.
+        layout.check_free(sweep)?;
         let logs = layout.path.join(LOGS);
         if disk.is_link(&logs) {
             return Err(OutputError::Linked { path: logs }.into());
@@ -88,12 +84,40 @@ impl Layout {
         Ok(layout)
     }
 
+    /// Keeps other processes out: all of them, or those that want the whole sweep.
+    ///
+    /// # Errors
+    /// [`OutputError::InUse`].
+    pub fn acquire(&mut self, sharing: Sharing) -> Result<(), OutputError> {
+        let locked = self.disk.lock(&self.path.join(LOCK), sharing);
+        self.lock = locked.map_err(OutputError::io("lock", &self.path))?.map(Arc::from);
+        Ok(())
+    }
+
+    /// Whether the folder is absent, or free for this sweep.
+    fn check_free(&self, sweep: &Sweep) -> Result<(), Error> {
+        match self.description() {
+            Ok(earlier) if sweep.overwrite == OverwritePolicy::Keep => {
+                self.check_continues(&earlier, sweep)?
+            }
+            Ok(_) => {}
+            Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+                self.is_free()?;
+            }
+            Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotADirectory => {
+                return Err(OutputError::NotADirectory { path: self.path.clone() }.into());
+            }
+            Err(error) => return Err(error.into()),
+        }
+        Ok(())
+    }
+
     /// The directory of a sweep that was laid out by the same command; nothing is written.
     ///
     /// # Errors
     /// [`SweepError::NotLaidOut`].
     pub fn open(disk: &Arc<dyn Disk>, sweep: &Sweep) -> Result<Self, SweepError> {
-        let layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone() };
+        let layout = Self { disk: Arc::clone(disk), path: sweep.directory.clone(), lock: None };
         let refused =
             |cause: &str| Err(SweepError::NotLaidOut { path: layout.path.clone(), cause: cause.to_owned() });
         match layout.description() {

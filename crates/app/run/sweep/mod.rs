@@ -29,4 +29,5 @@ pub use plan::{Outside, Planned, Request, Sweep};
 pub use script::{ScriptFile, script};
 pub use setting::Setting;
 pub use state::{State, States};
+pub(crate) use work::ENDS_WITH_STDIN;
 pub use work::{Ending, Event, Workers};

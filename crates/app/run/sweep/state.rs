@@ -70,9 +70,7 @@ impl<'a> States<'a> {
         if let Err(error) = run.refuse_older_journal() {
             return Ok(State::Other(error.to_string()));
         }
-        if let Err(error) = disk.hold(&run.journal())
-            && error.kind() == ErrorKind::ResourceBusy
-        {
+        if run.is_in_use() {
             return Ok(State::InUse);
         }
         let manifest = Manifest::read(&run)?;

@@ -2,6 +2,11 @@
 //!
 //! Every child leads a process group of its own: Ctrl-C on a terminal reaches the sweep alone, which forwards it once, so
 //! that no child takes one signal for two and leaves its evaluation unfinished.
+//!
+//! Every child holds the reading end of a pipe as its standard input, and the sweep the other one: when the sweep ends,
+//! however it does, the pipe ends too, which a child takes for SIGTERM ([`ENDS_WITH_STDIN`]). A sweep that is killed so takes
+//! its runs with it, which save what they have; a second signal, which ends the sweep at once, ends them at once too, for they
+//! have had the first.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -14,6 +19,9 @@ use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::OutputError;
 use crate::run::launcher;
+
+/// The variable that tells a run to take the end of its standard input for SIGTERM.
+pub(crate) const ENDS_WITH_STDIN: &str = "FLUXMORPH_ENDS_WITH_STDIN";
 
 /// Time between two polls of the children: far shorter than a run, and no load.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
@@ -133,7 +141,12 @@ impl Workers {
         let log = log(&path, task).map_err(OutputError::io("write", &path))?;
         let mut command = Command::new(&self.program);
         command.args(sweep.arguments(planned, task)).args(["--progress", "plain", "--threads"]);
-        command.arg(self.threads.to_string()).stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
+        command
+            .env(ENDS_WITH_STDIN, "1")
+            .arg(self.threads.to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(log);
         // A sweep that a launcher has started is no rank, and neither are its runs.
         launcher::variables().for_each(|name| {
             command.env_remove(name);

@@ -63,9 +63,16 @@ impl ReportedRun {
     /// [`Error::NoReport`] for what another command has written, faults of the configuration, files that are damaged or
     /// cannot be read.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
-        let directory = RunDirectory::open(disk, path)?;
+        Self::of(RunDirectory::open(disk, path)?)
+    }
+
+    /// The same of a directory that is open.
+    ///
+    /// # Errors
+    /// As [`ReportedRun::open`].
+    pub(crate) fn of(directory: RunDirectory) -> Result<Self, Error> {
         let manifest = Manifest::read(&directory)?;
-        let refused = |cause: String| Error::NoReport { path: path.to_owned(), cause };
+        let refused = |cause: String| Error::NoReport { path: directory.path().to_owned(), cause };
         if !matches!(manifest.command.as_str(), "run" | "solve") {
             let command = &manifest.command;
             return Err(refused(format!(
@@ -86,14 +93,18 @@ impl ReportedRun {
         (&self.config, &self.source)
     }
 
-    /// Writes the page into the directory or to `out`; where it is written.
+    /// Writes the page into the directory, unless another process works in it, or to `out`; where it is written.
     ///
     /// # Errors
-    /// Damaged files, or when the operating system refuses.
+    /// Damaged files, a directory in use or changed meanwhile, or when the operating system refuses.
     pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
-        let directory = self.directory.clone();
+        let (mut directory, manifest) = (self.directory.clone(), self.manifest.clone());
         let path = out.map_or_else(|| directory.report(), Path::to_owned);
         let data = RunData::read(self)?;
+        if out.is_none() {
+            directory = directory.locked()?;
+        }
+        manifest.check_current(&directory)?;
         let page = page::page(&data, &link_prefix(&path, directory.path()));
         directory.write(&path, page.as_bytes())?;
         Ok(path)

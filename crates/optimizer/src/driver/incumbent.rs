@@ -51,6 +51,8 @@ pub(super) struct Incumbent {
     pub(super) sample: Sample,
     /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
     pub(super) round: usize,
+    /// How many rounds had been begun by then.
+    pub(super) starts: usize,
     pub(super) field: BestField,
 }
 

@@ -10,7 +10,9 @@
 //!   penalty: the method is stopped. It has no objective: it is no evaluation and leaves no row in the history.
 //! * What follows from one search is decided in `search`: the best mesh becomes the reference of the next round, the trust
 //!   region shrinks, or the mesh motion falls back to another stiffness policy, smoothing or motion along one axis
-//!   ([`fluxmorph_remesh::FallbackLevel`]). Where nothing is left the run ends with [`StopReason::MeshLimit`].
+//!   ([`fluxmorph_remesh::FallbackLevel`]). Where nothing is left the run ends with [`StopReason::MeshLimited`]; so does one
+//!   whose method came to its tolerance in a small trust region while the gradient promises as much as before
+//!   (`promised_gain`): that is no convergence.
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit, in the same rounds on the same meshes, they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
@@ -23,6 +25,7 @@ mod evaluation;
 mod incumbent;
 mod observer;
 mod outcome;
+mod promised_gain;
 mod record;
 mod recorder;
 mod replay;

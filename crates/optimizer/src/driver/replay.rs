@@ -84,7 +84,8 @@ impl Run<'_> {
 
     /// The best design with its field: one that was replayed is computed in its own round, and comes out as it was.
     pub(super) fn with_field(&mut self, best: Incumbent) -> Result<Best, Error> {
-        let Incumbent { evaluation, values, objective, violation, field, .. } = best;
+        let Incumbent { evaluation, values, objective, violation, starts, field, .. } = best;
+        let starts = self.starts[..starts].to_vec();
         let analysis = match field {
             BestField::Computed(analysis) => *analysis,
             BestField::Replayed(state) => {
@@ -97,6 +98,6 @@ impl Run<'_> {
                 analysis?
             }
         };
-        Ok(Best { evaluation, values, objective, violation, analysis })
+        Ok(Best { evaluation, values, objective, violation, starts, analysis })
     }
 }

@@ -5,12 +5,13 @@ use std::time::Instant;
 use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
+use super::promised_gain::promised_gain;
 use super::search::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::objective::Goal;
-use crate::problem::{Analysis, Problem, RoundEvent, Shape, SolverCache, Timings};
+use crate::problem::{Analysis, Problem, RoundEvent, RoundStart, Shape, SolverCache, Timings};
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
@@ -37,6 +38,10 @@ pub(super) struct Run<'a> {
     rounds: Vec<RoundEvent>,
     /// Rounds begun at a best design.
     begun: usize,
+    /// What the gradient promised at the first design.
+    promised: Option<f64>,
+    /// How every round began.
+    pub(super) starts: Vec<RoundStart>,
     /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
@@ -72,6 +77,8 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             rounds: Vec::new(),
             begun: 0,
+            promised: None,
+            starts: Vec::new(),
             is_shared_out,
         }
     }
@@ -164,7 +171,9 @@ impl<'a> Run<'a> {
                 shape.next_round(&best.values, moved.mesh, moved.displacement)?
             }
         };
+        let design_m = best.values.clone();
         self.shape_mut().set_motion(motion);
+        self.starts.push(RoundStart::Reference { design_m });
         Ok(())
     }
 
@@ -180,10 +189,12 @@ impl<'a> Run<'a> {
         }
         self.rebase_at_best()?;
         let shape = self.shape();
+        let start = RoundStart::fallback(level, wanted);
         let escalated = shape.motion().escalate(&shape.displacement(wanted), level, &shape.limits)?;
         Ok(escalated.map(|(motion, report, level)| {
             self.best_is_stale = report.fallback.changes_mesh();
             self.shape_mut().set_motion(motion);
+            self.starts.push(start);
             (report, level)
         }))
     }
@@ -245,6 +256,9 @@ impl<'a> Run<'a> {
         self.timings += record.timings;
         self.best_is_stale = false;
         self.last.clone_from(&record.design);
+        if self.promised.is_none() {
+            self.promised = Some(self.promised_gain(&sample, &record.design));
+        }
         if comparison.is_improved() {
             let field = field(self);
             self.best = Some(Incumbent {
@@ -254,9 +268,21 @@ impl<'a> Run<'a> {
                 violation: violation(&sample),
                 sample,
                 round: record.row.round,
+                starts: self.starts.len(),
                 field,
             });
         }
+    }
+
+    fn promised_gain(&self, sample: &Sample, design: &[f64]) -> f64 {
+        let shape = self.shape();
+        promised_gain(sample, design, shape.lower(), shape.upper())
+    }
+
+    /// What the gradient promised at the first design, and promises at the best one.
+    pub(super) fn promised_gains(&self) -> Option<[f64; 2]> {
+        let best = self.best.as_ref()?;
+        Some([self.promised?, self.promised_gain(&best.sample, &best.values)])
     }
 
     /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.
@@ -265,7 +291,7 @@ impl<'a> Run<'a> {
     /// The error itself, where there is no best design or it is another one.
     pub(super) fn salvage(&mut self, error: Error) -> Result<StopReason, Error> {
         let reason = match &error {
-            Error::Remesh(_) => StopReason::MeshLimit,
+            Error::Remesh(_) => StopReason::MeshLimited,
             other if other.is_numerical() => StopReason::NumericalFailure,
             _ => return Err(error),
         };

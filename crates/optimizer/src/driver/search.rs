@@ -27,6 +27,10 @@ const RESTART_TOLERANCE: f64 = 0.1;
 /// Evaluations within which a method has done no more than its cautious first step.
 const CAUTIOUS: usize = 3;
 
+/// Share of the gain promised at the start above which a search in a small trust region has not converged. Runs that have
+/// promise less than a hundredth (`configs/shield_quick.toml`: 0.0001, with two frequencies 0.001).
+const STILL_PROMISED: f64 = 0.1;
+
 /// How often an end after the cautious first step is not believed.
 const MAX_TIGHTENINGS: usize = 3;
 
@@ -173,10 +177,30 @@ impl<'a> Search<'a> {
                 self.after_refusal(run, refusal.clone(), gained)
             }
             _ => NextStep::Stop(match ending {
+                Ending::Roundoff => StopReason::RoundoffLimited,
+                _ if self.is_throttled(run) => StopReason::MeshLimited,
                 Ending::Objective => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),
         }
+    }
+
+    /// Whether the method came to its tolerance only because the trust region is small, which is said then.
+    fn is_throttled(&self, run: &mut Run<'_>) -> bool {
+        let reach = self.trust.reach();
+        let Some([before, now]) = run.promised_gains() else { return false };
+        let is_throttled = reach.iter().any(|reach| *reach < 1.0) && now > STILL_PROMISED * before;
+        if is_throttled {
+            let [down, up] = reach.map(|reach| 100.0 * reach);
+            let share = 100.0 * now / before;
+            run.warn(&format!(
+                "not converged: the search came to its tolerance in a trust region of {down:.1} % of the bound range \
+                 downwards, {up:.1} % upwards, where the gradient still promises {share:.0} % of what it did at the start; a \
+                 smoother design (design.filter_radius or design.grid), surfaces that slide (remesh.slide) or more \
+                 remesh.rounds let the mesh go further"
+            ));
+        }
+        is_throttled
     }
 
     /// Where no new reference is to be had, or would be of use.
@@ -254,7 +278,7 @@ impl<'a> Search<'a> {
                 refused.cause,
                 run.why_no_fallback()
             ));
-            return Ok(Some(StopReason::MeshLimit));
+            return Ok(Some(StopReason::MeshLimited));
         };
         self.level = level;
         (self.shrinks, self.tightenings) = (0, 0);

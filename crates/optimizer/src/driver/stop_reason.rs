@@ -17,8 +17,11 @@ pub enum StopReason {
     MaxTime,
     /// A signal arrived.
     Interrupted,
-    /// The mesh allows no further step.
-    MeshLimit,
+    /// The mesh, the trust region or the number of rounds held the search back.
+    #[serde(rename = "mesh_limited", alias = "mesh_limit")]
+    MeshLimited,
+    /// Rounding allows the method no further step.
+    RoundoffLimited,
     /// The method can make no further step.
     MethodStalled,
     /// The method has converged, but no design keeps all constraints.
@@ -43,7 +46,8 @@ impl StopReason {
             Self::MaxEvaluations => "all evaluations are used",
             Self::MaxTime => "the time is over",
             Self::Interrupted => "interrupted",
-            Self::MeshLimit => "the mesh allows no further step",
+            Self::MeshLimited => "the mesh held the search back: not converged",
+            Self::RoundoffLimited => "rounding allows the method no further step: not converged",
             Self::MethodStalled => "the method can make no further step",
             Self::Infeasible => "no design keeps all constraints",
             Self::NumericalFailure => "a field could not be computed",

@@ -101,8 +101,10 @@ pub struct Minimisation {
 /// Why NLopt ended by itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// The objective changes by less than its tolerance, or rounding allows no more.
+    /// The objective changes by less than its tolerance.
     Objective,
+    /// Rounding allows no further step.
+    Roundoff,
     /// The variables change by less than their tolerance.
     Step,
 }
@@ -247,7 +249,8 @@ pub fn minimise<E: From<Error>>(
 fn outcome<E>(ended: Result<(SuccessState, f64), (FailState, f64)>) -> Outcome<E> {
     match ended {
         Ok((SuccessState::XtolReached, _)) => Outcome::Ended(Ending::Step),
-        Ok(_) | Err((FailState::RoundoffLimited, _)) => Outcome::Ended(Ending::Objective),
+        Ok(_) => Outcome::Ended(Ending::Objective),
+        Err((FailState::RoundoffLimited, _)) => Outcome::Ended(Ending::Roundoff),
         Err((FailState::InvalidArgs, _)) => Outcome::Failed("NLopt refuses its arguments"),
         Err((FailState::OutOfMemory, _)) => Outcome::Failed("NLopt is out of memory"),
         Err((FailState::Failure | FailState::ForcedStop, _)) => Outcome::Failed("NLopt failed"),

@@ -6,7 +6,8 @@
 //! terms, each constraint of the field another.
 //!
 //! Here: what is moved and solved (`mod`, `shape`), one evaluation (`evaluate`) with its sums (`adjoint_accumulator`) and
-//! result (`analysis`), the continuation to a design far away (`continuation`), and the check of what is computed (`finite`).
+//! result (`analysis`), the continuation to a design far away (`continuation`) or
+//! through the rounds of a run (`round_start`), and the check of what is computed (`finite`).
 //! Nothing here knows an optimiser, a file or a terminal.
 
 mod adjoint_accumulator;
@@ -16,6 +17,7 @@ mod evaluate;
 pub mod finite;
 mod progress;
 mod round_event;
+mod round_start;
 mod shape;
 mod solver_cache;
 mod stopwatch;
@@ -34,6 +36,7 @@ pub use analysis::{Analysis, Measured, Timings};
 pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
 pub use round_event::{RoundEvent, RoundKind};
+pub use round_start::RoundStart;
 pub use shape::Shape;
 pub use solver_cache::SolverCache;
 

@@ -20,7 +20,9 @@ impl Plane {
 /// Calls `visit` for every piece of `tet`; the pieces fill it without overlap.
 ///
 /// `tolerance` [m × length of the normal]: a vertex nearer to a plane than this counts as on it, so that meshes that
-/// follow the coil are not cut into slivers.
+/// follow the coil are not cut into slivers. It must be above what the distances of the coordinates round: a vertex that a
+/// cut puts on the plane then counts as on it, so that each half has one crossing fewer and every plane cuts at most four
+/// levels deep.
 pub fn for_each_piece(tet: [Point; 4], planes: &[Plane], tolerance: f64, visit: &mut impl FnMut([Point; 4])) {
     let Some((plane, rest)) = planes.split_first() else {
         visit(tet);

@@ -19,6 +19,13 @@ const CORNER_LEVELS: usize = 2;
 /// Halvings where an arc on which `T` has a kink crosses a piece.
 const KINK_LEVELS: usize = 4;
 
+/// Distance to a kink, relative to the smaller of the winding's width and height, below which a vertex is on it.
+const ON_PLANE: f64 = 1e-9;
+
+/// The same relative to the coordinates: some times what their sums and differences round, so that a cut puts its new vertex on
+/// the plane whatever the size of the winding, and cutting ends.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
 /// The coordinates of the four-point rule.
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
@@ -36,7 +43,9 @@ impl Racetrack {
         }
         let integral = Integral { coil: self, origin: local[0], gradients: Tet4::new(local).gradients };
         let mut weights = [0.0; 4];
-        for_each_piece(local, &self.kinks(), 1e-9 * self.detail(), &mut |piece| {
+        let reach = local.iter().flatten().chain(&extent).fold(0.0_f64, |reach, c| reach.max(c.abs()));
+        let tolerance = (ON_PLANE * self.detail()).max(ROUNDING * reach);
+        for_each_piece(local, &self.kinks(), tolerance, &mut |piece| {
             let c = centroid(piece);
             if 2.0 * c[2].abs() > self.height {
                 return;
@@ -206,6 +215,17 @@ mod tests {
         for n in [3, 4] {
             let sum = over_paper_box(&coil, n);
             assert!((sum / exact - 1.0).abs() < 1e-12, "{sum} {exact}");
+        }
+    }
+
+    #[test]
+    fn a_winding_thinner_than_rounding_is_cut_in_finite_time() {
+        for (width, height) in [(1e-8, 0.04), (0.02, 1e-9), (1e-12, 1e-12), (1e-15, 1e-18)] {
+            for corner in [Corner::Mitred, Corner::Round { inner_radius: 0.022 }] {
+                let coil = Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], width, height, corner).unwrap();
+                let sum = over_paper_box(&coil, 5);
+                assert!(sum.is_finite(), "{width} {height} {corner:?}: {sum}");
+            }
         }
     }
 

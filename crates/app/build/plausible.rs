@@ -1,0 +1,196 @@
+//! Whether coils can be meant as they stand in the mesh: sizes, places, units, materials.
+//!
+//! What cannot be meant is refused at its key; what is rarely meant is a warning.
+
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_solver::coil::{self, Racetrack};
+
+use super::{material, millimetres};
+use crate::config::{Boundaries, Coil, CoilShape, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
+
+/// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
+/// one is the same.
+const THINNEST: f64 = 1e-6;
+
+/// Shares of the mesh's size below and above which a coil looks like one in another unit.
+const ALIKE: [f64; 2] = [2e-2, 2.0];
+
+/// Weights of the vertices at which an element is looked at: its middle, near every vertex, and on every edge.
+const NEAR: f64 = 0.85;
+
+/// Coils of the configuration that are no source of a field in this mesh, or no physical one.
+pub(super) fn coil_faults(
+    config: &Config,
+    source: &SourceMap,
+    mesh: &Mesh,
+    coils: &[coil::Coil],
+) -> Vec<Diagnostic> {
+    let size = size(mesh);
+    let mut faults = Vec::new();
+    for (i, (written, built)) in config.coils.iter().zip(coils).enumerate() {
+        let coil::CoilShape::Racetrack(winding) = &built.shape else { continue };
+        if let Some((key, length)) =
+            section(written).into_iter().find(|(_, length)| *length < THINNEST * size)
+        {
+            let message =
+                format!("`coils[{i}].{key}` is {length:e} m, below any element of a mesh of {size:.4} m");
+            let expected = format!("at least {:.1e} m, a millionth of the mesh", THINNEST * size);
+            faults.push(source.diagnostic(&format!("coils[{i}].{key}"), message).expected(expected));
+        } else if let Some([lower, upper]) = box_outside(winding, written, mesh) {
+            let [low, high] = mesh.bounding_box();
+            let (place, own) = (millimetres(lower), millimetres(upper));
+            let message = format!("the coil `{}` lies outside the mesh, from {place} to {own}", built.name);
+            let expected =
+                format!("a place that meets the mesh, from {} to {}", millimetres(low), millimetres(high));
+            let fault = source.diagnostic(&format!("coils[{i}].center"), message).expected(expected);
+            faults.push(match unit_hint(config, mesh) {
+                Some(hint) => fault.help(hint),
+                None => fault,
+            });
+        } else if let Some((region, place)) = matter_in(config, mesh, winding) {
+            let name = &mesh.topology().region_names()[region.index()];
+            let message = format!(
+                "the current of the coil `{}` flows inside `{name}`, at {}, which is iron or conducts",
+                built.name,
+                millimetres(place)
+            );
+            faults.push(
+                source
+                    .diagnostic(&format!("coils[{i}].center"), message)
+                    .expected("a winding in air, or in a material without permeability and conductivity")
+                    .help(
+                        "move the coil or the region; the strands of a winding are no material of [regions]",
+                    ),
+            );
+        }
+    }
+    faults
+}
+
+/// What is rarely meant.
+pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let mut warnings: Vec<String> = Vec::new();
+    for (i, coil) in config.coils.iter().enumerate() {
+        if let Some(twin) = config.coils[..i].iter().find(|earlier| earlier.shape == coil.shape) {
+            warnings.push(format!(
+                "the coils `{}` and `{}` are the same winding at the same place: their ampere-turns add up",
+                twin.name, coil.name
+            ));
+        }
+    }
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
+    if flux_parallel.is_empty() && flux_normal.is_empty() && uniform_field.is_none() {
+        warnings.push(
+            "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
+             flux_normal"
+                .to_owned(),
+        );
+    }
+    warnings.extend(unit_hint(config, mesh));
+    warnings
+}
+
+/// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.
+pub(super) fn unit_hint(config: &Config, mesh: &Mesh) -> Option<String> {
+    let size = size(mesh);
+    let unlike = |coil: &&Coil| widest(coil).is_some_and(|w| w < ALIKE[0] * size || w > ALIKE[1] * size);
+    let coil = config.coils.iter().find(unlike)?;
+    let width = widest(coil)?;
+    let unit = match &config.mesh {
+        MeshConfig::File { .. } => "mesh.unit and the units of the coil",
+        _ => "the units of the mesh and of the coil",
+    };
+    Some(format!("the coil `{}` is {width:.4} m wide and the mesh {size:.4} m: check {unit}", coil.name))
+}
+
+fn size(mesh: &Mesh) -> f64 {
+    let [low, high] = mesh.bounding_box();
+    norm(sub(high, low))
+}
+
+/// Largest width of an analytic coil [m].
+fn widest(coil: &Coil) -> Option<f64> {
+    half_extent(coil).map(|[a, b, _]| 2.0 * a.max(b))
+}
+
+/// Half sizes of the box around an analytic coil, across its axis and along it [m].
+fn half_extent(coil: &Coil) -> Option<[f64; 3]> {
+    let of = |[a, b]: [f64; 2], width: f64, height: f64| Some([a + width, b + width, 0.5 * height]);
+    match &coil.shape {
+        CoilShape::Racetrack(c) => of(c.half_window, c.width, c.height),
+        CoilShape::Circular(c) => of([c.radius; 2], c.width, c.height),
+        CoilShape::Region(_) => None,
+    }
+}
+
+/// The sizes of an analytic coil's winding by their keys [m].
+fn section(coil: &Coil) -> Vec<(&'static str, f64)> {
+    let (width, height) = match &coil.shape {
+        CoilShape::Racetrack(c) => (c.width, c.height),
+        CoilShape::Circular(c) => (c.width, c.height),
+        CoilShape::Region(_) => return Vec::new(),
+    };
+    vec![("width", width), ("height", height)]
+}
+
+/// The box around a coil, where it does not meet that around the mesh [m].
+fn box_outside(winding: &Racetrack, written: &Coil, mesh: &Mesh) -> Option<[Point; 2]> {
+    let half = half_extent(written)?;
+    let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for corner in 0..8 {
+        let sign = |d: usize| if corner >> d & 1 == 1 { half[d] } else { -half[d] };
+        let offset = winding.frame().vector([sign(0), sign(1), sign(2)]);
+        for d in 0..3 {
+            let x = winding.frame().centre()[d] + offset[d];
+            (lower[d], upper[d]) = (lower[d].min(x), upper[d].max(x));
+        }
+    }
+    let [low, high] = mesh.bounding_box();
+    (0..3).any(|d| upper[d] < low[d] || lower[d] > high[d]).then_some([lower, upper])
+}
+
+/// A region of iron or of a conductor that the current of a coil flows in, and where.
+fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(RegionId, Point)> {
+    let topology = mesh.topology();
+    let changes = config.analysis.frequencies().iter().any(|&f| f > 0.0);
+    let is_matter = |name: &String| {
+        let own = material(config, name);
+        let replaced = config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);
+        own.relative_permeability != 1.0 || replaced || (changes && own.conductivity > 0.0)
+    };
+    let matter: Vec<bool> = topology.region_names().iter().map(is_matter).collect();
+    let flows = |x: &Point| norm(winding.current_density(*x)) > 0.0;
+    (0..topology.tets().len()).map(|e| topology.region_of()[e]).enumerate().find_map(|(e, region)| {
+        if !matter[region.index()] {
+            return None;
+        }
+        let vertices = mesh.vertices(ElementId::new(e));
+        places(vertices).into_iter().find(flows).map(|place| (region, place))
+    })
+}
+
+/// Places in an element at which it is looked at: inside it, for on its faces another material may begin.
+fn places(vertices: [Point; 4]) -> [Point; 11] {
+    let at = |weights: [f64; 4]| -> Point {
+        std::array::from_fn(|d| (0..4).map(|a| weights[a] * vertices[a][d]).sum())
+    };
+    let rest = (1.0 - NEAR) / 3.0;
+    let near = |k: usize| at(std::array::from_fn(|a| if a == k { NEAR } else { rest }));
+    let rest = 0.5 * (1.0 - NEAR);
+    let edge =
+        |i: usize, j: usize| at(std::array::from_fn(|a| if a == i || a == j { 0.5 * NEAR } else { rest }));
+    [
+        at([0.25; 4]),
+        near(0),
+        near(1),
+        near(2),
+        near(3),
+        edge(0, 1),
+        edge(0, 2),
+        edge(0, 3),
+        edge(1, 2),
+        edge(1, 3),
+        edge(2, 3),
+    ]
+}

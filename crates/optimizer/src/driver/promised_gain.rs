@@ -1,0 +1,73 @@
+//! What the gradient at a design still promises: how much the objective would fall, to first order, if every variable went to
+//! the bound that its derivative points at.
+//!
+//! At an optimum it is zero: derivatives are zero, or point out of a bound, or are held by a constraint (multipliers). It is
+//! far above the gain that is to be had, for an objective is not linear over the bounds; how it falls over a run tells whether
+//! a search has converged or was only held in a small trust region.
+
+use crate::nlopt::Sample;
+
+/// Constraints nearer to their bound than this share of it hold a design.
+const ACTIVE: f64 = 1e-3;
+
+/// Sweeps over the multipliers: few constraints hold a design at a time.
+const SWEEPS: usize = 50;
+
+/// The gain between the bounds, relative to the value of the sample.
+pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+    let mut gradient = sample.gradient.clone();
+    remove_held(&mut gradient, &sample.constraints);
+    let gain = |k: usize| {
+        let room = if gradient[k] > 0.0 { design[k] - lower[k] } else { upper[k] - design[k] };
+        gradient[k].abs() * room.max(0.0)
+    };
+    (0..design.len()).map(gain).sum::<f64>() / sample.value.abs().max(f64::MIN_POSITIVE)
+}
+
+/// Adds to a gradient what the constraints that are active hold of it: `g + Σ μ ∇c` of least norm, `μ ≥ 0`.
+fn remove_held(gradient: &mut [f64], constraints: &[(f64, Vec<f64>)]) {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let active: Vec<(&[f64], f64)> = constraints
+        .iter()
+        .filter(|(value, _)| *value > -ACTIVE)
+        .map(|(_, of)| (of.as_slice(), product(of, of)))
+        .filter(|(_, square)| *square > 0.0)
+        .collect();
+    let mut multipliers = vec![0.0; active.len()];
+    for _ in 0..SWEEPS {
+        for ((of, square), multiplier) in active.iter().zip(&mut multipliers) {
+            let next = (*multiplier - product(gradient, of) / square).max(0.0);
+            let step = next - *multiplier;
+            gradient.iter_mut().zip(*of).for_each(|(g, c)| *g += step * c);
+            *multiplier = next;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample(gradient: &[f64], constraints: &[(f64, Vec<f64>)]) -> Sample {
+        Sample { value: -0.5, gradient: gradient.to_vec(), constraints: constraints.to_vec() }
+    }
+
+    #[test]
+    fn a_bound_or_a_constraint_holds_what_points_at_it() {
+        let (lower, upper) = ([-1.0; 2], [1.0; 2]);
+        let gain = |sample: &Sample, design: [f64; 2]| promised_gain(sample, &design, &lower, &upper);
+        // Down by 1 in the first, up by 0.5 in the second; both over the value of 0.5.
+        let free = sample(&[0.1, -0.2], &[]);
+        assert!((gain(&free, [0.0, 0.5]) - 0.4).abs() < 1e-15);
+        assert_eq!(gain(&free, [-1.0, 1.0]), 0.0);
+        // The optimum of a linear objective under x + 2y <= 1, at its bound and away from it.
+        let held = sample(&[-0.1, -0.2], &[(0.0, vec![1.0, 2.0])]);
+        assert!(gain(&held, [0.0, 0.5]) < 1e-15);
+        assert!(gain(&sample(&[-0.1, -0.2], &[(-0.5, vec![1.0, 2.0])]), [0.0, 0.0]) > 0.5);
+        // A constraint does not hold what leads away from it.
+        assert!((gain(&sample(&[0.1, 0.2], &[(0.0, vec![1.0, 2.0])]), [0.0, 0.0]) - 0.6).abs() < 1e-15);
+        // Two that hold it together.
+        let two = [(0.0, vec![1.0, 0.0]), (0.0, vec![1.0, 1.0])];
+        assert!(gain(&sample(&[-0.3, -0.2], &two), [0.0, 0.0]) < 1e-9);
+    }
+}
