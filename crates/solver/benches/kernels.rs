@@ -18,13 +18,13 @@ use fluxmorph_geometry::tet4::{Point, Tet4};
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_solver::boundary::Boundary;
 use fluxmorph_solver::coil::{Coil, CoilShape, Corner, Racetrack};
-use fluxmorph_solver::element::density;
 use fluxmorph_solver::element::impedance::{self, ImpedanceTriangle};
 use fluxmorph_solver::element::interface::{self, InterfaceTriangle};
 use fluxmorph_solver::element::lagrange::Lagrange;
 use fluxmorph_solver::element::point;
 use fluxmorph_solver::element::quadratic::LagrangeTet;
 use fluxmorph_solver::element::volume::{AphiTet, Coefficients, NodalField};
+use fluxmorph_solver::element::{Complex3, density};
 use fluxmorph_solver::functional::Functional;
 use fluxmorph_solver::material::Material;
 use fluxmorph_solver::{FieldModel, FieldModelSetup, Order, adjoint};
@@ -101,6 +101,8 @@ fn triangle_kernels<const F: usize>(
         b.iter(|| total(&ImpedanceTriangle::new(shape, black_box(corners), coefficient)));
     });
     group.bench_function(format!("impedance shape derivative, {order}"), |b| {
+        let all = |vector: &[Complex3; F]| vector.map(|[x, y, z]| [x, y, z, x]);
+        let (l, u) = (all(&l), all(&u));
         b.iter(|| impedance::shape_derivative(shape, black_box(corners), coefficient, &l, &u));
     });
 }

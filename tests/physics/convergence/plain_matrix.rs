@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm};
+use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
 
@@ -93,16 +93,27 @@ fn plain(mesh: &Mesh, model: &FieldModel, penalty: f64) -> Entries {
         }
     }
     for conductor in model.conductors() {
-        let skin_depth = conductor.material.skin_depth(model.angular_frequency()).expect("it conducts");
+        let SurfaceLaw::Impedance(material) = conductor.law else { panic!("none is perfect here") };
+        let skin_depth = material.skin_depth(model.angular_frequency()).expect("it conducts");
         // jω/Zs with Zs = (1+j)/(σδ).
-        let coefficient =
-            c64::new(0.0, model.angular_frequency() * conductor.material.conductivity * skin_depth)
-                / c64::new(1.0, 1.0);
+        let coefficient = c64::new(0.0, model.angular_frequency() * material.conductivity * skin_depth)
+            / c64::new(1.0, 1.0);
         for triangle in &conductor.surface {
             let normal = area_vector(triangle.map(|n| mesh.point(n)));
             let area = norm(normal);
+            let corner = |a: usize| mesh.point(triangle[a % 3]);
+            let slope = |a: usize| {
+                let opposite = sub(corner(a + 2), corner(a + 1));
+                cross(normal, opposite).map(|c| c / (2.0 * area * area))
+            };
             for (a, &na) in triangle.iter().enumerate() {
                 for (b, &nb) in triangle.iter().enumerate() {
+                    let (ga, gb) = (slope(a), slope(b));
+                    add((na, 3), (nb, 3), coefficient * (area * dot(ga, gb)));
+                    for i in 0..3 {
+                        add((na, i), (nb, 3), coefficient * (area / 3.0 * gb[i]));
+                        add((na, 3), (nb, i), coefficient * (area / 3.0 * ga[i]));
+                    }
                     let mass = area / if a == b { 6.0 } else { 12.0 };
                     for i in 0..3 {
                         for j in 0..3 {

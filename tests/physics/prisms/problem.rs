@@ -7,7 +7,9 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{centroid, volume};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, FieldSolution, Material};
+use fluxmorph_solver::{
+    Boundary, Conductor, FieldModel, FieldModelSetup, FieldSolution, Material, SurfaceLaw,
+};
 
 use super::boxed::{OBSERVATION, with_surface};
 use super::discretisation::Discretisation;
@@ -53,12 +55,17 @@ pub(super) fn set_up(prism: &Prism, mesh: &Mesh, penalty: f64) -> (Mesh, FieldMo
         part.map_or(Material::AIR, |part| part.kind.material())
     };
     let materials = names.iter().map(material).collect();
-    let impedance = prism.parts.iter().filter(|part| matches!(part.kind, Kind::Impedance { .. }));
-    let impedance_surfaces: Vec<Conductor> = impedance
-        .map(|part| Conductor {
-            name: part.name.to_owned(),
-            surface: left.topology().surface(part.name).expect("it was named").to_vec(),
-            material: part.kind.material(),
+    let law = |kind: &Kind| match kind {
+        Kind::Perfect => Some(SurfaceLaw::Perfect),
+        Kind::Impedance { .. } => Some(SurfaceLaw::Impedance(kind.material())),
+        _ => None,
+    };
+    let impedance_surfaces: Vec<Conductor> = prism
+        .parts
+        .iter()
+        .filter_map(|part| {
+            let surface = || left.topology().surface(part.name).expect("it was named").to_vec();
+            Some(Conductor { law: law(&part.kind)?, name: part.name.to_owned(), surface: surface() })
         })
         .collect();
     let boundaries =
