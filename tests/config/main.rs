@@ -11,6 +11,7 @@ mod changes;
 mod damage;
 mod folders;
 mod generated;
+mod hidden;
 mod limits;
 mod looks;
 mod meshes;

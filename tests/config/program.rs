@@ -95,7 +95,11 @@ impl Finished {
         {
             return Some(format!("`{word}` in:\n{stderr}"));
         }
-        if let Some(c) = stderr.chars().find(|c| c.is_control() && *c != '\n') {
+        let is_hidden = |c: &char| {
+            (c.is_control() && *c != '\n')
+                || ('\u{200b}'..='\u{202e}').contains(c) && !"–—‘’“”†‡•…".contains(*c)
+        };
+        if let Some(c) = stderr.chars().find(is_hidden) {
             return Some(format!("the control character {c:?} in:\n{stderr:?}"));
         }
         // A screen or two, whatever the length of the names in the file.

@@ -4,6 +4,7 @@
 
 mod cli;
 mod commands;
+mod designs;
 mod examples;
 mod field_pieces;
 mod folders;

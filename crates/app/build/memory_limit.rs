@@ -30,8 +30,8 @@ struct Room {
     bytes: u64,
     /// What limits it.
     by: &'static str,
-    /// Whether addresses count that are not used.
-    is_of_addresses: bool,
+    /// Bytes of addresses left out of it that are taken and not used.
+    addresses: u64,
 }
 
 /// Refuses a mesh that cannot fit, before it is made; of a sweep the meshes of all cases.
@@ -83,15 +83,7 @@ pub(crate) fn check_problem(
 fn check_estimate(estimate: u64, threads: usize, source: &SourceMap) -> Result<(), ConfigError> {
     let workspace = threads as u64 * workspace_of_thread();
     let Some(room) = room(workspace) else { return Ok(()) };
-    let what = match workspace {
-        _ if !room.is_of_addresses => "solving the problem".to_owned(),
-        0 => "solving the problem".to_owned(),
-        bytes => format!(
-            "solving the problem (beside {} for the dense kernels of {threads} threads)",
-            mebibytes(bytes)
-        ),
-    };
-    refuse_beyond(room, source, ("mesh", &what), estimate)
+    refuse_beyond(room, source, ("mesh", "solving the problem"), estimate)
 }
 
 /// Addresses that a thread takes for dense kernels of large factors: both operands in packed form, each as large as the cache
@@ -115,7 +107,12 @@ pub(crate) fn shortage(needed: usize) -> Option<String> {
 }
 
 fn beyond(room: Room, needed: u64) -> String {
-    format!("about {} of memory, and there are {} ({})", mebibytes(needed), mebibytes(room.bytes), room.by)
+    let beside = match room.addresses {
+        0 => String::new(),
+        bytes => format!(", beside {} for the dense kernels of all threads", mebibytes(bytes)),
+    };
+    let (needed, bytes) = (mebibytes(needed), mebibytes(room.bytes));
+    format!("about {needed} of memory, and there are {bytes} ({}{beside})", room.by)
 }
 
 fn refuse_beyond(
@@ -151,14 +148,14 @@ fn room(addresses: u64) -> Option<Room> {
     };
     let machine = kibibytes(&read("/proc/meminfo"), "MemAvailable:").map(|free| free.saturating_add(held));
     let candidates = [
-        (machine, "available on this machine", false),
-        (group_room(&read("/proc/self/cgroup"), held), "allowed by the control group", false),
-        (own("VmSize:", "Max address space"), "allowed by the limit on the address space", true),
-        (own("VmData:", "Max data size"), "allowed by the limit on data", true),
+        (machine, "available on this machine", 0),
+        (group_room(&read("/proc/self/cgroup"), held), "allowed by the control group", 0),
+        (own("VmSize:", "Max address space"), "allowed by the limit on the address space", addresses),
+        (own("VmData:", "Max data size"), "allowed by the limit on data", addresses),
     ];
     let known = candidates
         .into_iter()
-        .filter_map(|(bytes, by, is_of_addresses)| Some(Room { bytes: bytes?, by, is_of_addresses }));
+        .filter_map(|(bytes, by, addresses)| Some(Room { bytes: bytes?, by, addresses }));
     known.min_by_key(|room| room.bytes)
 }
 
@@ -279,7 +276,7 @@ mod tests {
     fn what_does_not_fit_is_refused_unless_forced() {
         let text = "[mesh]\ngenerator = \"block\"\n[analysis]\nfrequency = 0\n";
         let (_, source) = Config::from_str(text, "block.toml").expect("complete");
-        let small = Room { bytes: 1 << 20, by: "by the test", is_of_addresses: false };
+        let small = Room { bytes: 1 << 20, by: "by the test", addresses: 0 };
         assert!(refuse_beyond(small, &source, ("mesh", "it"), 1 << 20).is_ok());
         let error = refuse_beyond(small, &source, ("mesh", "it"), (1 << 20) + 1).expect_err("too much");
         assert!(

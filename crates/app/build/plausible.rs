@@ -37,17 +37,6 @@ pub(super) fn coil_faults(
                 format!("`coils[{i}].{key}` is {length:e} m, below any element of a mesh of {size:.4} m");
             let expected = format!("at least {:.1e} m, a millionth of the mesh", THINNEST * size);
             faults.push(source.diagnostic(&format!("coils[{i}].{key}"), message).expected(expected));
-        } else if let Some([lower, upper]) = box_outside(winding, written, mesh) {
-            let [low, high] = mesh.bounding_box();
-            let (place, own) = (millimetres(lower), millimetres(upper));
-            let message = format!("the coil `{}` lies outside the mesh, from {place} to {own}", built.name);
-            let expected =
-                format!("a place that meets the mesh, from {} to {}", millimetres(low), millimetres(high));
-            let fault = source.diagnostic(&format!("coils[{i}].center"), message).expected(expected);
-            faults.push(match unit_hint(config, mesh) {
-                Some(hint) => fault.help(hint),
-                None => fault,
-            });
         } else if let Some((region, place)) = matter_in(config, mesh, winding) {
             let name = &mesh.topology().region_names()[region.index()];
             let message = format!(
@@ -132,22 +121,6 @@ fn section(coil: &Coil) -> Vec<(&'static str, f64)> {
         CoilShape::Region(_) => return Vec::new(),
     };
     vec![("width", width), ("height", height)]
-}
-
-/// The box around a coil, where it does not meet that around the mesh [m].
-fn box_outside(winding: &Racetrack, written: &Coil, mesh: &Mesh) -> Option<[Point; 2]> {
-    let half = half_extent(written)?;
-    let (mut lower, mut upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for corner in 0..8 {
-        let sign = |d: usize| if corner >> d & 1 == 1 { half[d] } else { -half[d] };
-        let offset = winding.frame().vector([sign(0), sign(1), sign(2)]);
-        for d in 0..3 {
-            let x = winding.frame().centre()[d] + offset[d];
-            (lower[d], upper[d]) = (lower[d].min(x), upper[d].max(x));
-        }
-    }
-    let [low, high] = mesh.bounding_box();
-    (0..3).any(|d| upper[d] < low[d] || lower[d] > high[d]).then_some([lower, upper])
 }
 
 /// A region of iron or of a conductor that the current of a coil flows in, and where.

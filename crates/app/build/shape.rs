@@ -164,7 +164,8 @@ fn vanishing_faults(
             thickness * 1e3
         );
         let fault = source.diagnostic(key, message);
-        faults.push(fault.expected(format!("less by more than {:.3} mm", -least * 1e3)));
+        let share = bound * thickness / (thickness - least);
+        faults.push(fault.expected(format!("a bound nearer to zero than {:.3} mm", share * 1e3)));
     }
     faults
 }

@@ -164,6 +164,22 @@ fn read_tree(tree: &tree::Table, source: &SourceMap) -> (Option<Config>, Vec<Dia
     ((!diagnostics.iter().any(rests)).then_some(config), diagnostics)
 }
 
+/// An override by an empty table, which would leave all keys of the table as they are and looks as if it removed them.
+fn without_effect(root: &tree::Table, over: &tree::Table, path: &str) -> Option<Diagnostic> {
+    over.iter().find_map(|(key, node)| {
+        let path = tree::join(path, key);
+        let (known, own) = (root.get(key)?.content.table()?, node.content.table()?);
+        if !own.is_empty() || known.is_empty() {
+            return without_effect(known, own, &path);
+        }
+        let message =
+            format!("`{path}` = {{}} changes nothing: an override keeps the keys that it does not name");
+        let first = known.keys().next().map_or_else(String::new, |key| format!(", such as {path}.{key}=…"));
+        let fault = Diagnostic::new(path, node.key_span.clone(), message);
+        Some(fault.expected(format!("every key by itself{first}")))
+    })
+}
+
 /// Parse the file and lay the overrides over it.
 fn parse_documents(source: &SourceMap) -> Result<tree::Table, Vec<Diagnostic>> {
     let mut root = tree::Table::new();
@@ -171,7 +187,10 @@ fn parse_documents(source: &SourceMap) -> Result<tree::Table, Vec<Diagnostic>> {
     for (index, document) in source.documents.iter().enumerate() {
         match tree::parse(index, &document.text) {
             Ok(table) if index == 0 => root = table,
-            Ok(table) => diagnostics.extend(tree::overlay(&mut root, table, "").err().map(|one| *one)),
+            Ok(table) => {
+                diagnostics.extend(without_effect(&root, &table, ""));
+                diagnostics.extend(tree::overlay(&mut root, table, "").err().map(|one| *one));
+            }
             Err(errors) => diagnostics.extend(errors),
         }
     }

@@ -346,7 +346,9 @@ mod tests {
         let run =
             RunDirectory::create(&system_disk(), path, OverwritePolicy::Keep).expect("a new run directory");
         Manifest::new("run", 2).write(&run).expect("a manifest");
-        run
+        drop(run);
+        // Without the lock of the process that wrote it.
+        RunDirectory::open(&system_disk(), path).expect("a run")
     }
 
     #[test]
@@ -357,9 +359,11 @@ mod tests {
             .expect("made");
         assert!(run.fields().is_dir());
         // Broken off before the manifest: still nothing of anybody.
-        std::fs::write(run.path().join(".fluxmorph-abc"), "").expect("written");
-        assert!(RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Keep).is_ok());
-        assert!(!run.path().join(".fluxmorph-abc").exists());
+        let path = run.path().to_owned();
+        drop(run);
+        std::fs::write(path.join(".fluxmorph-abc"), "").expect("written");
+        assert!(RunDirectory::create(&system_disk(), &path, OverwritePolicy::Keep).is_ok());
+        assert!(!path.join(".fluxmorph-abc").exists());
     }
 
     #[test]

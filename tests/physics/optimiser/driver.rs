@@ -142,6 +142,27 @@ fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
 }
 
 #[test]
+fn a_search_that_a_small_trust_region_ends_has_not_converged() {
+    let (mut problem, settings) = quick(&[]);
+    // A thousandth of the bound range, within which nothing changes by as much as the tolerance.
+    shape(&mut problem).limits.inversion_share = 1e-5;
+    let mut events = Events::default();
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 60, ftol_rel: 0.01, ..settings }, &mut events);
+    println!("{:?} after {} rows", optimised.stop_reason, rows.len());
+    assert_eq!(optimised.stop_reason, StopReason::MeshLimited);
+    assert!(rows[optimised.best.evaluation].ratio > 0.9);
+    // The same tolerance in the whole of the bounds is convergence.
+    let (mut problem, settings) = quick(&[]);
+    let (optimised, _) = self::optimised(
+        &mut problem,
+        &Optimizer { max_evaluations: 60, ftol_rel: 0.01, ..settings },
+        &mut Events::default(),
+    );
+    assert_eq!(optimised.stop_reason, StopReason::ObjectiveConverged);
+}
+
+#[test]
 fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are_compared() {
     let (mut problem, settings) = quick(&[]);
     let n = shape(&mut problem).surface().variable_count();

@@ -43,6 +43,30 @@ fn a_full_disk_behind_standard_output_is_told() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn a_run_whose_result_cannot_be_printed_loses_nothing_else() {
+    let folder = tiny();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    finish(program().args(["run", "tiny.toml", "--json"]).current_dir(folder.path()).stdout(full))
+        .with(5, &["report: ", "cannot write to `standard output`"]);
+    let out = folder.path().join("runs/tiny");
+    assert!(out.join("report.html").is_file() && out.join("result.json").is_file());
+    assert_eq!(read_json(&out.join("manifest.json"))["status"], "stopped");
+}
+
+#[test]
+fn the_environment_asks_for_no_more_threads_than_the_command_line_may() {
+    let folder = tiny();
+    for arguments in [&["check", "tiny.toml"][..], &["run", "tiny.toml"], &["generate", "man"]] {
+        finish(program().args(arguments).current_dir(folder.path()).env("RAYON_NUM_THREADS", "5000"))
+            .with(2, &["RAYON_NUM_THREADS asks for 5000 threads", "at most 1024"]);
+    }
+    assert!(!folder.path().join("runs").exists());
+    finish(program().args(["check", "tiny.toml"]).current_dir(folder.path()).env("RAYON_NUM_THREADS", "2"))
+        .exits_with(0);
+}
+
+#[test]
 #[cfg(unix)]
 fn standard_error_that_is_closed_stops_nothing() {
     let folder = tiny();

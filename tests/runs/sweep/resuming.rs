@@ -4,6 +4,7 @@ use std::process::Child;
 
 use super::home::{Home, children_of};
 use crate::support::essence::assert_same;
+use crate::support::folder::read_text;
 use crate::support::program::{Finished, JOURNAL, send, wait_for_lock, wait_until};
 use crate::support::with_mesh_file;
 
@@ -102,11 +103,55 @@ fn killed_runs_go_on_and_end_as_if_they_had_not_been() {
     sweep.kill().expect("killed");
     sweep.wait().expect("it has ended");
     assert_eq!(children.len(), 2);
-    children.into_iter().for_each(|process| send("KILL", process));
+    // They may have ended with the sweep by now.
+    for process in children {
+        let _ = std::process::Command::new("kill").args(["-s", "KILL", &process.to_string()]).output();
+    }
     RUNS[..2].iter().for_each(|run| wait_for_lock(&home.path("out").join(run)));
     assert!(!home.path("out").join(RUNS[2]).exists(), "the third had not begun");
     let again = brought_to_its_end(&home, &["--jobs", "2"], "killed");
     assert_eq!((again.count(": resumed"), again.count(": begun")), (2, 1), "{}", again.stderr);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_sweep_that_is_killed_takes_its_runs_with_it() {
+    let home = Home::slower();
+    let mut sweep = start(&home, &["--jobs", "2"]);
+    wait_until("both runs at work", || RUNS[..2].iter().all(|run| home.rows(&format!("out/{run}")) > 1));
+    sweep.kill().expect("killed");
+    sweep.wait().expect("it has ended");
+    for run in &RUNS[..2] {
+        // As after SIGTERM: what they have computed is in a result.
+        let manifest = home.path(&format!("out/{run}/manifest.json"));
+        wait_until("the end of the run", || !read_text(&manifest).contains("\"status\": \"running\""));
+        assert_eq!(home.json(&format!("out/{run}/result.json"))["status"], "interrupted");
+        wait_for_lock(&home.path("out").join(run));
+    }
+    brought_to_its_end(&home, &["--jobs", "2"], "killed");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_second_signal_to_a_sweep_ends_its_runs_at_once() {
+    // Evaluations so long that none is complete between two signals.
+    let finer = ("cells = [2, 2, 1]", "cells = [16, 16, 8]");
+    let home = Home::with(&[("cells = [1, 1, 1]", "cells = [8, 8, 8]"), finer, finer]);
+    let sweep = start(&home, &[]);
+    let run = home.path("out").join(RUNS[0]);
+    wait_until("a run at work", || run.join("config.toml").exists());
+    let children = children_of(&sweep);
+    send("INT", sweep.id());
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    send("INT", sweep.id());
+    let output = sweep.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{}", String::from_utf8_lossy(&output.stderr));
+    let is_gone = |process: &u32| {
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        stat.is_empty() || stat.contains(") Z ")
+    };
+    wait_until("the end of the runs", || children.iter().all(is_gone));
+    assert!(!run.join("result.json").exists(), "it was to end at once");
 }
 
 #[test]

@@ -41,8 +41,8 @@ table! {
         stl: Vec<String> = NAMES, else Vec::new();
         /// `run`: after the optimisation the mesh is generated anew with a `refinement` so many times as large, and the initial
         /// and the best shape are analysed on it. What an optimiser gained from the errors of one mesh is lost on another. 0: no
-        /// check. With the default all nodes lie elsewhere, and the check costs two analyses without gradients on about twice
-        /// the elements. A mesh from a file or of the generator `block` has no check.
+        /// check. Mesh lines that the factor is too small to divide stay where they are. With the default the check costs two
+        /// analyses without gradients on about twice the elements. A mesh from a file or of the generator `block` has no check.
         verify_refinement: f64 = zero_or(REFINEMENTS) => 1.25;
         /// Whether a run ends with `report.html`. Default `true`: it is what one looks at first.
         report: bool = FLAG => true;

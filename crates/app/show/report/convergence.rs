@@ -84,13 +84,15 @@ impl Series<'_> {
         let point = |(row, value): (&Evaluation, f64)| [x.at(row.evaluation as f64), y.at(value)];
         let points: Vec<[f64; 2]> = self.known().map(point).collect();
         let rounds = self.rows.windows(2).filter(|pair| pair[1].round > pair[0].round).map(|pair| &pair[1]);
+        let rounds = rounds.take(MOST_ROUNDS).map(|row| (row.round, x.at(row.evaluation as f64 - 0.5)));
+        let rounds = labelled(rounds);
         let best = self.known().find(|(row, _)| Some(row.evaluation) == self.best);
         let content = html! {
             (grid(&x, &y, 5))
             (axes(&x, &y, ["evaluation", &self.title], [last.min(8), 5]))
-            @for (row, at) in rounds.take(MOST_ROUNDS).map(|row| (row, x.at(row.evaluation as f64 - 0.5))) {
-                (line("round", [at, y.pixels[0]], [at, y.pixels[1]]))
-                (text("tick", at + 3.0, TOP + 9.0, &format!("round {}", row.round)))
+            @for (round, at, is_labelled) in &rounds {
+                (line("round", [*at, y.pixels[0]], [*at, y.pixels[1]]))
+                @if *is_labelled { (text("tick", at + 3.0, TOP + 9.0, &format!("round {round}"))) }
             }
             @if let Some(bound) = self.bound {
                 (line("bound", [x.pixels[0], y.at(bound)], [x.pixels[1], y.at(bound)]))
@@ -143,5 +145,35 @@ impl Series<'_> {
             text += "; dotted lines: the mesh got a new reference";
         }
         text + "."
+    }
+}
+
+/// Width of a label such as `round 12`.
+const LABEL: f64 = 44.0;
+
+/// Rounds with their places, and whether there is room for a label behind the one before.
+fn labelled(rounds: impl Iterator<Item = (usize, f64)>) -> Vec<(usize, f64, bool)> {
+    let mut free = f64::NEG_INFINITY;
+    let mut label = |(round, at): (usize, f64)| {
+        let has_room = at >= free;
+        if has_room {
+            free = at + LABEL;
+        }
+        (round, at, has_room)
+    };
+    rounds.map(&mut label).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::labelled;
+
+    #[test]
+    fn labels_of_rounds_do_not_pile_up() {
+        let shown = |places: &[f64]| -> Vec<bool> {
+            labelled(places.iter().copied().enumerate()).into_iter().map(|(.., shown)| shown).collect()
+        };
+        assert_eq!(shown(&[60.0, 160.0, 260.0]), [true; 3]);
+        assert_eq!(shown(&[60.0, 70.0, 100.0, 105.0, 150.0]), [true, false, false, true, true]);
     }
 }

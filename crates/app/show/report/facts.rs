@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 use maud::{Markup, html};
 
 use super::data::RunData;
-use super::ticks::{duration, group_digits, number, trim_zeros};
+use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use crate::files::{Manifest, shell_word};
 
 /// Names and values in their order.
@@ -79,11 +79,11 @@ pub(super) fn provenance(data: &RunData) -> Markup {
     }
     let host = &manifest.host;
     let machine = format!("{}, {} {}", host.name, host.system, host.architecture);
-    facts.add("machine", format!("{machine}, {} threads used", manifest.threads));
+    facts.add("machine", format!("{machine}, {} used", threads(manifest.threads)));
     facts.add("started", manifest.started.clone());
     for resumption in &manifest.resumed {
         let place = format!("{} on {}", resumption.at, resumption.host.name);
-        let work = format!("{} evaluations, {} threads", resumption.evaluations, resumption.threads);
+        let work = format!("{} evaluations, {}", resumption.evaluations, threads(resumption.threads));
         facts.add("resumed", format!("{place}, after {work}"));
     }
     if let Some(finished) = &manifest.finished {

@@ -5,7 +5,7 @@ use maud::Markup;
 use super::data::RunData;
 use super::markup::{Card, header};
 use super::plane::bounds;
-use super::ticks::{duration, group_digits, number, trim_zeros};
+use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::{MeshConfig, Objective};
@@ -24,7 +24,7 @@ pub(super) fn head(data: &RunData) -> Markup {
         objective.map(|o| ("objective F", number(o.best, 5), unit(data).to_owned())).into_iter().collect()
     };
     if let Some(seconds) = data.manifest.seconds {
-        cards.push(("time", duration(seconds), format!("on {} threads", data.manifest.threads)));
+        cards.push(("time", duration(seconds), format!("on {}", threads(data.manifest.threads))));
     }
     if let Some(result) = &data.result {
         let unknowns = format!("{} unknowns", group_digits(result.mesh.unknowns));

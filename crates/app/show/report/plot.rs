@@ -10,7 +10,7 @@ use super::ticks::{Count, labels, linear, logarithmic, number};
 pub(crate) const WIDTH: f64 = 360.0;
 
 /// Room for the labels of the vertical axis, and on the other side.
-pub(crate) const LEFT: f64 = 46.0;
+pub(crate) const LEFT: f64 = 60.0;
 pub(crate) const RIGHT: f64 = 12.0;
 
 /// Room for the title of the vertical axis, and for ticks and title of the horizontal one.

@@ -8,7 +8,7 @@ use super::data::RunData;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use crate::build::{Audited, Outline};
-use crate::config::RegionModel;
+use crate::config::{Objective, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, TermResult};
 use crate::show::Evaluation;
 
@@ -118,7 +118,7 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     };
     html! {
         (constraints(&result.constraints))
-        @if let Some(objective) = &result.objective { (terms(&objective.terms)) }
+        @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (losses(&states))
         (probes(&states))
     }
@@ -134,19 +134,24 @@ fn constraints(constraints: &[ConstraintResult]) -> Markup {
     titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
 }
 
-fn terms(terms: &[TermResult]) -> Markup {
+fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
+    let unit = |kind: &str| {
+        let own = objective.into_iter().flat_map(Objective::terms);
+        let mut functionals = own.map(|term| &term.functional).filter(|own| own.kind.name() == kind);
+        functionals.next().map_or("in SI", |functional| functional.dimension().si_unit())
+    };
     let row = |t: &TermResult| {
         vec![
             t.kind.replace('_', " "),
             t.region.clone().unwrap_or_else(|| "whole mesh".to_owned()),
             t.frequency.map_or("all".to_owned(), hertz),
             trim_zeros(t.weight, 6),
-            number(t.value, 6),
+            format!("{} {}", number(t.value, 6), unit(&t.kind)),
             number(t.weight * t.value, 6),
         ]
     };
     let rows: Vec<Vec<String>> = terms.iter().map(row).collect();
-    let head = ["term", "region", "frequency", "weight", "value [SI]", "weighted"];
+    let head = ["term", "region", "frequency", "weight", "value", "weighted"];
     titled_table("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
 }
 

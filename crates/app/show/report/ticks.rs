@@ -94,6 +94,20 @@ pub(crate) fn trim_zeros(value: f64, decimals: usize) -> String {
     minus(if text == "-0" { "0" } else { text })
 }
 
+/// So many threads.
+pub(super) fn threads(count: usize) -> String {
+    if count == 1 { "1 thread".to_owned() } else { format!("{count} threads") }
+}
+
+/// A value of the configuration with all digits that it has, by a power of ten where it is very small or large.
+pub(super) fn given(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        1e-4..1e6 => trim_zeros(value, 12),
+        _ => number(value, 6),
+    }
+}
+
 /// Thousands set apart by thin spaces.
 pub(crate) fn group_digits(count: usize) -> String {
     let digits = count.to_string();

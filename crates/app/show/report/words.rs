@@ -1,6 +1,6 @@
 //! The configuration in plain words.
 
-use super::ticks::{number, trim_zeros};
+use super::ticks::{given, number, trim_zeros};
 use crate::config::{
     Algorithm, BodyKind, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal, Limit,
     ObjectiveKind, UpperBound, Weighting,
@@ -34,7 +34,7 @@ pub(super) fn functional(functional: &Functional) -> String {
     let what = match functional.kind {
         ObjectiveKind::FluxDensitySquared => sum("|B|²"),
         ObjectiveKind::Uniformity => {
-            let target = functional.target.unwrap_or_default().map(|c| number(c, 3)).join(", ");
+            let target = functional.target.unwrap_or_default().map(given).join(", ");
             sum(&format!("|B − ({target}) T|²"))
         }
         ObjectiveKind::FieldComponent => {
