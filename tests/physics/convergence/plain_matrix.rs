@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm};
+use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
 
@@ -93,14 +93,18 @@ fn plain(mesh: &Mesh, model: &FieldModel, penalty: f64) -> Entries {
         }
     }
     for conductor in model.conductors() {
-        let skin_depth = conductor.material.skin_depth(model.angular_frequency()).expect("it conducts");
+        let SurfaceLaw::Impedance(material) = conductor.law else { panic!("an impedance surface") };
+        let skin_depth = material.skin_depth(model.angular_frequency()).expect("it conducts");
         // jω/Zs with Zs = (1+j)/(σδ).
-        let coefficient =
-            c64::new(0.0, model.angular_frequency() * conductor.material.conductivity * skin_depth)
-                / c64::new(1.0, 1.0);
+        let coefficient = c64::new(0.0, model.angular_frequency() * material.conductivity * skin_depth)
+            / c64::new(1.0, 1.0);
         for triangle in &conductor.surface {
             let normal = area_vector(triangle.map(|n| mesh.point(n)));
             let area = norm(normal);
+            let slope = |a: usize| {
+                let [next, last] = [triangle[(a + 1) % 3], triangle[(a + 2) % 3]].map(|n| mesh.point(n));
+                cross(normal, sub(last, next)).map(|c| c / (2.0 * area * area))
+            };
             for (a, &na) in triangle.iter().enumerate() {
                 for (b, &nb) in triangle.iter().enumerate() {
                     let mass = area / if a == b { 6.0 } else { 12.0 };
@@ -109,7 +113,10 @@ fn plain(mesh: &Mesh, model: &FieldModel, penalty: f64) -> Entries {
                             let tangential = dot(unit(i), unit(j)) - normal[i] * normal[j] / (area * area);
                             add((na, i), (nb, j), coefficient * (mass * tangential));
                         }
+                        add((na, i), (nb, 3), coefficient * (area / 3.0 * slope(b)[i]));
+                        add((na, 3), (nb, i), coefficient * (area / 3.0 * slope(a)[i]));
                     }
+                    add((na, 3), (nb, 3), coefficient * (area * dot(slope(a), slope(b))));
                 }
             }
         }
