@@ -101,11 +101,11 @@ pub(super) fn contact_faults(
         let (name, other) = (&conductor.name, &topology.region_names()[touched(conductor)?]);
         let message =
             format!("`{name}` is replaced by its surface, but touches the meshed conductor `{other}`");
-        let expected = format!(
-            "air between the two, one of the models \"impedance\" and \"perfect\" for `{other}` as well, or model = \
-             \"volume\" for `{name}`"
-        );
-        Some(source.diagnostic(&format!("regions.{name}.model"), message).expected(expected))
+        Some(
+            source
+                .diagnostic(&format!("regions.{name}.model"), message)
+                .expected("air between the two, or one kind of model for both"),
+        )
     };
     conductors.iter().filter_map(fault).collect()
 }
