@@ -79,6 +79,37 @@ fn exposed_surface(
         .collect())
 }
 
+/// Conductors replaced by their surfaces that touch a meshed conductor: what flows from one to the other is in neither.
+pub(super) fn contact_faults(
+    config: &Config,
+    source: &SourceMap,
+    mesh: &Mesh,
+    conductors: &[Conductor],
+) -> Vec<Diagnostic> {
+    if config.analysis.frequencies().iter().all(|&f| f == 0.0) {
+        return Vec::new();
+    }
+    let topology = mesh.topology();
+    let conducts: Vec<bool> =
+        topology.region_names().iter().map(|name| super::material(config, name).conductivity > 0.0).collect();
+    let touched = |conductor: &Conductor| -> Option<usize> {
+        let around = conductor.surface.iter().flatten().flat_map(|&node| topology.elements_around(node));
+        let mut regions = around.map(|e| topology.region_of()[e.index()].index());
+        regions.find(|&region| conducts[region])
+    };
+    let fault = |conductor: &Conductor| {
+        let (name, other) = (&conductor.name, &topology.region_names()[touched(conductor)?]);
+        let message =
+            format!("`{name}` is replaced by its surface, but touches the meshed conductor `{other}`");
+        Some(
+            source
+                .diagnostic(&format!("regions.{name}.model"), message)
+                .expected("air between the two, or one kind of model for both"),
+        )
+    };
+    conductors.iter().filter_map(fault).collect()
+}
+
 /// The field models of a configuration on its mesh, one a frequency.
 pub(super) fn field_models(
     config: &Config,

@@ -141,7 +141,9 @@ fn build_problem(
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
-    let mut sink = DiagnosticSink::new(config, source, probe_faults(config, source, &full_mesh, &mesh));
+    let mut faults = probe_faults(config, source, &full_mesh, &mesh);
+    faults.extend(field::contact_faults(config, source, &mesh, &conductors));
+    let mut sink = DiagnosticSink::new(config, source, faults);
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     if conductors.is_empty() && !motion_alone {
         sink.take(check_conditions(&config.boundaries, source))?;

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::Grid;
-use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::unknowns::PSI;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SolverError, SurfaceLaw};
 
 const COPPER: Material = Material { relative_permeability: 1.0, conductivity: 6e7 };
 const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
@@ -63,4 +64,55 @@ fn a_conductor_that_a_flux_parallel_plane_cuts_needs_no_ground() {
     assert_eq!(grounded(&both), 0);
     let neither = model([1, 0, 0, 2, 0, 0, 0], materials, &[("y_min", Boundary::FluxNormal)]);
     assert_eq!(grounded(&neither), 2);
+}
+
+/// A cube of 27 cells without the middle one, with a conductor's surface on the given faces and one condition at most.
+fn around_a_hole(
+    law: SurfaceLaw,
+    faces: impl Fn(&Mesh, Vec<[NodeId; 3]>) -> Vec<[NodeId; 3]>,
+    boundary: Option<Boundary>,
+) -> Result<FieldModel, SolverError> {
+    let line = || (0..=3).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(), line(), line()])?;
+    let hole = |x: [f64; 3]| x.iter().all(|c| (0.01..0.02).contains(c));
+    let topology = grid.topology(&["air", "hole"], |x| RegionId(u32::from(hole(x))))?;
+    let (mesh, exposed) = Mesh::new(Arc::new(topology), grid.points())?.without_region(RegionId(1))?;
+    let surface = faces(&mesh, exposed);
+    let setup = FieldModelSetup {
+        frequency: if law == SurfaceLaw::Perfect { 0.0 } else { 50.0 },
+        materials: vec![Material::AIR; 2],
+        impedance_surfaces: vec![Conductor { name: "conductor".to_owned(), surface, law }],
+        boundaries: boundary.into_iter().map(|b| ("x_min".to_owned(), b)).collect(),
+        ..FieldModelSetup::default()
+    };
+    FieldModel::new(&mesh, setup)
+}
+
+fn psi_count(model: &FieldModel) -> usize {
+    model.topology().nodes().filter(|n| model.unknowns().dofs.equation(*n, PSI).is_some()).count()
+}
+
+#[test]
+fn the_surface_of_a_conductor_with_edges_has_a_potential_and_one_ground() {
+    for law in [SurfaceLaw::Impedance(COPPER), SurfaceLaw::Perfect] {
+        let model = around_a_hole(law, |_, hole| hole, Some(Boundary::FluxNormal)).expect("a model");
+        assert_eq!((grounded(&model), psi_count(&model)), (1, 7), "eight corners");
+    }
+}
+
+#[test]
+fn the_inner_surface_of_a_box_has_no_potential() {
+    let inner = |mesh: &Mesh, hole: Vec<[NodeId; 3]>| -> Vec<[NodeId; 3]> {
+        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let is_hole = |face: [NodeId; 3]| hole.iter().any(|&other| face_key(other) == face_key(face));
+        outer.map(|facet| facet.nodes).filter(|&nodes| !is_hole(nodes)).collect()
+    };
+    let model = around_a_hole(SurfaceLaw::Impedance(COPPER), inner, None).expect("a model");
+    assert_eq!((grounded(&model), psi_count(&model)), (0, 0));
+}
+
+#[test]
+fn a_surface_with_edges_and_nothing_else_is_refused() {
+    let err = around_a_hole(SurfaceLaw::Impedance(COPPER), |_, hole| hole, None).unwrap_err();
+    assert!(err.to_string().contains("a condition on an outer surface"), "{err}");
 }

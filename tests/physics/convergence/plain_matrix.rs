@@ -120,7 +120,10 @@ fn plain(mesh: &Mesh, model: &FieldModel, penalty: f64) -> Entries {
                             let tangential = dot(unit(i), unit(j)) - normal[i] * normal[j] / (area * area);
                             add((na, i), (nb, j), coefficient * (mass * tangential));
                         }
+                        add((na, i), (nb, 3), coefficient * (area / 3.0 * slope(b)[i]));
+                        add((na, 3), (nb, i), coefficient * (area / 3.0 * slope(a)[i]));
                     }
+                    add((na, 3), (nb, 3), coefficient * (area * dot(slope(a), slope(b))));
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::linear_solver::LinearSolver;
+use super::linear_solver::{LinearSolver, SolverMethod};
 use super::petsc::Petsc;
 use crate::config::section::Section;
 use crate::config::table::{Group, left_out, table};
@@ -40,6 +40,7 @@ table! {
         /// How they are solved on several ranks.
         petsc: Petsc = TABLE => Petsc::default();
     }
+    check = Analysis::check;
 }
 
 table! {
@@ -107,6 +108,25 @@ pub enum Frequencies {
 }
 
 impl Analysis {
+    /// Edge elements have no penalty, and no coarse level of their own.
+    fn check(&mut self, section: &Section<'_>) {
+        if self.elements != Elements::Edge {
+            return;
+        }
+        if self.penalty != 1.0 {
+            let message = format!("`{}.penalty` has no meaning for edge elements", section.path());
+            section.wrong("penalty", message, "no penalty, or elements = \"nodal\"");
+        }
+        if self.linear_solver.method == SolverMethod::TwoLevel {
+            let message = "edge elements have no coarse level for the method `two_level`";
+            section.wrong(
+                "linear_solver.method",
+                message,
+                "method = \"automatic\" or a factor, or elements = \"nodal\"",
+            );
+        }
+    }
+
     /// What a motion of the mesh alone is read with: magnetostatic.
     pub(super) fn static_field() -> Self {
         Self { frequencies: Frequencies::One(0.0), ..left_out() }
