@@ -73,12 +73,12 @@ fn block_from_file(home: &Path, name: &str) -> PathBuf {
 fn a_mesh_from_elsewhere_is_shown_where_the_user_allows_it() {
     let home = folder();
     let folder = block_from_file(home.path(), "../device.msh");
-    for (command, code) in [("run", 1), ("solve", 0)] {
+    for command in ["run", "solve"] {
         let out = folder.join(command);
         let config = folder.join("block.toml");
         let mut program = crate::support::program::command(&[&command, &config, &"--out", &out, &"--quiet"]);
         finish(&mut program).with(3, &["which leads upwards by `..`", "--allow-outside"]);
-        finish(program.arg("--allow-outside")).exits_with(code);
+        finish(program.arg("--allow-outside")).completed();
         // A run has made its page by itself.
         let own = std::fs::read_to_string(out.join("report.html")).ok();
         assert_eq!(own.is_some(), command == "run");

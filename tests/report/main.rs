@@ -22,8 +22,7 @@ fn shield(out: &Path, further: &[&str]) {
 /// A run of the block with texts of its configuration replaced.
 fn block(command: &str, folder: &Path, changes: &[(&str, &str)]) -> PathBuf {
     let out = folder.join("out");
-    let code = if command == "run" { 1 } else { 0 };
-    finish(&mut written("block", folder, changes).command(command, &out)).exits_with(code);
+    finish(&mut written("block", folder, changes).command(command, &out)).completed();
     out
 }
 

@@ -1,0 +1,51 @@
+//! `--design`: a result is solved again as the run came to it, and that of another device is refused.
+
+use std::path::Path;
+
+use crate::support::device::{Device, ROUNDS, shipped, written};
+use crate::support::folder::{RunFolder, count, number};
+use crate::support::program::{finish, folder};
+
+/// Steps so cautious that the mesh of the best design has gone through several references.
+fn in_rounds(home: &Path) -> Device {
+    written("device", home, &[ROUNDS, ("max_evaluations = 6", "max_evaluations = 14")])
+}
+
+#[test]
+fn the_result_of_a_run_in_rounds_is_solved_again_to_the_last_bit() {
+    let home = folder();
+    let device = in_rounds(home.path());
+    let [run, solved, again] = ["run", "solved", "again"].map(|name| home.path().join(name));
+    finish(&mut device.command("run", &run)).completed();
+    let result = RunFolder(run.clone()).result();
+    let rounds = result["design"]["rounds"].as_array().map_or(0, Vec::len);
+    assert!(rounds >= 2, "the run was to have rounds: {rounds}");
+    for (from, to) in [(&run, &solved), (&solved, &again)] {
+        finish(device.command("solve", to).arg("--design").arg(from.join("result.json"))).exits_with(0);
+        let own = RunFolder(to.clone()).result();
+        assert_eq!(number(&own, "/objective/best"), number(&result, "/objective/best"));
+        assert_eq!(own["mesh"]["worst_quality_final"], result["mesh"]["worst_quality_final"]);
+        assert_eq!(own["design"], result["design"]);
+    }
+}
+
+#[test]
+fn a_design_that_acts_at_other_places_is_refused_whatever_its_count() {
+    let home = folder();
+    let device = shipped("shield_quick", &[]).with("output.verify_refinement=0");
+    let other = device.clone().with("mesh.shield.plate=[\"120 mm\", \"220 mm\", \"10 mm\"]");
+    let [run, solved] = ["run", "solved"].map(|name| home.path().join(name));
+    finish(device.command("run", &run).args(["--max-evaluations", "2"])).completed();
+    let file = run.join("result.json");
+    finish(other.command("solve", &solved).arg("--design").arg(&file)).with(
+        3,
+        &["is that of another device: its variable 1 acts at (0.000, 20.000, -10.000) mm", "design.points_m"],
+    );
+    assert!(!solved.exists(), "nothing is written for it");
+    // The values alone are taken for what they are.
+    let result = RunFolder(run).result();
+    let list = home.path().join("list.json");
+    std::fs::write(&list, result["design"]["values_m"].to_string()).expect("written");
+    finish(other.command("solve", &solved).arg("--design").arg(&list)).exits_with(0);
+    assert_eq!(count(&RunFolder(solved).result(), "/evaluations"), 1);
+}
