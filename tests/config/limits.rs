@@ -179,7 +179,7 @@ fn a_problem_that_does_not_fit_is_refused_before_it_is_solved() {
     write(home.path(), "device.toml", repository_text("configs/sphere.toml"));
     for command in ["check", "solve"] {
         let says =
-            ["solving the problem (beside", "needs about", "allowed by the limit on data", "--force", "device.toml:6:"];
+            ["solving the problem needs about", "allowed by the limit on data", "--force", "device.toml:6:"];
         with_memory(home.path(), BETWEEN, command, &[]).refuses(3, &says);
     }
     assert_holds(home.path(), &["device.toml"]);

@@ -108,12 +108,6 @@ fn plain(mesh: &Mesh, model: &FieldModel, penalty: f64) -> Entries {
             };
             for (a, &na) in triangle.iter().enumerate() {
                 for (b, &nb) in triangle.iter().enumerate() {
-                    let (ga, gb) = (slope(a), slope(b));
-                    add((na, 3), (nb, 3), coefficient * (area * dot(ga, gb)));
-                    for i in 0..3 {
-                        add((na, i), (nb, 3), coefficient * (area / 3.0 * gb[i]));
-                        add((na, 3), (nb, i), coefficient * (area / 3.0 * ga[i]));
-                    }
                     let mass = area / if a == b { 6.0 } else { 12.0 };
                     for i in 0..3 {
                         for j in 0..3 {

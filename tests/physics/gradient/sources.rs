@@ -53,7 +53,8 @@ fn the_gradient_of_edge_elements_is_exact_around_an_impedance_surface_and_for_it
     let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]";
     for (order, settings) in [(1, Settings::default()), (2, brief())] {
         let setup = edge(order, &["mesh.shield.refinement=0.3", loss]);
-        all_hold(&setup, &wavy(&setup.problem), &settings);
+        // Not the wavy design, where the loss hardly changes along one of the directions and the difference is all truncation.
+        all_hold(&setup, &vec![2e-3; variables(&setup.problem)], &settings);
     }
 }
 
@@ -140,7 +141,7 @@ fn magnet(elements: &str, order: u8) -> String {
 fn the_gradient_with_a_magnet_that_moves_is_exact() {
     for (elements, order) in [("nodal", 1), ("nodal", 2), ("edge", 1), ("edge", 2)] {
         let setup = setup_of(&magnet(elements, order));
-        let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 4e-4 * (1.3 * k as f64).sin()).collect();
+        let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 4e-4 * (1.7 * k as f64).cos()).collect();
         assert_eq!(setup.problem.constraints().len(), 2);
         all_hold(&setup, &p, &brief());
     }

@@ -29,7 +29,7 @@ fn what_a_surface_cannot_carry_is_refused_at_its_key() {
     for (design, says) in [
         (
             format!("{bottom}\nsymmetry = [{{ axis = \"y\", at = \"121 mm\" }}]"),
-            &["52 | symmetry = [", "no partner in the mirror y = 121.000 mm", "(0.000, 0.000, -10.000) mm"][..],
+            &["53 | symmetry = [", "no partner in the mirror y = 121.000 mm", "(0.000, 0.000, -10.000) mm"][..],
         ),
         (
             format!("{bottom}\ngrid = [3, 4]\nsymmetry = [{{ axis = \"x\", at = \"61 mm\" }}]"),
