@@ -38,7 +38,7 @@ fn any_number_of_threads_writes_the_same_bits_with_every_linear_solver() {
     for method in METHODS {
         let device = block(home.path(), 8).with(&format!("analysis.linear_solver.method={method}"));
         same_on_all_threads(&match method {
-            "two_level" => device.with("analysis.order=2"),
+            "two_level" => device.with("analysis.elements=nodal").with("analysis.order=2"),
             _ => device,
         });
     }

@@ -130,13 +130,15 @@ impl RunDirectory {
         Self { disk: Arc::clone(disk), path: path.to_owned(), lock: None }
     }
 
-    /// The same, with other processes kept out; what was read before may be another's since.
+    /// The same, with other processes kept out; what was read before may be another's since. What a killed one left
+    /// half-written goes.
     ///
     /// # Errors
     /// [`OutputError::InUse`] where one works in it, or when the operating system refuses.
     pub fn locked(mut self) -> Result<Self, OutputError> {
         if self.lock.is_none() {
             self.acquire()?;
+            self.remove_unfinished(&self.path)?;
         }
         Ok(self)
     }
@@ -454,8 +456,10 @@ mod tests {
         for path in [&ours, &theirs, &folder.path().join("stay.stl"), &run.optimum()] {
             fs::write(path, b"x").expect("written");
         }
-        RunDirectory::create(&system_disk(), run.path(), OverwritePolicy::Replace).expect("replaced");
-        assert!(!ours.exists() && !run.optimum().exists());
+        let (path, optimum) = (run.path().to_owned(), run.optimum());
+        drop(run);
+        RunDirectory::create(&system_disk(), &path, OverwritePolicy::Replace).expect("replaced");
+        assert!(!ours.exists() && !optimum.exists());
         assert!(theirs.exists() && folder.path().join("stay.stl").exists());
     }
 
