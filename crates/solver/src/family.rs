@@ -2,9 +2,9 @@
 //!
 //! A carrier (a node; of edge elements an edge or a face) has up to four coefficients: `A_x, A_y, A_z, ψ`, or those of
 //! the functions in [`crate::element::edge::functions`]. All that physics asks is the field that they make, integrals of it,
-//! and the derivatives of these: [`Family`] is that, one virtual call an element; the kernels behind it are pure
+//! and the derivatives of these: `Family` is that, one virtual call an element; the kernels behind it are pure
 //! functions in [`crate::element`]. Assembly, which needs the matrices of all elements, is generic instead
-//! ([`Matrices`]).
+//! (`Matrices`).
 
 use std::sync::LazyLock;
 

@@ -10,7 +10,7 @@
 //! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
-//! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors ([`crate::gauge`]),
+//! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors (`gauge`),
 //! and the gradients' coefficients in and on conductors; on flux-parallel surfaces and where a field is applied, all that is
 //! tangential is known, as on perfect conductors. Flux-normal is natural.
 //!

@@ -3,7 +3,7 @@
 //! `(jω/Zs) ∫_S (A_t + ∇_tψ)·(w_t + ∇_t q)` with `Zs = (1+j)/(σδ)`, hence `jω/Zs = ωσδ (1+j)/2`. Without ψ on the surface
 //! a nodal `A`, which is smoother than the tangential `E` along a sharp edge of the conductor, would stop the currents that
 //! flow there. On a flat triangle with area `S`, unit normal `n̂`, `A_t = P A` with `P = I − n̂ n̂ᵀ`, surface gradients
-//! `g_m = n̂ × e_m / 2S` ([`super::triangle`]) and `c = jω/Zs`:
+//! `g_m = n̂ × e_m / 2S` (`triangle`) and `c = jω/Zs`:
 //!
 //! | rows × columns | entry of node `a` against node `b` |
 //! |---|---|
