@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::support::folder::{RunFolder, count, files_below, list, named, number, numbers, scalars, vectors};
 use crate::support::program::{fluxmorph, folder};
+use crate::support::repository;
 use crate::support::shield::{Model, height, on_quick, plate_bottom, quick};
 
 /// A design as a file that `--design` takes.
@@ -196,4 +197,16 @@ fn a_thicker_plate_shields_better_in_both_models() {
         assert!((thin / flat - 1.101).abs() < 0.1, "{model:?}: {}", thin / flat);
         assert!((thick / flat - 0.736).abs() < 0.1, "{model:?}: {}", thick / flat);
     }
+}
+
+#[test]
+fn nodal_elements_beside_iron_are_warned_of_with_the_cure() {
+    let pole = repository("configs/pole.toml");
+    let nodal = |order: &str| {
+        let order = format!("analysis.order={order}");
+        fluxmorph(&[&"check", &pole, &"--set", &"analysis.elements=nodal", &"--set", &order])
+    };
+    nodal("1").with(0, &["region `iron`", "wrong by factors", "analysis.elements = \"edge\""]);
+    nodal("2").with(0, &["region `iron`", "a tenth of its flux", "analysis.elements = \"edge\""]);
+    assert!(!fluxmorph(&[&"check", &pole]).with(0, &[]).stderr.contains("nodal elements"));
 }

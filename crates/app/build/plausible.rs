@@ -7,7 +7,10 @@ use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::{material, millimetres};
-use crate::config::{Boundaries, Coil, CoilShape, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
+use crate::config::{
+    Boundaries, Coil, CoilShape, Config, Diagnostic, ElementOrder, Elements, MeshConfig, RegionModel,
+    SourceMap,
+};
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.
@@ -77,7 +80,30 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         );
     }
     warnings.extend(unit_hint(config, mesh));
+    warnings.extend(beside_iron(config, mesh));
     warnings
+}
+
+/// What nodal elements cannot carry: the field beside iron without eddy currents, and the flux of a circuit of it
+/// (docs/verification.md, 2.8).
+fn beside_iron(config: &Config, mesh: &Mesh) -> Option<String> {
+    let (limit, wrong) = match (config.analysis.elements, config.analysis.order) {
+        (Elements::Edge, _) => return None,
+        (Elements::Nodal, ElementOrder::Linear) => (4.0, "weak fields beside it may be wrong by factors"),
+        (Elements::Nodal, ElementOrder::Quadratic) => (100.0, "a circuit of it may lose a tenth of its flux"),
+    };
+    let is_static = config.analysis.frequencies().contains(&0.0);
+    let names = mesh.topology().region_names().iter();
+    let iron = names.map(|name| (name, material(config, name)));
+    let (name, iron) = iron
+        .filter(|(_, m)| m.relative_permeability > limit && (is_static || m.conductivity == 0.0))
+        .max_by(|(_, a), (_, b)| a.relative_permeability.total_cmp(&b.relative_permeability))?;
+    Some(format!(
+        "region `{name}` has the relative permeability {}, and nodal elements of order {}: {wrong}. Set analysis.elements = \
+         \"edge\"",
+        iron.relative_permeability,
+        u8::from(config.analysis.order)
+    ))
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.
