@@ -89,8 +89,10 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
 fn beside_iron(config: &Config, mesh: &Mesh) -> Option<String> {
     let (limit, wrong) = match (config.analysis.elements, config.analysis.order) {
         (Elements::Edge, _) => return None,
-        (Elements::Nodal, ElementOrder::Linear) => (4.0, "weak fields beside it may be wrong by factors"),
-        (Elements::Nodal, ElementOrder::Quadratic) => (100.0, "a circuit of it may lose a tenth of its flux"),
+        (Elements::Nodal, ElementOrder::Linear) => {
+            (4.0, "circuits of it and weak fields beside it may be wrong by factors")
+        }
+        (Elements::Nodal, ElementOrder::Quadratic) => (100.0, "a circuit of it may lose most of its flux"),
     };
     let is_static = config.analysis.frequencies().contains(&0.0);
     let names = mesh.topology().region_names().iter();
