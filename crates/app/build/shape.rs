@@ -254,11 +254,9 @@ fn held_node_fault(
         Ok(i) => surface.directions()[i][axis] != 0.0,
         Err(_) => map.is_unknown(node, axis),
     };
-    let vertices = inputs.mesh.topology().node_count();
-    let (node, axis) =
-        unknowns.plane_nodes().filter(|(node, _)| node.index() < vertices).find_map(|(node, axes)| {
-            (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
-        })?;
+    let (node, axis) = unknowns.plane_nodes().find_map(|(node, axes)| {
+        (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
+    })?;
     let message = format!(
         "a plane with a condition at right angles to {} would lose its nodes at {}",
         ["x", "y", "z"][axis],

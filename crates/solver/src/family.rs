@@ -71,6 +71,11 @@ impl Cell {
     fn ascending(&self) -> Ascending {
         Ascending::new(&self.tet, self.order)
     }
+
+    /// Barycentric coordinates in ascending order of the vertices.
+    fn ascending_coordinates(&self, lambda: &[f64; 4]) -> [f64; 4] {
+        self.order.map(|place| lambda[usize::from(place)])
+    }
 }
 
 /// A real integral over an element or a face with `M` vertices, and its derivatives as in [`ElementIntegral`].
@@ -325,22 +330,14 @@ impl Matrices<10, 6> for Nodal<10, 6> {
 
 impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for Edge<N, M, F, K> {
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>) {
-        let lambda = cell.order.map(|place| lambda[usize::from(place)]);
+        let lambda = cell.ascending_coordinates(lambda);
         for (carrier, component, value, curl) in self.tet.functions_at(&cell.ascending(), &lambda) {
             each(carrier, component, value, curl);
         }
     }
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
-        let (mut potential, mut flux_density) = ([c64::default(); 3], [c64::default(); 3]);
-        self.functions(cell, lambda, &mut |carrier, component, value, curl| {
-            let u = coefficients[carrier][component];
-            for d in 0..3 {
-                potential[d] += value[d] * u;
-                flux_density[d] += curl[d] * u;
-            }
-        });
-        FieldPoint::of_edges(potential, flux_density)
+        self.tet.field_at(&cell.ascending(), &cell.ascending_coordinates(lambda), coefficients)
     }
 
     fn at_centroid(&self, cell: &Cell, coefficients: &[[c64; 4]]) -> FieldPoint {

@@ -49,8 +49,9 @@ const DEPENDENT: f64 = 1e-3;
 
 /// The recovered flux density [T] at a point of an element.
 ///
-/// `A` at the nodes of all elements that share a vertex with `element` and have its material (of edge elements `B` in them),
-/// fitted by least squares with a polynomial of one degree more than that of the elements; a further layer of elements where these do not determine it.
+/// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares with a
+/// polynomial of one degree more than that of the elements; of edge elements `B` in them, with one of their degree. A further
+/// layer of elements where these do not determine it.
 /// In a part of the material too small for any fit, the element's own mean.
 pub fn recovered_flux_density(
     solution: &FieldSolution,
@@ -74,7 +75,7 @@ pub fn recovered_flux_density(
             .collect();
         let fitted = match model.space().family() {
             ElementFamily::Nodal => fitted_curl(solution, model, mesh, &elements, point),
-            ElementFamily::Edge => fitted_mean(solution, model, mesh, &elements, point),
+            ElementFamily::Edge => fitted_flux_density(solution, model, mesh, &elements, point),
         };
         if let Some(flux_density) = fitted {
             return flux_density;
@@ -104,7 +105,7 @@ fn fitted_curl(
 
 /// The value at a point of the polynomial fitted to the flux densities in some elements, taken where they are of one order
 /// better: at the centroid, or at the four points of the rule of degree 2.
-fn fitted_mean(
+fn fitted_flux_density(
     solution: &FieldSolution,
     model: &FieldModel,
     mesh: &Mesh,

@@ -27,11 +27,11 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
-use crate::element::edge::functions::{EDGE_GRADIENTS, FACE_GRADIENTS, WHITNEY};
+use crate::element::edge::functions::{WHITNEY, is_gradient};
 use crate::error::SolverError;
 use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
 use crate::gauge;
-use crate::space::{ElementFamily, Order, Space};
+use crate::space::{ElementFamily, Space};
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
@@ -203,11 +203,11 @@ impl Unknowns {
             if known[i] {
                 return false;
             }
-            match branches.get(i) {
-                Some(&is_branch) if c == WHITNEY => !is_branch,
-                Some(_) => conducts[i] && has_gradient(EDGE_GRADIENTS, space.order(), c),
-                None => c < 2 || conducts[i] && FACE_GRADIENTS >> c & 1 == 1,
-            }
+            let is_rotational = match branches.get(i) {
+                Some(&is_branch) => c == WHITNEY && !is_branch,
+                None => c < 2,
+            };
+            is_rotational || conducts[i] && is_gradient(space.order(), i < edges.len(), c)
         });
         let planes = planes(mesh, boundaries)?;
         Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes })
@@ -281,11 +281,6 @@ impl Unknowns {
     pub(crate) fn has_frames(&self) -> bool {
         !self.frames.is_empty()
     }
-}
-
-/// Whether an edge has a gradient function of this component.
-fn has_gradient(gradients: u8, order: Order, component: usize) -> bool {
-    gradients >> component & 1 == 1 && (order == Order::Quadratic || component == 2)
 }
 
 /// The axes across conditioned planes, at every vertex on one.

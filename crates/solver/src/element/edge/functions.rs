@@ -25,9 +25,10 @@ use crate::space::Order;
 /// Component of the Whitney function of an edge.
 pub const WHITNEY: usize = 0;
 
-/// Bits of the components that are gradients, of edges and of faces.
-pub(crate) const EDGE_GRADIENTS: u8 = 0b1100;
-pub(crate) const FACE_GRADIENTS: u8 = 0b0100;
+/// Whether a component of an edge or of a face is a gradient.
+pub(crate) fn is_gradient(order: Order, is_edge: bool, component: usize) -> bool {
+    component == 2 || component == 3 && is_edge && order == Order::Quadratic
+}
 
 /// Local vertices of the faces of a simplex with ascending vertices.
 pub const ASCENDING_FACES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];

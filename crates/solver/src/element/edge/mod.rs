@@ -188,6 +188,11 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
         if N == 6 { Rule::Degree2 } else { Rule::Degree5 }
     }
 
+    /// The field at a point given by the ascending coordinates.
+    pub fn field_at(&self, tet: &Ascending, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
+        self.field(&self.at(lambda, 1.0), tet, coefficients)
+    }
+
     /// The field at the centroid.
     pub fn at_centroid(&self, tet: &Ascending, coefficients: &[[c64; 4]]) -> FieldPoint {
         self.field(&self.tables[Rule::Centroid as usize][0], tet, coefficients)
