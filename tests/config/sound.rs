@@ -1,6 +1,6 @@
 //! Sound configurations: their values in SI with every default filled in, and the resolved form, which reads back the same.
 
-use fluxmorph::build::build_mesh;
+use fluxmorph::build::{Mode, build_mesh, set_up};
 use fluxmorph::config::{Config, MeshConfig, SourceMap, resolved_toml};
 use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SphereParameters};
 
@@ -84,4 +84,20 @@ fn a_mesh_left_to_its_defaults_is_that_of_the_generator() {
             other => panic!("{other:?}"),
         }
     }
+}
+
+#[test]
+fn a_word_of_an_earlier_version_is_read_as_the_new_one_with_a_notice() {
+    let text = |word: &str| {
+        let base = repository_text("tests/config/bases/boxes.toml");
+        format!("{base}\n[objective]\nkind = \"{word}\"\nregion = \"air\"\ntarget = [0, 0, \"5 mT\"]\n")
+    };
+    let [(former, source), (now, silent)] = ["uniformity", "target_field"]
+        .map(|word| Config::from_str(&text(word), "device.toml").expect("both words are read"));
+    assert_eq!(former, now);
+    let notice =
+        "`objective.kind` = \"uniformity\" is called \"target_field\" now; the old word is still read";
+    assert_eq!((source.notices(), silent.notices()), (&[notice.to_owned()][..], &[][..]));
+    let setup = set_up(&former, &source, Mode::Inspection).expect("a sound device");
+    assert!(setup.warnings.iter().any(|warning| warning == notice), "{:?}", setup.warnings);
 }

@@ -46,7 +46,7 @@ const TABLES: &[&str] = &[
     "[boundaries.uniform_field]\n",
     "[objective]\n",
     "[[objective.terms]]\n",
-    "[[constraints]]\nkind = \"uniformity\"\n",
+    "[[constraints]]\nkind = \"target_field\"\n",
     "[[constraints]]\nkind = \"mass\"\n",
     "[[constraints]]\nkind = \"thickness\"\n",
     "[design]\n",

@@ -132,7 +132,7 @@ fn term(
         ObjectiveKind::FluxDensitySquared => {
             Functional::observation(mesh, region()?, Observed::Deviation { target: [0.0; 3], weighting })?
         }
-        ObjectiveKind::Uniformity => {
+        ObjectiveKind::TargetField => {
             let target = functional.target.unwrap_or_default();
             Functional::observation(mesh, region()?, Observed::Deviation { target, weighting })?
         }

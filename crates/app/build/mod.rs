@@ -138,6 +138,7 @@ fn build_problem(
     progress.stage(Stage::Mesh);
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     check_names(config, source, &full_mesh, &warnings)?;
+    warnings.extend_from_slice(source.notices());
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;

@@ -64,7 +64,8 @@ impl Config {
         let bare = SourceMap::of_documents(documents, directory, stem);
         let root = parse_documents(&bare).map_err(|diagnostics| bare.error(diagnostics))?;
         let mut source = bare.of_tree(&root);
-        let (mut config, mut diagnostics) = read_tree(&root, &source);
+        let Reading { mut config, mut diagnostics, notices } = read_tree(&root, &source);
+        source.notices = notices.into();
         let (count, values) = (case_count(&root), tree::value_count(&root));
         if count.saturating_mul(values) > MOST_REPEATED {
             let message = format!("{count} cases repeat a configuration of {values} values");
@@ -139,7 +140,7 @@ fn read_cases(
                 continue;
             }
         };
-        let (case, own) = read_tree(&tree, bare);
+        let Reading { config: case, diagnostics: own, .. } = read_tree(&tree, bare);
         // What is wrong without the case has been said.
         diagnostics.extend(own.into_iter().filter(|diagnostic| known.insert(diagnostic.clone())));
         sources.push(bare.of_tree(&tree));
@@ -151,17 +152,25 @@ fn read_cases(
     sources
 }
 
-/// The configuration of one tree, and its faults in the order of the text; none where a table is missing that all others
-/// rest on.
-fn read_tree(tree: &tree::Table, source: &SourceMap) -> (Option<Config>, Vec<Diagnostic>) {
+/// What was read from one tree.
+struct Reading {
+    /// None where a table is missing that all others rest on.
+    config: Option<Config>,
+    /// Faults in the order of the text.
+    diagnostics: Vec<Diagnostic>,
+    /// What should be written otherwise.
+    notices: Vec<String>,
+}
+
+fn read_tree(tree: &tree::Table, source: &SourceMap) -> Reading {
     let context = Context::new(known_keys);
     let root = Section::new(String::new(), tree, Span { document: 0, range: 0..0 }, &context);
     let mut config = Config::read_keys(&root);
     config.complete(&root, source);
     root.finish();
-    let diagnostics = context.sink.into_sorted();
+    let (diagnostics, notices) = (context.sink.into_sorted(), context.notices.into_inner());
     let rests = |diagnostic: &Diagnostic| ["mesh", "analysis"].contains(&diagnostic.path.as_str());
-    ((!diagnostics.iter().any(rests)).then_some(config), diagnostics)
+    Reading { config: (!diagnostics.iter().any(rests)).then_some(config), diagnostics, notices }
 }
 
 /// An override by an empty table, which would leave all keys of the table as they are and looks as if it removed them.

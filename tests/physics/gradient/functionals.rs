@@ -39,7 +39,7 @@ fn all_hold(problem: &Problem) {
 /// Constraints on what does not need eddy currents.
 const FIELD: &str = r#"
 [[constraints]]
-kind = "uniformity"
+kind = "target_field"
 region = "observation"
 target = ["0 T", "1 mT", "5 mT"]
 upper_ratio = 0.9

@@ -185,7 +185,7 @@ const APPLIED: &str = r#"
     flux_normal = ["z_min"]
     uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = [0, 0, "0.1 T"] }
     [objective]
-    kind = "uniformity"
+    kind = "target_field"
     weighting = "volume"
     region = "observation"
     target = [0, 0, "0.12 T"]

@@ -23,6 +23,7 @@ impl Prose<'_> {
                 (None, Some(words)) => {
                     let words: Vec<String> = words
                         .iter()
+                        .filter(|word| word.get("deprecated").is_none())
                         .filter_map(|word| Some(format!("`\"{}\"`", word["const"].as_str()?)))
                         .collect();
                     words.join(", ")

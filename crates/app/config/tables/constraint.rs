@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::design::COMPONENTS;
-use super::functional::{Functional, ObjectiveKind, Weighting, keys_of_the_kind};
+use super::functional::{Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
 use crate::config::table::kinds::{WORD, quantity};
 use crate::config::table::rules::{Rules, Then, is, present};
@@ -120,7 +120,7 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
             "else": { "oneOf": present(&BOUNDS) },
         }));
     let by_volume = is("weighting", &["volume"]);
-    let sums = is("kind", &["flux_density_squared", "uniformity"]);
+    let sums = is("kind", &[&["flux_density_squared"], &TARGET_FIELD[..]].concat());
     let units = [
         (json!({ "allOf": [sums, by_volume] }), Dimension::FluxDensityIntegral, Range::POSITIVE),
         (json!({ "allOf": [sums, { "not": by_volume }] }), Dimension::FluxDensitySquared, Range::POSITIVE),
@@ -195,7 +195,7 @@ choice! {
         /// As in `[objective]`.
         FluxDensitySquared = "flux_density_squared",
         /// As in `[objective]`.
-        Uniformity = "uniformity",
+        TargetField = "target_field" | "uniformity",
         /// As in `[objective]`.
         FieldComponent = "field_component",
         /// As in `[objective]`.
@@ -248,7 +248,7 @@ impl Group for Limit {
         };
         let field = match kind {
             Kind::FluxDensitySquared => ObjectiveKind::FluxDensitySquared,
-            Kind::Uniformity => ObjectiveKind::Uniformity,
+            Kind::TargetField => ObjectiveKind::TargetField,
             Kind::FieldComponent => ObjectiveKind::FieldComponent,
             Kind::Loss => ObjectiveKind::Loss,
             Kind::Energy => ObjectiveKind::Energy,

@@ -15,10 +15,10 @@ table! {
         /// The region it is measured in. Required, but for `energy`: without it the energy is that of everything that is
         /// meshed.
         region: Option<String> = TEXT;
-        /// For `flux_density_squared` and `uniformity`: how the cells of the region are weighted. Default `"point"`, as in the
+        /// For `flux_density_squared` and `target_field`: how the cells of the region are weighted. Default `"point"`, as in the
         /// paper.
         weighting: Option<Weighting> = WORD;
-        /// For `uniformity`, required: the flux density wished for [T].
+        /// For `target_field`, required: the flux density wished for [T].
         target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
         /// For `field_component`, required: a vector along the component; its length does not matter.
         #[also(not_all_zero)]
@@ -28,13 +28,16 @@ table! {
     }
 }
 
+/// The words of a deviation from a field that is wished for, with the one of earlier versions.
+pub(super) const TARGET_FIELD: [&str; 2] = ["target_field", "uniformity"];
+
 /// Which keys go with which kind.
 pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
     rules
         .unless("kind", &["energy"], Then { required: &["region"], refused: &[] })
         .when("kind", &["field_component", "loss", "energy"], Then { required: &[], refused: &["weighting"] })
-        .when("kind", &["uniformity"], Then { required: &["target"], refused: &[] })
-        .unless("kind", &["uniformity"], Then { required: &[], refused: &["target"] })
+        .when("kind", &TARGET_FIELD, Then { required: &["target"], refused: &[] })
+        .unless("kind", &TARGET_FIELD, Then { required: &[], refused: &["target"] })
         .when("kind", &["field_component"], Then { required: &["direction"], refused: &[] })
         .unless("kind", &["field_component"], Then { required: &[], refused: &["direction"] })
 }
@@ -44,8 +47,9 @@ choice! {
     pub enum ObjectiveKind {
         /// Σ w B·B* [T²; by volume T² m³]. The region must not move.
         FluxDensitySquared = "flux_density_squared",
-        /// Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is to vanish. The region must not move.
-        Uniformity = "uniformity",
+        /// Deviation from a field that is wished for: Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is
+        /// to vanish. A field that is even but of another strength counts as deviating. The region must not move.
+        TargetField = "target_field" | "uniformity",
         /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. The region must not move.
         FieldComponent = "field_component",
         /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
@@ -70,7 +74,7 @@ choice! {
 impl ObjectiveKind {
     /// Whether the cells are weighted.
     fn sums_over_cells(self) -> bool {
-        matches!(self, Self::FluxDensitySquared | Self::Uniformity)
+        matches!(self, Self::FluxDensitySquared | Self::TargetField)
     }
 }
 
@@ -83,7 +87,7 @@ impl Functional {
         }
         for (key, example, wanted) in [
             ("weighting", None, kind.sums_over_cells()),
-            ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::Uniformity),
+            ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::TargetField),
             ("direction", Some("direction = [0, 0, 1]"), kind == ObjectiveKind::FieldComponent),
         ] {
             match (section.has(key), example) {
@@ -120,10 +124,10 @@ impl Functional {
     /// Unit of its values.
     pub fn dimension(&self) -> Dimension {
         match (self.kind, self.weighting) {
-            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::Uniformity, Some(Weighting::Volume)) => {
+            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField, Some(Weighting::Volume)) => {
                 Dimension::FluxDensityIntegral
             }
-            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::Uniformity, _) => {
+            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField, _) => {
                 Dimension::FluxDensitySquared
             }
             (ObjectiveKind::FieldComponent, _) => Dimension::FluxDensity,

@@ -24,6 +24,8 @@ pub struct SourceMap {
     pub(in crate::config) stem: String,
     /// The same texts with the places of every case of `[[morph.case]]`.
     pub(in crate::config) cases: Arc<[SourceMap]>,
+    /// What is read and should be written otherwise.
+    pub(in crate::config) notices: Arc<[String]>,
 }
 
 impl SourceMap {
@@ -41,6 +43,7 @@ impl SourceMap {
             directory,
             stem: stem.to_owned(),
             cases: [].into(),
+            notices: [].into(),
         }
     }
 
@@ -54,6 +57,11 @@ impl SourceMap {
     /// The file first, then the overrides in the order given.
     pub fn documents(&self) -> &[Document] {
         &self.documents
+    }
+
+    /// What is read and should be written otherwise: words of earlier versions.
+    pub fn notices(&self) -> &[String] {
+        &self.notices
     }
 
     /// The text of the file as given, without overrides.

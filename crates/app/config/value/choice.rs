@@ -10,13 +10,16 @@ pub(in crate::config) trait Choice: Copy + 'static {
     const CHOICES: &'static [(&'static str, Self)];
     /// Lines that describe each variant.
     const MEANINGS: &'static [&'static [&'static str]];
+    /// Words of earlier versions and the words that took their place: still read, with a notice.
+    const FORMER: &'static [(&'static str, &'static str)];
 }
 
 /// Declares such an enum: the word, the variant, its meaning, its form in `resolved.toml` and in the schema stay together.
+/// A word of earlier versions stands behind the new one: `"new" | "old"`.
 macro_rules! choice {
     (
         $(#[doc = $about:literal])*
-        $vis:vis enum $name:ident { $($(#[doc = $meaning:literal])* $variant:ident = $word:literal,)+ }
+        $vis:vis enum $name:ident { $($(#[doc = $meaning:literal])* $variant:ident = $word:literal $(| $former:literal)?,)+ }
     ) => {
         $(#[doc = $about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -25,7 +28,7 @@ macro_rules! choice {
         }
 
         $crate::config::value::choice::choice!(
-            @impl $(#[doc = $about])* $name { $($(#[doc = $meaning])* $variant = $word,)+ }
+            @impl $(#[doc = $about])* $name { $($(#[doc = $meaning])* $variant = $word $(| $former)?,)+ }
         );
 
         impl $name {
@@ -50,13 +53,14 @@ macro_rules! choice {
     };
     (
         @impl $(#[doc = $about:literal])*
-        $name:ident { $($(#[doc = $meaning:literal])* $variant:ident = $word:literal,)+ }
+        $name:ident { $($(#[doc = $meaning:literal])* $variant:ident = $word:literal $(| $former:literal)?,)+ }
     ) => {
         impl $crate::config::value::choice::Choice for $name {
             const NAME: &'static str = stringify!($name);
             const ABOUT: &'static [&'static str] = &[$($about),*];
             const CHOICES: &'static [(&'static str, Self)] = &[$(($word, Self::$variant)),+];
             const MEANINGS: &'static [&'static [&'static str]] = &[$(&[$($meaning),*]),+];
+            const FORMER: &'static [(&'static str, &'static str)] = &[$($(($former, $word),)?)+];
         }
     };
 }

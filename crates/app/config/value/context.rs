@@ -1,5 +1,7 @@
 //! What all tables of one reading share.
 
+use std::cell::RefCell;
+
 use super::known_keys::KnownKeys;
 use crate::config::text::diagnostic::DiagnosticSink;
 
@@ -7,6 +9,8 @@ use crate::config::text::diagnostic::DiagnosticSink;
 pub(in crate::config) struct Context {
     /// What is wrong.
     pub(in crate::config) sink: DiagnosticSink,
+    /// What is read and should be written otherwise.
+    pub(in crate::config) notices: RefCell<Vec<String>>,
     /// The keys of all tables, for advice.
     pub(in crate::config) keys: fn() -> &'static KnownKeys,
 }
@@ -14,7 +18,7 @@ pub(in crate::config) struct Context {
 impl Context {
     /// For a reading with advice from these keys.
     pub(in crate::config) fn new(keys: fn() -> &'static KnownKeys) -> Self {
-        Self { sink: DiagnosticSink::default(), keys }
+        Self { sink: DiagnosticSink::default(), notices: RefCell::default(), keys }
     }
 }
 

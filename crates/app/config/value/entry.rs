@@ -26,6 +26,13 @@ impl<'a> Entry<'a> {
         self.context.sink.push(suggest(diagnostic, word, known));
     }
 
+    /// Record that a word of earlier versions stands where another one does now.
+    pub(in crate::config) fn former(&self, former: &str, word: &str) {
+        let notice =
+            format!("`{}` = \"{former}\" is called \"{word}\" now; the old word is still read", self.path);
+        self.context.notices.borrow_mut().push(notice);
+    }
+
     /// The items of a list of `what`.
     pub(in crate::config) fn items(&self, what: &str) -> Option<Vec<Entry<'a>>> {
         let Content::Array(items) = &self.node.content else {

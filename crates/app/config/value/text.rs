@@ -181,6 +181,9 @@ impl<T: Choice> Value<Word> for T {
     fn read(_: &Word, entry: &Entry<'_>) -> Option<Self> {
         let word = String::read(&Text, entry)?;
         let found = choice_named(&word);
+        if let Some((former, now)) = former::<T>(&word) {
+            entry.former(former, now);
+        }
         if found.is_none() {
             let message = format!("`{}` cannot be `{}`", entry.path, shown(&word));
             entry.unknown(message, &word, &words::<T>());
@@ -191,7 +194,12 @@ impl<T: Choice> Value<Word> for T {
     fn schema(_: &Word, definitions: &mut Definitions) -> Keywords {
         let words = || {
             let word = |((word, _), meaning): (&(&str, T), &&[&str])| json!({ "description": described(meaning), "type": "string", "const": word });
-            let words: Vec<Json> = T::CHOICES.iter().zip(T::MEANINGS).map(word).collect();
+            let former = |(former, word): &(&str, &str)| {
+                let meaning = format!("What `{word}` was called before.");
+                json!({ "description": meaning, "type": "string", "const": former, "deprecated": true })
+            };
+            let words = T::CHOICES.iter().zip(T::MEANINGS).map(word);
+            let words: Vec<Json> = words.chain(T::FORMER.iter().map(former)).collect();
             json!({ "description": described(T::ABOUT), "oneOf": words })
         };
         definitions.reference(T::NAME, |_| words())
@@ -224,7 +232,13 @@ impl<T: Choice> Value<Word> for Vec<T> {
 
 /// The choice that a word stands for.
 pub(in crate::config) fn choice_named<T: Choice>(word: &str) -> Option<T> {
+    let word = former::<T>(word).map_or(word, |(_, now)| now);
     T::CHOICES.iter().find(|(name, _)| *name == word).map(|(_, choice)| *choice)
+}
+
+/// A word of earlier versions, with the one that took its place.
+fn former<T: Choice>(word: &str) -> Option<(&'static str, &'static str)> {
+    T::FORMER.iter().find(|(former, _)| *former == word).copied()
 }
 
 fn words<T: Choice>() -> Vec<&'static str> {

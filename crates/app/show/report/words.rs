@@ -33,7 +33,7 @@ pub(super) fn functional(functional: &Functional) -> String {
     };
     let what = match functional.kind {
         ObjectiveKind::FluxDensitySquared => sum("|B|²"),
-        ObjectiveKind::Uniformity => {
+        ObjectiveKind::TargetField => {
             let target = functional.target.unwrap_or_default().map(given).join(", ");
             sum(&format!("|B − ({target}) T|²"))
         }
