@@ -26,9 +26,7 @@ pub(crate) fn main() -> Result<(), SolverError> {
         &mesh,
         FieldModelSetup {
             frequency: 60.0,
-            penalty: 1.0,
             materials,
-            impedance_surfaces: Vec::new(),
             coils: vec![coil],
             boundaries: ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
                 .map(|surface| (surface.to_owned(), Boundary::FluxParallel))

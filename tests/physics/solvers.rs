@@ -3,7 +3,7 @@
 
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
-use fluxmorph_solver::{FieldModel, FieldModelSetup, SolverError};
+use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, SolverError};
 
 use crate::problems::variables;
 use crate::support::{norm, relative_difference, setup};
@@ -136,6 +136,7 @@ fn a_method_that_does_not_converge_is_followed_by_a_more_robust_one() {
     let problem = problem(MESHED, &[REUSED]);
     let (mesh, model) = (problem.original(), &problem.states()[0]);
     let setup = |max_iterations| FieldModelSetup {
+        family: ElementFamily::Nodal,
         linear_solver: LinearSolverSettings {
             method: LinearSolver::Fixed(Method::Incomplete),
             max_iterations,

@@ -114,7 +114,7 @@ pub(super) fn contact_faults(
 pub(super) fn field_models(
     config: &Config,
     mesh: &Mesh,
-    impedance_surfaces: &[Conductor],
+    conductors: &[Conductor],
     coils: &[coil::Coil],
     share: Option<&Ownership>,
 ) -> Result<Vec<FieldModel>, Error> {
@@ -124,7 +124,7 @@ pub(super) fn field_models(
         models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
             Some(model) => model.at_frequency(mesh, frequency)?,
             None => {
-                let sources = (impedance_surfaces.to_vec(), coils.to_vec());
+                let sources = (conductors.to_vec(), coils.to_vec());
                 field_model(config, mesh, frequency, sources, share)?
             }
         });
@@ -136,7 +136,7 @@ fn field_model(
     config: &Config,
     mesh: &Mesh,
     frequency: f64,
-    (impedance_surfaces, coils): (Vec<Conductor>, Vec<coil::Coil>),
+    (conductors, coils): (Vec<Conductor>, Vec<coil::Coil>),
     share: Option<&Ownership>,
 ) -> Result<FieldModel, Error> {
     let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
@@ -157,7 +157,7 @@ fn field_model(
         order: order(config),
         materials,
         remanence: remanences(config, mesh.topology()),
-        impedance_surfaces,
+        conductors,
         coils,
         boundaries,
         linear_solver,

@@ -241,11 +241,10 @@ fn held_node_fault(
 ) -> Option<Diagnostic> {
     let (space, unknowns) = (model.space(), model.unknowns());
     let moves = |node: NodeId| may_move(surface, map, node);
-    let place = |node: NodeId| millimetres(space.position(inputs.mesh, node));
-    if let Some(node) = unknowns.held_nodes().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
+    if let Some(held) = unknowns.held_carriers().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
         let message = format!(
             "a surface with a condition that is curved, oblique or has an applied field would move at {}",
-            place(node)
+            millimetres(space.position(inputs.mesh, held))
         );
         let fault = inputs.source.diagnostic("remesh", message);
         return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
@@ -260,7 +259,7 @@ fn held_node_fault(
     let message = format!(
         "a plane with a condition at right angles to {} would lose its nodes at {}",
         ["x", "y", "z"][axis],
-        place(node)
+        millimetres(inputs.mesh.point(node))
     );
     let fault = inputs.source.diagnostic("remesh", message);
     Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))

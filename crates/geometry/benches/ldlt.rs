@@ -48,7 +48,7 @@ fn system(cells: usize) -> (DofMap<3>, Arc<CsrStructure>) {
     let nodes = mesh.points().len();
     let dofs = DofMap::<3>::new(nodes, |_, _| true);
     let volumes = ElementGroup::new(nodes, tets, couplings);
-    let surfaces = ElementGroup::<3>::new(nodes, Vec::new(), Vec::new());
+    let surfaces = ElementGroup::<3>::new(nodes, Vec::<[fluxmorph_geometry::NodeId; 3]>::new(), Vec::new());
     let structure = Arc::clone(BlockPattern::symmetric(&dofs, &volumes, &surfaces).structure());
     (dofs, structure)
 }

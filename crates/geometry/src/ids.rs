@@ -38,6 +38,19 @@ index_type! {
     NodeId
 }
 index_type! {
+    /// What carries unknowns of a discretisation: a node, an edge or a face, in the numbering of its space.
+    CarrierId
+}
+
+impl From<NodeId> for CarrierId {
+    /// Where the nodes are the carriers, in their own order.
+    #[inline]
+    fn from(node: NodeId) -> Self {
+        Self(node.0)
+    }
+}
+
+index_type! {
     /// A tetrahedron.
     ElementId
 }

@@ -1,6 +1,6 @@
-//! Which elements touch each node, in compressed rows.
+//! Which elements touch each node, or other carrier of unknowns, in compressed rows.
 
-use crate::ids::{ElementId, NodeId};
+use crate::ids::{CarrierId, ElementId};
 
 /// Elements around each node, ascending.
 #[derive(Clone, Debug)]
@@ -14,10 +14,14 @@ impl Incidence {
     ///
     /// # Panics
     /// If a node is not below `node_count`.
-    pub fn new<const N: usize>(node_count: usize, elements: &[[NodeId; N]]) -> Self {
+    pub fn new<const N: usize, I>(node_count: usize, elements: &[[I; N]]) -> Self
+    where
+        I: Copy + Into<CarrierId>,
+    {
+        let place = |&id: &I| -> usize { id.into().index() };
         let mut offsets = vec![0u32; node_count + 1];
         for n in elements.iter().flatten() {
-            offsets[n.index() + 1] += 1;
+            offsets[place(n) + 1] += 1;
         }
         for i in 0..node_count {
             offsets[i + 1] += offsets[i];
@@ -26,7 +30,7 @@ impl Incidence {
         let mut around = vec![ElementId(0); elements.len() * N];
         for (e, nodes) in elements.iter().enumerate() {
             for n in nodes {
-                let slot = &mut cursor[n.index()];
+                let slot = &mut cursor[place(n)];
                 around[*slot as usize] = ElementId::new(e);
                 *slot += 1;
             }
@@ -36,8 +40,8 @@ impl Incidence {
 
     /// Elements that touch `node`, ascending.
     #[inline]
-    pub fn around(&self, node: NodeId) -> &[ElementId] {
-        let i = node.index();
+    pub fn around(&self, node: impl Into<CarrierId>) -> &[ElementId] {
+        let i = node.into().index();
         &self.elements[self.offsets[i] as usize..self.offsets[i + 1] as usize]
     }
 }

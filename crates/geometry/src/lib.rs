@@ -25,7 +25,7 @@ pub mod tet4;
 pub mod topology;
 
 pub use error::MeshError;
-pub use ids::{ElementId, NodeId, RegionId};
+pub use ids::{CarrierId, ElementId, NodeId, RegionId};
 pub use mesh::Mesh;
 pub use parallel::Partition;
 pub use topology::{Facet, Topology};

@@ -292,10 +292,10 @@ impl Plan {
         let Body { topology, elements, .. } = &*body;
         let conditions = NodeConditions::new(reference, &setup, elements)?;
         let node_count = topology.node_count();
-        let unknowns = Arc::new(DofMap::<3>::new(node_count, |node, c| {
+        let unknowns = Arc::new(DofMap::<3>::of_nodes(node_count, |node, c| {
             setup.kinematic_constraint.allows(c) && conditions.is_unknown(node, c)
         }));
-        let prescribed = DofMap::<3>::new(node_count, |node, _| conditions.is_design[node.index()]);
+        let prescribed = DofMap::<3>::of_nodes(node_count, |node, _| conditions.is_design[node.index()]);
         restraint::check(reference, elements, &unknowns)?;
 
         // Positions in the body of those at a design node: no other couples to the design.
@@ -342,7 +342,7 @@ pub(crate) fn bind_pattern(
     connectivity: Vec<[NodeId; 4]>,
 ) -> (BlockPattern<3>, BoundGroup<4>) {
     let couplings = vec![Coupling::full(3); connectivity.len()];
-    let group = ElementGroup::new(rows.node_count(), connectivity, couplings);
+    let group = ElementGroup::new(rows.carrier_count(), connectivity, couplings);
     let pattern = BlockPattern::rectangular(rows, columns, &group);
     let group = pattern.bind(&group);
     (pattern, group)

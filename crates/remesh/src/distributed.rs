@@ -14,7 +14,7 @@ use fluxmorph_geometry::parallel::{
 };
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::body::Body;
 use crate::deform::bind_pattern;
@@ -144,10 +144,10 @@ impl ElasticHandler {
         moving: &[ElementId],
     ) -> Self {
         let topology = &body.topology;
-        let owner = |node: NodeId| ownership.partition.owner_of(node);
+        let owner = |carrier: CarrierId| ownership.partition.owner_of(NodeId::new(carrier.index()));
         let layout =
             Arc::new(RowLayout::new(unknowns, ownership.group.size(), ownership.group.rank(), owner));
-        let rows = DofMap::new(topology.node_count(), |node, c| {
+        let rows = DofMap::of_nodes(topology.node_count(), |node, c| {
             ownership.owns(node) && unknowns.equation(node, c).is_some()
         });
         let touches = |e: ElementId| topology.tet(e).iter().any(|&n| ownership.owns(n));

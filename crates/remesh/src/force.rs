@@ -46,7 +46,7 @@ mod tests {
         let tets = vec![[0, 1, 2, 3].map(NodeId), [4, 1, 3, 2].map(NodeId)];
         let topology = Topology::new(5, tets, vec!["all".into()], vec![RegionId(0); 2]).expect("two tets");
         let part = |e, z| Subregion { force: [0.0, 0.0, z], ..Subregion::new("part", vec![ElementId(e)]) };
-        let unknowns = DofMap::<3>::new(5, |node, c| c == 2 && node != NodeId(3));
+        let unknowns = DofMap::<3>::of_nodes(5, |node, c| c == 2 && node != NodeId(3));
         let force = nodal_force(&topology, &[part(0, 1.0), part(1, 3.0)], &unknowns);
         assert_eq!(force, Some(vec![1.0, 2.0, 2.0, 3.0]));
         assert_eq!(nodal_force(&topology, &[part(0, 0.0)], &unknowns), None);

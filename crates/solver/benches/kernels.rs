@@ -27,7 +27,7 @@ use fluxmorph_solver::element::volume::{AphiTet, Coefficients, NodalField};
 use fluxmorph_solver::element::{Complex3, density};
 use fluxmorph_solver::functional::Functional;
 use fluxmorph_solver::material::Material;
-use fluxmorph_solver::{FieldModel, FieldModelSetup, Order, adjoint};
+use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Order, adjoint};
 
 const VERTICES: [Point; 4] = [[0.1, 0.2, -0.1], [1.3, 0.1, 0.2], [0.3, 0.9, 0.1], [0.2, 0.3, 1.4]];
 const AIR: Coefficients = Coefficients { reluctivity: 1.7, extra_penalty: 0.0, eddy: c64::new(0.0, 0.0) };
@@ -127,6 +127,7 @@ fn plate(refinement: f64, order: Order) -> (FieldModel, Mesh) {
     let coil = Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred);
     let shape = CoilShape::Racetrack(coil.expect("the sizes are positive"));
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 60.0,
         order,
         materials: topology.region_names().iter().map(material).collect(),

@@ -8,7 +8,7 @@ use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix, c64,
 };
 use fluxmorph_geometry::parallel::Ownership;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
 use crate::error::SolverError;
@@ -32,7 +32,7 @@ pub(crate) struct Discretisation {
     groups: Box<dyn Bound>,
     /// Elements and triangles of the groups, where these are not all.
     pub(crate) local: Option<LocalEntities>,
-    /// Elements and surface triangles with a node whose `A` is prescribed.
+    /// Elements and surface triangles with a carrier whose `A` is prescribed.
     lifted: (Vec<ElementId>, Vec<usize>),
 }
 
@@ -74,7 +74,7 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
         let (elements, triangles) = &of.lifted;
         for &e in elements {
             let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
-            of.subtract_lift(of.space.nodes_of(e), &matrix, load);
+            of.subtract_lift(of.space.carriers_of(e), &matrix, load);
         }
         for &t in triangles {
             let matrix = weak_form.triangle(self.matrices, mesh, t);
@@ -98,23 +98,23 @@ impl Discretisation {
         let topology = mesh.topology();
         let space = Space::new(topology, family, order);
         let unknowns = Unknowns::new(mesh, &space, &weak_form.conductors(), boundaries)?;
-        let turned = |nodes: &[NodeId]| nodes.iter().any(|&n| unknowns.frame(n).is_some());
+        let turned = |carriers: &[CarrierId]| carriers.iter().any(|&n| unknowns.frame(n).is_some());
         let local = ownership.map(|own| LocalEntities::new(topology, weak_form.triangles(), own));
         let coupling_of = |e: ElementId| {
             if family == ElementFamily::Edge {
                 // Gradients have no curl: they couple in conductors alone.
                 return Coupling::full(if weak_form.conducts(e) { 4 } else { 2 });
             }
-            let decoupled = !weak_form.couples_components() && !turned(space.nodes_of(e));
+            let decoupled = !weak_form.couples_components() && !turned(space.carriers_of(e));
             let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
             if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
         };
         let rows = match ownership {
             None => unknowns.dofs.clone(),
             Some(ownership) => {
-                let owned = |node: NodeId| ownership.owns(space.vertices_of(node)[0]);
-                DofMap::new(space.node_count(), |node, c| {
-                    owned(node) && unknowns.dofs.equation(node, c).is_some()
+                let owned = |carrier: CarrierId| ownership.owns(space.vertices_of(carrier)[0]);
+                DofMap::new(space.carrier_count(), |carrier, c| {
+                    owned(carrier) && unknowns.dofs.equation(carrier, c).is_some()
                 })
             }
         };
@@ -149,9 +149,9 @@ impl Discretisation {
             let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
-        let mut conducts = vec![false; self.space.node_count()];
-        conductors.each(&self.space, |nodes| nodes.iter().for_each(|n| conducts[n.index()] = true));
-        let kept = |node: NodeId| conducts[node.index()];
+        let mut conducts = vec![false; self.space.carrier_count()];
+        conductors.each(&self.space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
+        let kept = |carrier: CarrierId| conducts[carrier.index()];
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
     }
 
@@ -171,7 +171,7 @@ impl Discretisation {
     ) {
         if self.unknowns.has_frames() {
             self.pattern.assemble(group, values, |e| {
-                RotatedMatrix::new(matrix(e), group.nodes_of(e).map(|n| self.unknowns.frame(n)))
+                RotatedMatrix::new(matrix(e), group.carriers_of(e).map(|n| self.unknowns.frame(n)))
             });
         } else {
             self.pattern.assemble(group, values, matrix);
@@ -186,13 +186,13 @@ impl Discretisation {
     /// `f −= K A_prescribed` for one element.
     fn subtract_lift<const N: usize>(
         &self,
-        nodes: &[NodeId],
+        carriers: &[CarrierId],
         matrix: &impl LocalMatrix<c64, N, 4>,
         load: &mut [c64],
     ) {
-        for (b, &from) in nodes.iter().enumerate() {
+        for (b, &from) in carriers.iter().enumerate() {
             let Some(potential) = self.unknowns.prescribed_at(from) else { continue };
-            for (a, &to) in nodes.iter().enumerate() {
+            for (a, &to) in carriers.iter().enumerate() {
                 let block = matrix.block(a, b);
                 let row = |i: usize| -> c64 { (0..3).map(|j| -block[i][j] * potential[j]).sum() };
                 self.unknowns.scatter_add(load, to, [row(0), row(1), row(2), row(PSI)]);
@@ -218,7 +218,7 @@ fn pattern(
         (space.triangle(triangle), Coupling::full(components))
     };
     let all = weak_form.surface();
-    let faces: Vec<(Vec<NodeId>, Coupling)> = match local {
+    let faces: Vec<(Vec<CarrierId>, Coupling)> = match local {
         None => all.map(face).collect(),
         Some(local) => {
             let all: Vec<_> = all.collect();
@@ -236,20 +236,24 @@ fn pattern(
 
 /// Rows and columns; the elements and triangles of this rank where there are several; couplings of these elements; carriers
 /// and coupling of these triangles.
-type Parts<'a> =
-    ((&'a DofMap<4>, &'a DofMap<4>), Option<&'a LocalEntities>, Vec<Coupling>, &'a [(Vec<NodeId>, Coupling)]);
+type Parts<'a> = (
+    (&'a DofMap<4>, &'a DofMap<4>),
+    Option<&'a LocalEntities>,
+    Vec<Coupling>,
+    &'a [(Vec<CarrierId>, Coupling)],
+);
 
 fn bind<K: Matrices<N, F>, const N: usize, const F: usize>(
     matrices: &'static K,
-    tets: &[[NodeId; N]],
+    tets: &[[CarrierId; N]],
     ((rows, columns), local, couplings, faces): Parts<'_>,
 ) -> (BlockPattern<4>, Box<dyn Bound>) {
-    let count = columns.node_count();
+    let count = columns.carrier_count();
     let tets = match local {
         None => tets.to_vec(),
         Some(local) => local.elements.iter().map(|e| tets[e.index()]).collect(),
     };
-    let carriers = |face: &(Vec<NodeId>, Coupling)| -> [NodeId; F] {
+    let carriers = |face: &(Vec<CarrierId>, Coupling)| -> [CarrierId; F] {
         face.0.as_slice().try_into().expect("a triangle of the same family and order")
     };
     let triangles = faces.iter().map(carriers).collect();
@@ -260,19 +264,19 @@ fn bind<K: Matrices<N, F>, const N: usize, const F: usize>(
     (pattern, Box::new(groups))
 }
 
-/// Elements and surface triangles with a node whose `A` is prescribed, ascending.
+/// Elements and surface triangles with a carrier whose `A` is prescribed, ascending.
 fn find_lifted(
     mesh: &Mesh,
     space: &Space,
     unknowns: &Unknowns,
     triangles: &[[NodeId; 3]],
 ) -> (Vec<ElementId>, Vec<usize>) {
-    let mut prescribed = vec![false; space.node_count()];
-    for n in unknowns.prescribed_nodes() {
-        prescribed[n.index()] = true;
+    let mut prescribed = vec![false; space.carrier_count()];
+    for carrier in unknowns.prescribed_carriers() {
+        prescribed[carrier.index()] = true;
     }
-    let touches = |nodes: &[NodeId]| nodes.iter().any(|n| prescribed[n.index()]);
-    let elements = mesh.topology().elements().filter(|&e| touches(space.nodes_of(e))).collect();
+    let touches = |carriers: &[CarrierId]| carriers.iter().any(|n| prescribed[n.index()]);
+    let elements = mesh.topology().elements().filter(|&e| touches(space.carriers_of(e))).collect();
     let triangles = (0..triangles.len()).filter(|&t| touches(&space.triangle(triangles[t]))).collect();
     (elements, triangles)
 }

@@ -13,7 +13,7 @@ use fluxmorph_geometry::parallel::{
     complex_of, numbers_of,
 };
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 
 use crate::adjoint::{self, Extent};
 use crate::error::SolverError;
@@ -101,7 +101,7 @@ impl FieldHandler {
     fn new(model: FieldModel, ownership: Ownership, settings: &DistributedSettings) -> Self {
         let discretisation = model.discretisation();
         let (space, dofs) = (&discretisation.space, &discretisation.unknowns.dofs);
-        let owner = |node: NodeId| ownership.partition.owner_of(space.vertices_of(node)[0]);
+        let owner = |carrier: CarrierId| ownership.partition.owner_of(space.vertices_of(carrier)[0]);
         let layout = Arc::new(RowLayout::new(dofs, ownership.group.size(), ownership.group.rank(), owner));
         let rows = Rows { structure: Arc::clone(discretisation.pattern.structure()), layout };
         let tolerance = model.setup().linear_solver.tolerance;

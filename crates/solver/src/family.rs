@@ -1,7 +1,7 @@
 //! Where physics meets space: what the elements of one family and order make of the coefficients on one of them.
 //!
 //! A carrier (a node; of edge elements an edge or a face) has up to four coefficients: `A_x, A_y, A_z, ψ`, or those of
-//! the functions in [`crate::element::edge::functions`]. All that physics asks is the field that they make, integrals of it,
+//! the functions in `element::edge::functions`. All that physics asks is the field that they make, integrals of it,
 //! and the derivatives of these: `Family` is that, one virtual call an element; the kernels behind it are pure
 //! functions in [`crate::element`]. Assembly, which needs the matrices of all elements, is generic instead
 //! (`Matrices`).
@@ -101,6 +101,8 @@ pub(crate) trait Family: Sync {
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>);
     /// The field at such a point.
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint;
+    /// The field at a vertex, by its place in the mesh's order.
+    fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint;
     /// The field at the centroid.
     fn at_centroid(&self, cell: &Cell, coefficients: &[[c64; 4]]) -> FieldPoint;
     /// The mean of `|A + ∇ψ|²` [T² m²].
@@ -227,6 +229,11 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
         PointField::new(self.tet, &cell.tet, lambda, &nodal(coefficients)).into()
     }
 
+    fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint {
+        let table = &self.tet.at(Rule::Vertices)[vertex];
+        PointField::tabulated(table, &cell.tet, &nodal(coefficients)).into()
+    }
+
     fn at_centroid(&self, cell: &Cell, coefficients: &[[c64; 4]]) -> FieldPoint {
         let table = &self.tet.at(Rule::Centroid)[0];
         PointField::tabulated(table, &cell.tet, &nodal(coefficients)).into()
@@ -338,6 +345,12 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
         self.tet.field_at(&cell.ascending(), &cell.ascending_coordinates(lambda), coefficients)
+    }
+
+    fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint {
+        let place = cell.order.iter().position(|&place| usize::from(place) == vertex);
+        let place = place.expect("the order names every vertex");
+        self.tet.at_vertex(&cell.ascending(), place, coefficients)
     }
 
     fn at_centroid(&self, cell: &Cell, coefficients: &[[c64; 4]]) -> FieldPoint {

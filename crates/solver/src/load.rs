@@ -53,7 +53,7 @@ impl Sources {
     pub(crate) fn add_load(&self, space: &Space, unknowns: &Unknowns, mesh: &Mesh, load: &mut [c64]) {
         let elements = space.elements();
         let mut add = |(e, local): (ElementId, Local)| {
-            for (&carrier, values) in space.nodes_of(e).iter().zip(local.values()) {
+            for (&carrier, values) in space.carriers_of(e).iter().zip(local.values()) {
                 unknowns.scatter_add(load, carrier, *values);
             }
         };

@@ -37,7 +37,7 @@ pub struct FieldModelSetup {
     pub frequency: f64,
     /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
     pub penalty: f64,
-    /// What is continuous between elements. Default nodal.
+    /// What is continuous between elements. Default edge.
     pub family: ElementFamily,
     /// Polynomial order of the potentials. Default linear.
     pub order: Order,
@@ -46,7 +46,7 @@ pub struct FieldModelSetup {
     /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
     pub remanence: Vec<Point>,
     /// Conductors replaced by their surfaces.
-    pub impedance_surfaces: Vec<Conductor>,
+    pub conductors: Vec<Conductor>,
     /// Coils.
     pub coils: Vec<Coil>,
     /// Conditions on named surfaces; outer faces without one are natural.
@@ -67,7 +67,7 @@ impl Default for FieldModelSetup {
             order: Order::default(),
             materials: Vec::new(),
             remanence: Vec::new(),
-            impedance_surfaces: Vec::new(),
+            conductors: Vec::new(),
             coils: Vec::new(),
             boundaries: Vec::new(),
             linear_solver: LinearSolverSettings::default(),
@@ -185,7 +185,7 @@ impl FieldModel {
             numbers,
             &setup.materials,
             &setup.boundaries,
-            &setup.impedance_surfaces,
+            &setup.conductors,
         )?;
         Ok((angular_frequency, form))
     }
@@ -283,7 +283,7 @@ impl FieldModel {
         &self.shared.fine.unknowns
     }
 
-    /// The nodes that carry the unknowns.
+    /// What carries the unknowns.
     pub fn space(&self) -> &Space {
         &self.shared.fine.space
     }
@@ -311,7 +311,7 @@ impl FieldModel {
 
     /// Conductors replaced by their surfaces.
     pub fn conductors(&self) -> &[Conductor] {
-        &self.setup.impedance_surfaces
+        &self.setup.conductors
     }
 
     /// The coils.
@@ -326,7 +326,7 @@ impl FieldModel {
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
     pub fn is_unexcited(&self) -> bool {
-        self.shared.sources.is_empty() && self.unknowns().prescribed_nodes().next().is_none()
+        self.shared.sources.is_empty() && self.unknowns().prescribed_carriers().next().is_none()
     }
 
     /// How the linear systems of one process are solved, and what that takes; `None` where they are on several ranks.
@@ -416,7 +416,7 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
         return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
     }
-    for conductor in &setup.impedance_surfaces {
+    for conductor in &setup.conductors {
         if conductor.surface.is_empty() {
             return Err(SolverError::EmptyRegion {
                 region: conductor.name.clone(),

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::NodeId;
+use fluxmorph_geometry::CarrierId;
 use fluxmorph_geometry::fem::CsrMatrix;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::tet4::dot;
@@ -45,7 +45,7 @@ pub fn prolongation(
     let mut row_starts = vec![0u32];
     let (mut columns, mut values) = (Vec::new(), Vec::new());
     let mut row: Vec<(u32, f64)> = Vec::new();
-    for node in (0..space.node_count()).map(NodeId::new) {
+    for node in (0..space.carrier_count()).map(CarrierId::new) {
         let ends = space.vertices_of(node);
         let (ends, weight) = if ends[0] == ends[1] { (&ends[..1], 1.0) } else { (&ends[..], 0.5) };
         let own = axes(fine, node);
@@ -59,7 +59,7 @@ pub fn prolongation(
                 row.extend(potentials.map(|equation| (number[equation], weight)));
             } else {
                 for &end in ends {
-                    let others = axes(coarse, end);
+                    let others = axes(coarse, end.into());
                     let unknown = |&d: &usize| coarse.dofs.equation(end, d).is_some();
                     for d in (0..3).filter(unknown) {
                         let cosine = dot(own[c], others[d]);
@@ -88,7 +88,7 @@ impl Columns {
     fn new(coarse: &Unknowns, scalar: ScalarSpace) -> Self {
         let mut number = vec![u32::MAX; coarse.dofs.count()];
         let mut count = 0;
-        for node in (0..coarse.dofs.node_count()).map(NodeId::new) {
+        for node in (0..coarse.dofs.carrier_count()).map(CarrierId::new) {
             for c in (0..4).filter(|&c| c != PSI || scalar == ScalarSpace::Linear) {
                 if let Some(equation) = coarse.dofs.equation(node, c) {
                     number[equation] = count;
@@ -149,8 +149,8 @@ mod tests {
         let x: Vec<c64> = (0..coarse.dofs.count()).map(|i| c64::new((0.7 * i as f64).sin(), 0.1)).collect();
         let mut y = vec![c64::default(); fine.dofs.count()];
         Transfer::new(p).add_prolongation(&x, &mut y);
-        for node in (0..space.node_count()).map(NodeId::new) {
-            let [a, b] = space.vertices_of(node).map(|end| coarse.gather(&x, end));
+        for node in (0..space.carrier_count()).map(CarrierId::new) {
+            let [a, b] = space.vertices_of(node).map(|end| coarse.gather(&x, end.into()));
             let mean: [c64; 4] = std::array::from_fn(|c| 0.5 * (a[c] + b[c]));
             let field = fine.gather(&y, node);
             let axes = fine.frame(node).map_or(Frame::COORDINATES.axes, |frame| frame.axes);
@@ -180,6 +180,7 @@ mod tests {
         let names = mesh.topology().region_names();
         let model = |order| {
             let setup = FieldModelSetup {
+                family: ElementFamily::Nodal,
                 frequency: 60.0,
                 order,
                 materials: names.iter().map(|n| if n == "plate" { steel } else { Material::AIR }).collect(),

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::{Point, sub};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
@@ -93,9 +93,9 @@ fn fitted_curl(
     point: Point,
 ) -> Option<Complex3> {
     let space = model.space();
-    let nodes: BTreeSet<NodeId> = elements.iter().flat_map(|&e| space.nodes_of(e)).copied().collect();
+    let nodes: BTreeSet<CarrierId> = elements.iter().flat_map(|&e| space.carriers_of(e)).copied().collect();
     let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
-    let potential = |&n: &NodeId| {
+    let potential = |&n: &CarrierId| {
         let [x, y, z, _] = solution.potentials(model, n);
         [x, y, z]
     };

@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::volume;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
@@ -57,11 +57,11 @@ impl FieldSolution {
     /// The coefficients of a carrier: of a node `A_x, A_y, A_z` [T m] and `ψ` [T m²], ψ zero outside conductors; of an edge
     /// or face those of its functions.
     #[inline]
-    pub fn potentials(&self, model: &FieldModel, node: NodeId) -> [c64; 4] {
+    pub fn potentials(&self, model: &FieldModel, carrier: CarrierId) -> [c64; 4] {
         let unknowns = model.unknowns();
-        let mut potentials = unknowns.gather(&self.values, node);
+        let mut potentials = unknowns.gather(&self.values, carrier);
         if self.role == Role::State
-            && let Some(prescribed) = unknowns.prescribed_at(node)
+            && let Some(prescribed) = unknowns.prescribed_at(carrier)
         {
             for d in 0..3 {
                 potentials[d] += prescribed[d];
@@ -72,14 +72,14 @@ impl FieldSolution {
 
     /// Coefficients of some carriers.
     #[inline]
-    pub(crate) fn local(&self, model: &FieldModel, carriers: &[NodeId]) -> Local {
+    pub(crate) fn local(&self, model: &FieldModel, carriers: &[CarrierId]) -> Local {
         Local::new(carriers.len(), |a| self.potentials(model, carriers[a]))
     }
 
     /// Coefficients of an element.
     #[inline]
     pub(crate) fn element(&self, model: &FieldModel, e: ElementId) -> Local {
-        self.local(model, model.space().nodes_of(e))
+        self.local(model, model.space().carriers_of(e))
     }
 
     /// The field at barycentric coordinates in an element.
@@ -92,18 +92,21 @@ impl FieldSolution {
     /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at nodes of the mesh. Edge elements do not tell `A` from `∇ψ`, and are
     /// discontinuous across their faces: theirs is the mean of `A + ∇ψ` over the elements around, and ψ is zero.
     pub fn nodal_potentials(&self, model: &FieldModel, mesh: &Mesh, nodes: &[NodeId]) -> Vec<[c64; 4]> {
+        let space = model.space();
         let of_edges = |&node: &NodeId| {
             let around = model.topology().elements_around(node);
             let mut mean = [c64::default(); 4];
             for &e in around {
-                let is_node = model.topology().tet(e).map(|n| f64::from(u8::from(n == node)));
-                let at = self.at(model, mesh, e, &is_node).vector_potential;
+                let vertex = model.topology().tet(e).iter().position(|&n| n == node);
+                let vertex = vertex.expect("the elements around a node have it");
+                let (cell, field) = (space.cell(mesh, e), self.element(model, e));
+                let at = space.elements().at_vertex(&cell, vertex, field.values()).vector_potential;
                 (0..3).for_each(|d| mean[d] += at[d] / around.len() as f64);
             }
             mean
         };
-        match model.space().family() {
-            ElementFamily::Nodal => nodes.par_iter().map(|&n| self.potentials(model, n)).collect(),
+        match space.family() {
+            ElementFamily::Nodal => nodes.par_iter().map(|&n| self.potentials(model, n.into())).collect(),
             ElementFamily::Edge => nodes.par_iter().map(of_edges).collect(),
         }
     }

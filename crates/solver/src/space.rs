@@ -1,15 +1,15 @@
 //! What carries the unknowns: of nodal elements the mesh's vertices and, of second order, its edges' midpoints; of edge
 //! elements its edges and, of second order, its faces.
 //!
-//! A space follows from topology, family and order alone. Carriers have numbers of their own, written as [`NodeId`] since
-//! assembly treats all alike: vertices first, with the mesh's own numbers, then the edges in ascending order of their two
+//! A space follows from topology, family and order alone. Carriers have numbers of their own ([`CarrierId`]), all alike to
+//! assembly: vertices first, with the mesh's own numbers, then the edges in ascending order of their two
 //! vertices, then the faces likewise; each family has those that it needs. Geometry stays linear, so a midpoint lies where
 //! its vertices put it. Does not live here: which carrier has which unknown ([`crate::unknowns`]), and what the functions
 //! are ([`crate::family`]).
 
 use fluxmorph_geometry::tet4::{EDGES, Point, Tet4};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, Topology};
 use rayon::prelude::*;
 
 use crate::element::edge::functions::{ASCENDING_FACES, ASCENDING_TRIANGLE_EDGES};
@@ -40,9 +40,9 @@ impl Order {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ElementFamily {
     /// All components of `A`, and `ψ`, at nodes (Lagrange).
-    #[default]
     Nodal,
     /// The tangential components of `A + ∇ψ`, along edges (Nédélec).
+    #[default]
     Edge,
 }
 
@@ -65,11 +65,11 @@ pub struct Space {
 #[derive(Clone, Debug)]
 pub(crate) enum Carriers {
     /// Vertices.
-    Four(Vec<[NodeId; 4]>),
+    Four(Vec<[CarrierId; 4]>),
     /// Edges.
-    Six(Vec<[NodeId; 6]>),
+    Six(Vec<[CarrierId; 6]>),
     /// Vertices and edges, or edges and faces.
-    Ten(Vec<[NodeId; 10]>),
+    Ten(Vec<[CarrierId; 10]>),
 }
 
 impl Space {
@@ -98,9 +98,9 @@ impl Space {
             ascending: if of_edges { tets.par_iter().map(ascending).collect() } else { Vec::new() },
         };
         space.tets = match (family, order) {
-            (ElementFamily::Nodal, Order::Linear) => Carriers::Four(tets.to_vec()),
+            (ElementFamily::Nodal, Order::Linear) => Carriers::Four(each(tets, |tet, a| tet[a].into())),
             (ElementFamily::Nodal, Order::Quadratic) => Carriers::Ten(each(tets, |tet, a| {
-                a.checked_sub(4).map_or_else(|| tet[a], |e| space.carrier_of_edge(edge(tet, EDGES[e])))
+                a.checked_sub(4).map_or_else(|| tet[a].into(), |e| space.carrier_of_edge(edge(tet, EDGES[e])))
             })),
             (ElementFamily::Edge, Order::Linear) => {
                 Carriers::Six(each(tets, |tet, a| space.carrier_of_edge(edge(&sorted(tet), EDGES[a]))))
@@ -127,7 +127,7 @@ impl Space {
     }
 
     /// Number of carriers.
-    pub fn node_count(&self) -> usize {
+    pub fn carrier_count(&self) -> usize {
         self.first_edge() + self.edges.len() + self.faces.len()
     }
 
@@ -148,7 +148,7 @@ impl Space {
     /// Carriers of an element, in the order of its functions: vertices, then edges in the order of [`EDGES`], then faces; of
     /// edge elements with the vertices in ascending order.
     #[inline]
-    pub fn nodes_of(&self, e: ElementId) -> &[NodeId] {
+    pub fn carriers_of(&self, e: ElementId) -> &[CarrierId] {
         match &self.tets {
             Carriers::Four(tets) => &tets[e.index()],
             Carriers::Six(tets) => &tets[e.index()],
@@ -165,14 +165,14 @@ impl Space {
     ///
     /// # Panics
     /// If there is no such edge.
-    pub fn carrier_of_edge(&self, edge: [NodeId; 2]) -> NodeId {
+    pub fn carrier_of_edge(&self, edge: [NodeId; 2]) -> CarrierId {
         let place = self.edges.binary_search(&edge).expect("the edge of an element is an edge of the mesh");
-        NodeId::new(self.first_edge() + place)
+        CarrierId::new(self.first_edge() + place)
     }
 
-    fn carrier_of_face(&self, face: [NodeId; 3]) -> NodeId {
+    fn carrier_of_face(&self, face: [NodeId; 3]) -> CarrierId {
         let place = self.faces.binary_search(&face).expect("the face of an element is a face of the mesh");
-        NodeId::new(self.first_edge() + self.edges.len() + place)
+        CarrierId::new(self.first_edge() + self.edges.len() + place)
     }
 
     fn first_edge(&self) -> usize {
@@ -187,15 +187,15 @@ impl Space {
     ///
     /// # Panics
     /// If the triangle is not a face of the mesh.
-    pub fn triangle(&self, triangle: [NodeId; 3]) -> Vec<NodeId> {
+    pub fn triangle(&self, triangle: [NodeId; 3]) -> Vec<CarrierId> {
         let edges =
             |of: [NodeId; 3], local: [[usize; 2]; 3]| local.map(|e| self.carrier_of_edge(edge(&of, e)));
         let ascending = face_key(triangle);
         let mut carriers = Vec::with_capacity(6);
         match (self.family, self.order) {
-            (ElementFamily::Nodal, Order::Linear) => carriers.extend(triangle),
+            (ElementFamily::Nodal, Order::Linear) => carriers.extend(triangle.map(CarrierId::from)),
             (ElementFamily::Nodal, Order::Quadratic) => {
-                carriers.extend(triangle);
+                carriers.extend(triangle.map(CarrierId::from));
                 carriers.extend(edges(triangle, TRIANGLE_EDGES));
             }
             (ElementFamily::Edge, order) => {
@@ -208,12 +208,12 @@ impl Space {
 
     /// Where a carrier lies [m]: a vertex, the middle of an edge, the centre of a face.
     #[inline]
-    pub fn position(&self, mesh: &Mesh, node: NodeId) -> Point {
-        let face = node.index().checked_sub(self.first_edge() + self.edges.len());
+    pub fn position(&self, mesh: &Mesh, carrier: CarrierId) -> Point {
+        let face = carrier.index().checked_sub(self.first_edge() + self.edges.len());
         if let Some(face) = face {
             return fluxmorph_geometry::tet4::centroid(self.faces[face].map(|n| mesh.point(n)));
         }
-        match self.vertices_of(node) {
+        match self.vertices_of(carrier) {
             [a, b] if a == b => mesh.point(a),
             [a, b] => {
                 let (x, y) = (mesh.point(a), mesh.point(b));
@@ -225,8 +225,10 @@ impl Space {
     /// Vertices of a carrier: a vertex twice, the two ends of an edge, or the first two vertices of a face, whose edges are
     /// carriers as well.
     #[inline]
-    pub fn vertices_of(&self, node: NodeId) -> [NodeId; 2] {
-        let Some(edge) = node.index().checked_sub(self.first_edge()) else { return [node; 2] };
+    pub fn vertices_of(&self, carrier: CarrierId) -> [NodeId; 2] {
+        let Some(edge) = carrier.index().checked_sub(self.first_edge()) else {
+            return [NodeId::new(carrier.index()); 2];
+        };
         match edge.checked_sub(self.edges.len()) {
             None => self.edges[edge],
             Some(face) => [self.faces[face][0], self.faces[face][1]],
@@ -266,8 +268,8 @@ fn collect<const K: usize, const V: usize>(
 /// `N` carriers of every element.
 fn each<const N: usize>(
     tets: &[[NodeId; 4]],
-    of: impl Fn(&[NodeId; 4], usize) -> NodeId + Sync,
-) -> Vec<[NodeId; N]> {
+    of: impl Fn(&[NodeId; 4], usize) -> CarrierId + Sync,
+) -> Vec<[CarrierId; N]> {
     tets.par_iter().map(|tet| std::array::from_fn(|a| of(tet, a))).collect()
 }
 
@@ -304,12 +306,12 @@ mod tests {
         let of = |family| Space::new(topology, family, Order::Quadratic);
         let (nodal, edge) = (of(ElementFamily::Nodal), of(ElementFamily::Edge));
         assert_eq!(nodal.edges().len(), edges);
-        assert_eq!(nodal.node_count(), topology.node_count() + edges);
-        assert_eq!(edge.node_count(), edges + faces);
+        assert_eq!(nodal.carrier_count(), topology.node_count() + edges);
+        assert_eq!(edge.carrier_count(), edges + faces);
         for space in [nodal, edge] {
             for facet in topology.facets() {
                 let carriers = space.triangle(facet.nodes);
-                let inside = space.nodes_of(facet.inside);
+                let inside = space.carriers_of(facet.inside);
                 assert!(carriers.iter().all(|n| inside.contains(n)), "a face has those of its element");
             }
         }

@@ -57,7 +57,6 @@ pub(crate) enum SurfaceTerm {
     /// `jω/Zs` [1/H] of the conductor with this index.
     Impedance(c64, usize),
     /// The large coefficient [1/H] that makes `A_t + ∇_tψ` zero under nodal elements, on perfect conductors and on walls.
-    /// Edge elements know theirs.
     Perfect(f64),
 }
 
@@ -100,6 +99,8 @@ pub(crate) struct Surfaces {
     pub(crate) terms: Vec<SurfaceTerm>,
     /// Whether ψ is unknown on it.
     pub(crate) has_psi: Vec<bool>,
+    /// Perfect conductors under edge elements: no term, for all that is tangential is known there.
+    pub(crate) known: Vec<[NodeId; 3]>,
 }
 
 impl Surfaces {
@@ -141,9 +142,10 @@ impl Surfaces {
             };
             for &triangle in &conductor.surface {
                 let key = face_key(triangle);
-                match family {
-                    ElementFamily::Nodal => surfaces.push(triangle, term, beside.contains(&key)),
-                    ElementFamily::Edge => surfaces.push(key, term, conductor.law != SurfaceLaw::Perfect),
+                match (family, conductor.law) {
+                    (ElementFamily::Nodal, _) => surfaces.push(triangle, term, beside.contains(&key)),
+                    (ElementFamily::Edge, SurfaceLaw::Impedance(_)) => surfaces.push(key, term, true),
+                    (ElementFamily::Edge, SurfaceLaw::Perfect) => surfaces.known.push(key),
                 }
             }
         }

@@ -24,7 +24,7 @@ use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
@@ -45,11 +45,11 @@ pub struct Unknowns {
     /// Components along the node's directions, and `ψ`.
     pub dofs: DofMap<4>,
     /// One node per connected conductor whose ψ no boundary fixes.
-    pub grounded: Vec<NodeId>,
+    pub grounded: Vec<CarrierId>,
     /// Directions at the nodes where they are not the coordinates'.
-    frames: BTreeMap<NodeId, Frame>,
+    frames: BTreeMap<CarrierId, Frame>,
     /// Fixed components that are not zero [T m], along the node's directions.
-    prescribed: BTreeMap<NodeId, Point>,
+    prescribed: BTreeMap<CarrierId, Point>,
     /// Bit `d`: the node lies on a conditioned plane at right angles to the axis `d`.
     planes: BTreeMap<NodeId, u8>,
 }
@@ -69,8 +69,8 @@ pub struct Conductors {
 
 impl Conductors {
     /// Calls back with the carriers of every element and surface triangle with ψ.
-    pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[NodeId])) {
-        self.elements.iter().for_each(|&e| with(space.nodes_of(e)));
+    pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[CarrierId])) {
+        self.elements.iter().for_each(|&e| with(space.carriers_of(e)));
         self.surface.iter().for_each(|&triangle| with(&space.triangle(triangle)));
     }
 }
@@ -122,7 +122,7 @@ impl Unknowns {
         }
         let potentials = at_nodes.values().filter_map(|at| at.potential).map(norm);
         let tolerance = CONFLICT * potentials.fold(0.0, f64::max);
-        let node_count = space.node_count();
+        let node_count = space.carrier_count();
         let mut fixed = vec![0u8; node_count];
         let mut psi_zero = vec![false; node_count];
         let (mut frames, mut prescribed) = (BTreeMap::new(), BTreeMap::new());
@@ -167,15 +167,15 @@ impl Unknowns {
         conductors: &Conductors,
         boundaries: &[(String, Boundary)],
     ) -> Result<Self, SolverError> {
-        let count = space.node_count();
+        let count = space.carrier_count();
         let edges = space.edges();
         let (mut known, mut prescribed) = (vec![false; count], BTreeMap::new());
-        let along = |carrier: NodeId, potential: Point| -> f64 {
+        let along = |carrier: CarrierId, potential: Point| -> f64 {
             let [from, to] = edges[carrier.index()].map(|n| mesh.point(n));
             dot(potential, sub(to, from))
         };
         let at_carriers = conditions(mesh, space, boundaries, &HashSet::new())?;
-        let applied: Vec<(NodeId, f64, bool)> = at_carriers
+        let applied: Vec<(CarrierId, f64, bool)> = at_carriers
             .iter()
             .filter(|(carrier, _)| carrier.index() < edges.len())
             .filter_map(|(&carrier, at)| {
@@ -213,11 +213,11 @@ impl Unknowns {
         Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes })
     }
 
-    /// `A_x, A_y, A_z` and `ψ` at a node out of a vector of unknowns; zero where a component is fixed.
+    /// The coefficients of a carrier, of a node `A_x, A_y, A_z` and `ψ`, out of a vector of unknowns; zero where a component is fixed.
     #[inline]
-    pub fn gather(&self, values: &[c64], node: NodeId) -> [c64; 4] {
-        let local = self.dofs.gather(values, node);
-        match self.frame(node) {
+    pub fn gather(&self, values: &[c64], carrier: CarrierId) -> [c64; 4] {
+        let local = self.dofs.gather(values, carrier);
+        match self.frame(carrier) {
             None => local,
             Some(frame) => {
                 let mut global = [c64::default(), c64::default(), c64::default(), local[PSI]];
@@ -231,24 +231,24 @@ impl Unknowns {
         }
     }
 
-    /// The prescribed part of `A` at a node [T m].
+    /// The prescribed part of `A` at a node [T m]; of an edge its circulation [T m²], in the first place.
     #[inline]
-    pub fn prescribed_at(&self, node: NodeId) -> Option<Point> {
+    pub fn prescribed_at(&self, carrier: CarrierId) -> Option<Point> {
         if self.prescribed.is_empty() {
             return None;
         }
-        let local = self.prescribed.get(&node)?;
-        let axes = self.frame(node).map_or(Frame::COORDINATES.axes, |frame| frame.axes);
+        let local = self.prescribed.get(&carrier)?;
+        let axes = self.frame(carrier).map_or(Frame::COORDINATES.axes, |frame| frame.axes);
         Some(std::array::from_fn(|d| (0..3).map(|k| axes[k][d] * local[k]).sum()))
     }
 
-    /// Nodes with a prescribed part of `A`, ascending.
-    pub fn prescribed_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+    /// Carriers with a prescribed part of `A`, ascending.
+    pub fn prescribed_carriers(&self) -> impl Iterator<Item = CarrierId> + '_ {
         self.prescribed.keys().copied()
     }
 
-    /// Nodes whose directions or prescribed values belong to where they lie: these must not move.
-    pub fn held_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+    /// Carriers whose directions or prescribed values belong to where they lie: these must not move.
+    pub fn held_carriers(&self) -> impl Iterator<Item = CarrierId> + '_ {
         self.frames.keys().chain(self.prescribed.keys()).copied()
     }
 
@@ -258,23 +258,23 @@ impl Unknowns {
         self.planes.iter().map(|(&node, &axes)| (node, axes))
     }
 
-    /// Adds `x, y, z` and ψ components at a node into a vector of unknowns; what is fixed is dropped.
+    /// Adds the components of a carrier, of a node `x, y, z` and ψ, into a vector of unknowns; what is fixed is dropped.
     #[inline]
-    pub fn scatter_add(&self, values: &mut [c64], node: NodeId, components: [c64; 4]) {
-        let local = match self.frame(node) {
+    pub fn scatter_add(&self, values: &mut [c64], carrier: CarrierId, components: [c64; 4]) {
+        let local = match self.frame(carrier) {
             None => components,
             Some(frame) => {
                 let along = |k: usize| (0..3).map(|d| frame.axes[k][d] * components[d]).sum();
                 [along(0), along(1), along(2), components[PSI]]
             }
         };
-        self.dofs.scatter_add(values, node, local);
+        self.dofs.scatter_add(values, carrier, local);
     }
 
     /// The directions at a node, where they are not the coordinates'.
     #[inline]
-    pub(crate) fn frame(&self, node: NodeId) -> Option<&Frame> {
-        if self.frames.is_empty() { None } else { self.frames.get(&node) }
+    pub(crate) fn frame(&self, carrier: CarrierId) -> Option<&Frame> {
+        if self.frames.is_empty() { None } else { self.frames.get(&carrier) }
     }
 
     /// Whether some node has directions of its own.
@@ -303,8 +303,8 @@ fn conditions(
     space: &Space,
     boundaries: &[(String, Boundary)],
     covered: &HashSet<[NodeId; 3]>,
-) -> Result<BTreeMap<NodeId, AtNode>, SolverError> {
-    let mut at_nodes: BTreeMap<NodeId, AtNode> = BTreeMap::new();
+) -> Result<BTreeMap<CarrierId, AtNode>, SolverError> {
+    let mut at_nodes: BTreeMap<CarrierId, AtNode> = BTreeMap::new();
     let mut condition_of: HashMap<[NodeId; 3], (&str, &Boundary)> = HashMap::new();
     for (surface, boundary) in boundaries {
         let applied = match boundary {
@@ -345,7 +345,7 @@ fn conditions(
 fn check_agreement(
     mesh: &Mesh,
     space: &Space,
-    node: NodeId,
+    node: CarrierId,
     own: &[(Fix, Point)],
     potential: Point,
     tolerance: f64,
@@ -365,11 +365,11 @@ fn check_agreement(
 }
 
 /// The first node of every connected set of nodes with ψ in which no node is fixed already.
-fn ground(sets: &mut DisjointSets, has_psi: &[bool], psi_zero: &[bool]) -> Vec<NodeId> {
+fn ground(sets: &mut DisjointSets, has_psi: &[bool], psi_zero: &[bool]) -> Vec<CarrierId> {
     let nodes = || (0..has_psi.len()).filter(|&n| has_psi[n]);
     let mut is_fixed = vec![false; has_psi.len()];
     for n in nodes().filter(|&n| psi_zero[n]) {
         is_fixed[sets.root(n)] = true;
     }
-    nodes().filter(|&n| sets.root(n) == n && !is_fixed[n]).map(NodeId::new).collect()
+    nodes().filter(|&n| sets.root(n) == n && !is_fixed[n]).map(CarrierId::new).collect()
 }

@@ -83,6 +83,7 @@ impl WeakForm {
     pub(crate) fn conductors(&self) -> Conductors {
         let mut conductors = Conductors {
             elements: self.topology.elements().filter(|&e| self.conducts(e)).collect(),
+            grounded: self.surfaces.known.clone(),
             ..Conductors::default()
         };
         for ((triangle, term), has_psi) in self.surface().zip(&self.surfaces.has_psi) {

@@ -6,7 +6,9 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::unknowns::PSI;
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SolverError, SurfaceLaw};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, SolverError, SurfaceLaw,
+};
 
 const COPPER: Material = Material { relative_permeability: 1.0, conductivity: 6e7 };
 const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
@@ -21,6 +23,7 @@ fn model(paint: [u32; 7], materials: Vec<Material>, boundaries: &[(&str, Boundar
         .expect("a topology");
     let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 50.0,
         materials,
         boundaries: boundaries.iter().map(|(name, b)| ((*name).to_owned(), *b)).collect(),
@@ -79,9 +82,10 @@ fn around_a_hole(
     let (mesh, exposed) = Mesh::new(Arc::new(topology), grid.points())?.without_region(RegionId(1))?;
     let surface = faces(&mesh, exposed);
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: if law == SurfaceLaw::Perfect { 0.0 } else { 50.0 },
         materials: vec![Material::AIR; 2],
-        impedance_surfaces: vec![Conductor { name: "conductor".to_owned(), surface, law }],
+        conductors: vec![Conductor { name: "conductor".to_owned(), surface, law }],
         boundaries: boundary.into_iter().map(|b| ("x_min".to_owned(), b)).collect(),
         ..FieldModelSetup::default()
     };

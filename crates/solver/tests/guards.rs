@@ -11,7 +11,9 @@ use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{
     LinearSolver, LinearSolverCache, LinearSolverSettings, Method, Reuse, SolverEvent,
 };
-use fluxmorph_solver::{FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence, SolverError};
+use fluxmorph_solver::{
+    ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence, SolverError,
+};
 
 const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
 
@@ -28,6 +30,7 @@ fn setup(settings: LinearSolverSettings, ampere_turns: c64, plate: Material) -> 
     let shape = Racetrack::new([0.03, 0.03, 0.06], 2, [0.008, 0.008], 0.01, 0.01, Corner::Mitred)
         .expect("a racetrack inside the mesh");
     FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 50.0,
         materials: vec![Material::AIR, plate],
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns, shape: shape.into() }],

@@ -44,6 +44,7 @@ fn setup(order: Order, frequency: f64) -> FieldModelSetup {
     let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
     boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
     FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency,
         order,
         materials: vec![Material::AIR; 2],
@@ -95,7 +96,7 @@ fn the_field_goes_around_the_edge_of_an_impedance_surface() {
             2.0 / (2.0 * std::f64::consts::PI * frequency * VACUUM_PERMEABILITY * skin_depth * skin_depth);
         let material = Material { relative_permeability: 1.0, conductivity };
         let setup = FieldModelSetup {
-            impedance_surfaces: vec![block(&surface, SurfaceLaw::Impedance(material))],
+            conductors: vec![block(&surface, SurfaceLaw::Impedance(material))],
             ..setup(order, frequency)
         };
         // Zs/(jω) = μ δ (1 − j)/2.
@@ -114,7 +115,7 @@ fn the_field_goes_around_a_perfect_conductor() {
             for frequency in [0.0, 50.0] {
                 let setup = FieldModelSetup {
                     family,
-                    impedance_surfaces: vec![block(&surface, SurfaceLaw::Perfect)],
+                    conductors: vec![block(&surface, SurfaceLaw::Perfect)],
                     ..setup(order, frequency)
                 };
                 let error = error(&mesh, setup, far_field(c64::default(), 0.0));
@@ -187,7 +188,7 @@ fn a_cavity_in_an_impedance_has_one_field() {
         for order in [Order::Linear, Order::Quadratic] {
             let mut setup = FieldModelSetup {
                 family,
-                impedance_surfaces: vec![block(&surface, SurfaceLaw::Impedance(material))],
+                conductors: vec![block(&surface, SurfaceLaw::Impedance(material))],
                 ..setup(order, frequency)
             };
             setup.boundaries.retain(|(_, boundary)| *boundary == Boundary::FluxNormal);

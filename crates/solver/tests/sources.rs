@@ -11,7 +11,7 @@ use fluxmorph_solver::coil::{
     SourceTerms, planes,
 };
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, SolverError};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, SolverError};
 
 /// The shield's coil with conditions of choice on the planes x = 0 and z = z_max.
 fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
@@ -22,6 +22,7 @@ fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
     let mut boundaries = flux_parallel(&OUTSIDE[1..]);
     boundaries.push(("x_min".to_owned(), x_min));
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR; mesh.topology().region_names().len()],
@@ -72,6 +73,7 @@ fn solved(mesh: &Mesh, shape: CoilShape, ampere_turns: c64) -> Result<[c64; 3], 
     let mut boundaries = flux_parallel(&["x_min", "x_max", "y_min", "y_max", "z_max"]);
     boundaries.push(("z_min".to_owned(), Boundary::FluxNormal));
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR; 2],

@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
-use fluxmorph_solver::{FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Material, Order};
 
 /// The shipped shield, coarser.
 fn mesh(refinement: f64) -> Mesh {
@@ -28,6 +28,7 @@ fn model(mesh: &Mesh, order: Order) -> FieldModel {
     let shape =
         Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a racetrack");
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 60.0,
         order,
         linear_solver: LinearSolverSettings { method, ..LinearSolverSettings::default() },

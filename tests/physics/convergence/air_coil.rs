@@ -12,7 +12,7 @@ use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, uniform};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material};
 
 use super::quadrature::line_integral;
 use crate::meshes::boxed;
@@ -76,6 +76,7 @@ fn model(mesh: &Mesh, corner: Corner) -> FieldModel {
     let parallel = ["x_min", "y_min", "x_max", "y_max", "z_max"].map(|name| (name, Boundary::FluxParallel));
     let boundaries = parallel.into_iter().chain([("z_min", Boundary::FluxNormal)]);
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency: 0.0,
         penalty: 1.0,
         materials: vec![Material::AIR],
@@ -131,7 +132,7 @@ fn the_discrete_source_carries_the_ampere_turns_exactly() {
     let mut checked = 0;
     for j in straight {
         let nodes = mesh.topology().nodes().filter(|&n| grid.lines_of(n)[1] == j);
-        let sum: c64 = nodes.map(|n| unknowns.gather(&load, n)[1]).sum();
+        let sum: c64 = nodes.map(|n| unknowns.gather(&load, n.into())[1]).sum();
         let expected = 0.5 * AMPERE_TURNS * 0.5 * (y[j + 1] - y[j - 1]);
         // T is linear across the winding, where its integral is exact up to rounding.
         assert!((sum / expected - 1.0).norm() < 1e-11, "line {j}: {sum} {expected}");

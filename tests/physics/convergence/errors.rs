@@ -47,6 +47,7 @@ pub(crate) fn setup(
     faces: Boundary,
 ) -> FieldModelSetup {
     FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency,
         penalty,
         materials,
@@ -78,7 +79,7 @@ fn load(field: &impl KnownField, model: &FieldModel, mesh: &Mesh) -> Vec<c64> {
             let weight = weight * cell.tet.volume;
             let drive: Complex3 =
                 std::array::from_fn(|d| sigma * (known.vector_potential[d] + known.scalar_gradient[d]));
-            let carriers = model.space().nodes_of(e);
+            let carriers = model.space().carriers_of(e);
             let is_psi = |component| nodal && component == PSI;
             model.space().functions(&cell, &bary, &mut |carrier, component, value, _| {
                 let source = if is_psi(component) { drive } else { known.source };

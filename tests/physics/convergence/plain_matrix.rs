@@ -11,7 +11,9 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Tet4, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, SurfaceLaw,
+};
 
 use crate::meshes::{FACES, shaken, unit_cube};
 
@@ -147,7 +149,7 @@ fn assert_same(mesh: &Mesh, setup: &FieldModelSetup) {
         setup.frequency,
         setup.penalty,
         setup.boundaries.len(),
-        setup.impedance_surfaces.len(),
+        setup.conductors.len(),
     );
     // Against the geometric mean of the two diagonal entries: rounding of sums of some twenty elements whose
     // reluctivities differ by 50.
@@ -156,6 +158,7 @@ fn assert_same(mesh: &Mesh, setup: &FieldModelSetup) {
 
 fn setup(frequency: f64, penalty: f64, boundaries: &[(&str, Boundary)]) -> FieldModelSetup {
     FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency,
         penalty,
         materials: materials(),
@@ -194,7 +197,7 @@ fn the_split_matrix_is_the_plain_one_around_an_impedance_surface() {
     for penalty in [1.0, 0.5] {
         let mut setup = setup(50.0, penalty, &boundaries);
         let material = materials()[STEEL as usize];
-        setup.impedance_surfaces = vec![Conductor {
+        setup.conductors = vec![Conductor {
             name: "steel".to_owned(),
             surface: surface.clone(),
             law: SurfaceLaw::Impedance(material),

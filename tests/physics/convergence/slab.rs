@@ -9,7 +9,9 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, subdivide, uniform};
 use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::{Boundary, Conductor, FieldModel, FieldModelSetup, Material, SurfaceLaw};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, SurfaceLaw,
+};
 
 use crate::meshes::{boxed, shaken};
 use crate::orders::Study;
@@ -67,15 +69,16 @@ impl Slab {
     }
 
     /// Loss per area [W/m²] at 1 A/m.
-    fn loss_per_area(&self, mesh: &Mesh, area: f64, impedance_surfaces: Vec<Conductor>) -> f64 {
+    fn loss_per_area(&self, mesh: &Mesh, area: f64, conductors: Vec<Conductor>) -> f64 {
         use Boundary::{FluxNormal, FluxParallel};
         let faces =
             [("x_min", FluxParallel), ("x_max", FluxParallel), ("y_min", FluxNormal), ("y_max", FluxNormal)];
         let setup = FieldModelSetup {
+            family: ElementFamily::Nodal,
             frequency: self.frequency,
             penalty: 1.0,
             materials: vec![Material::AIR, self.material],
-            impedance_surfaces,
+            conductors,
             boundaries: faces.map(|(name, kind)| (name.to_owned(), kind)).to_vec(),
             ..FieldModelSetup::default()
         };
@@ -87,7 +90,7 @@ impl Slab {
                 // e_y × n, a third of it for each node.
                 let third = [n[2], 0.0, -n[0], 0.0].map(|c| c64::from(c / 3.0));
                 for &node in triangle {
-                    model.unknowns().scatter_add(&mut load, node, third);
+                    model.unknowns().scatter_add(&mut load, node.into(), third);
                 }
             }
         }

@@ -60,7 +60,7 @@ pub(super) fn set_up(prism: &Prism, mesh: &Mesh, penalty: f64) -> (Mesh, FieldMo
         Kind::Impedance { .. } => Some(SurfaceLaw::Impedance(kind.material())),
         _ => None,
     };
-    let impedance_surfaces: Vec<Conductor> = prism
+    let conductors: Vec<Conductor> = prism
         .parts
         .iter()
         .filter_map(|part| {
@@ -70,7 +70,7 @@ pub(super) fn set_up(prism: &Prism, mesh: &Mesh, penalty: f64) -> (Mesh, FieldMo
         .collect();
     let boundaries =
         [("walls", Boundary::FluxParallel), ("bottom", Boundary::FluxNormal), ("top", Boundary::FluxNormal)];
-    for (name, faces) in outer_faces(prism, &left, &impedance_surfaces) {
+    for (name, faces) in outer_faces(prism, &left, &conductors) {
         left = with_surface(left, name, faces);
     }
     let setup = FieldModelSetup {
@@ -78,7 +78,7 @@ pub(super) fn set_up(prism: &Prism, mesh: &Mesh, penalty: f64) -> (Mesh, FieldMo
         penalty,
         materials,
         coils: vec![prism.source.coil(prism.height)],
-        impedance_surfaces,
+        conductors,
         boundaries: boundaries.map(|(name, kind)| (name.to_owned(), kind)).to_vec(),
         ..FieldModelSetup::default()
     };

@@ -10,7 +10,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::grading::{Fine, Growth, growing, uniform};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order};
 
 use super::rows::{Case, Row, assert_rows};
 use crate::meshes::{FACES, boxed};
@@ -92,6 +92,7 @@ fn space(
 fn model(mesh: &Mesh, frequency: f64, order: Order, plate: Material, coil: Racetrack) -> FieldModel {
     let coil = Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape: coil.into() };
     let setup = FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency,
         order,
         materials: vec![Material::AIR, plate],

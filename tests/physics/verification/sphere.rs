@@ -11,8 +11,8 @@ use fluxmorph_geometry::tet4::{Point, norm};
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{
-    Boundary, Conductor, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw, UniformField,
-    adjoint,
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
+    UniformField, adjoint,
 };
 use serde_json::Value;
 
@@ -34,6 +34,7 @@ fn setup(mesh: &Mesh, frequency: f64, material: Material, order: Order) -> Field
         ("outer", Boundary::UniformField(applied)),
     ];
     FieldModelSetup {
+        family: ElementFamily::Nodal,
         frequency,
         order,
         materials: mesh.topology().region_names().iter().map(|name| of(name)).collect(),
@@ -180,7 +181,8 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
     let (mesh, surface) = full.without_region(region).expect("air is left");
     let conductor = Conductor { name: "sphere".to_owned(), surface, law: SurfaceLaw::Impedance(material) };
     let setup = FieldModelSetup {
-        impedance_surfaces: vec![conductor],
+        family: ElementFamily::Nodal,
+        conductors: vec![conductor],
         ..setup(&mesh, frequency, Material::AIR, order)
     };
     let model = FieldModel::new(&mesh, setup).expect("a sound problem");

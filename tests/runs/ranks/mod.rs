@@ -65,7 +65,7 @@ fn objective_and_gradient_of_a_meshed_conductor_are_those_of_one_process() {
 }
 
 #[test]
-fn so_are_those_of_impedance_surfaces_at_two_frequencies() {
+fn so_are_those_of_conductors_at_two_frequencies() {
     let overrides = ["mesh.shield.refinement=0.35", "analysis.linear_solver.method=\"direct\""];
     ranks_agree("shield_two_frequencies.toml", &overrides, &[3]);
 }

@@ -1,5 +1,5 @@
-//! Assembly by owner-computes: every task owns a range of nodes, visits all elements that touch them and writes only
-//! the rows of its own nodes.
+//! Assembly by owner-computes: every task owns a range of carriers, visits all elements that touch them and writes only
+//! the rows of its own carriers.
 //!
 //! Elements on a border between tasks are computed twice; nothing is locked, and every entry is summed in ascending
 //! element order: the bits do not depend on the tasks or the threads.
@@ -12,12 +12,12 @@ use crate::fem::pattern::{BlockPattern, BoundGroup, RowStarts};
 use crate::fem::scalar::Scalar;
 use crate::ids::ElementId;
 
-/// The symmetric matrix of one element with `N` nodes and `C` components a node, given block by block.
+/// The symmetric matrix of one element with `N` carriers and `C` components a carrier, given block by block.
 pub trait LocalMatrix<T, const N: usize, const C: usize> {
-    /// Entries of local node `a` (rows) against local node `b` (columns); `block(b, a)` is its transpose.
+    /// Entries of local carrier `a` (rows) against local carrier `b` (columns); `block(b, a)` is its transpose.
     fn block(&self, a: usize, b: usize) -> [[T; C]; C];
 
-    /// The matrix as one real number a pair of nodes, shape `(N, N)`, where that is all there is to it: every block is
+    /// The matrix as one real number a pair of carriers, shape `(N, N)`, where that is all there is to it: every block is
     /// the number times the identity on the first three components, and zero elsewhere. The upper triangle suffices.
     ///
     /// Most elements of a field problem are of this kind (a Laplacian for each component), and much faster so.
@@ -27,11 +27,11 @@ pub trait LocalMatrix<T, const N: usize, const C: usize> {
     }
 }
 
-/// One assembly task: the nodes it owns, and their part of the values.
+/// One assembly task: the carriers it owns, and their part of the values.
 struct Task<'a, T> {
-    nodes: &'a Range<usize>,
+    carriers: &'a Range<usize>,
     elements: &'a [ElementId],
-    /// Entries of the rows of `nodes`; the first of them is entry `first` of the matrix.
+    /// Entries of the rows of `carriers`; the first of them is entry `first` of the matrix.
     values: &'a mut [T],
     first: usize,
 }
@@ -53,11 +53,11 @@ impl<const C: usize> BlockPattern<C> {
         assert_eq!(values.len(), self.structure().columns.len(), "one value an entry");
         let mut rest = values;
         let mut tasks = Vec::with_capacity(self.tasks.len());
-        for (nodes, elements) in self.tasks.iter().zip(&group.elements) {
-            let entries = self.entries_of(nodes);
+        for (carriers, elements) in self.tasks.iter().zip(&group.elements) {
+            let entries = self.entries_of(carriers);
             let (values, others) = rest.split_at_mut(entries.len());
             rest = others;
-            tasks.push(Task { nodes, elements, values, first: entries.start });
+            tasks.push(Task { carriers, elements, values, first: entries.start });
         }
         tasks.into_par_iter().for_each(|mut task| {
             for &e in task.elements {
@@ -75,17 +75,17 @@ impl<const C: usize> BlockPattern<C> {
         local: &impl LocalMatrix<T, N, C>,
         task: &mut Task<'_, T>,
     ) {
-        let nodes = &group.connectivity[e.index()];
+        let carriers = &group.connectivity[e.index()];
         let positions = &group.blocks[e.index()];
-        let owned = nodes.map(|n| task.nodes.contains(&n.index()));
+        let owned = carriers.map(|n| task.carriers.contains(&n.index()));
         let rows: [RowStarts; N] = std::array::from_fn(|a| {
-            if owned[a] { self.row_starts_of(nodes[a], task.first) } else { RowStarts::default() }
+            if owned[a] { self.row_starts_of(carriers[a], task.first) } else { RowStarts::default() }
         });
         let scalars = local.scalars();
         for a in 0..N {
             for b in a..N {
                 let stored = |a: usize, b: usize| {
-                    if owned[a] { self.block(nodes[a], positions[a][b]) } else { None }
+                    if owned[a] { self.block(carriers[a], positions[a][b]) } else { None }
                 };
                 let (upper, lower) = (stored(a, b), if a == b { None } else { stored(b, a) });
                 if let Some(scalars) = &scalars {
@@ -117,9 +117,9 @@ mod tests {
     use crate::fem::csr::CsrMatrix;
     use crate::fem::dofs::DofMap;
     use crate::fem::pattern::{Coupling, ElementGroup};
-    use crate::ids::NodeId;
+    use crate::ids::CarrierId;
 
-    /// Symmetric block entries that depend on element, nodes and components, so that every mix-up shows.
+    /// Symmetric block entries that depend on element, carriers and components, so that every mix-up shows.
     struct Marked(usize);
 
     impl Marked {
@@ -153,15 +153,15 @@ mod tests {
 
     #[test]
     fn assembly_equals_a_sum_of_triplets() {
-        let node_count = 9000;
-        let connectivity: Vec<[NodeId; 4]> = (0..9000)
-            .map(|e| [e, (e * 7 + 1) % 9000, (e * 13 + 5) % 9000, (e * 29 + 11) % 9000].map(NodeId))
+        let carrier_count = 9000;
+        let connectivity: Vec<[CarrierId; 4]> = (0..9000)
+            .map(|e| [e, (e * 7 + 1) % 9000, (e * 13 + 5) % 9000, (e * 29 + 11) % 9000].map(CarrierId))
             .filter(|n| (1..4).all(|i| !n[..i].contains(&n[i])))
             .collect();
         let coupling = |e: usize| if e.is_multiple_of(3) { Coupling::diagonal(3) } else { Coupling::full(3) };
         let couplings: Vec<Coupling> = (0..connectivity.len()).map(coupling).collect();
-        let dofs = DofMap::<3>::new(node_count, |node, c| (node.index() + c) % 5 != 0);
-        let group = ElementGroup::new(node_count, connectivity.clone(), couplings);
+        let dofs = DofMap::<3>::new(carrier_count, |carrier, c| (carrier.index() + c) % 5 != 0);
+        let group = ElementGroup::new(carrier_count, connectivity.clone(), couplings);
         let pattern = BlockPattern::rectangular(&dofs, &dofs, &group);
         let bound = pattern.bind(&group);
         assert!(pattern.tasks.len() > 1);
@@ -170,12 +170,12 @@ mod tests {
 
         // An entry is stored where one element couples it; every element then adds its value there.
         let mut triplets = BTreeMap::<(usize, usize), (f64, bool)>::new();
-        for (e, nodes) in connectivity.iter().enumerate() {
+        for (e, carriers) in connectivity.iter().enumerate() {
             for (a, b) in (0..4).flat_map(|a| (0..4).map(move |b| (a, b))) {
                 let block = Marked(e).block(a, b);
                 for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
                     if let (Some(row), Some(column)) =
-                        (dofs.equation(nodes[a], i), dofs.equation(nodes[b], j))
+                        (dofs.equation(carriers[a], i), dofs.equation(carriers[b], j))
                     {
                         let entry = triplets.entry((row, column)).or_default();
                         entry.0 += block[i][j];
@@ -194,12 +194,13 @@ mod tests {
 
     #[test]
     fn the_bits_do_not_depend_on_the_threads_or_their_tasks() {
-        let node_count = 9000;
-        let connectivity: Vec<[NodeId; 4]> =
-            (0..9000).map(|e| [e, (e + 1) % 9000, (e + 90) % 9000, (e + 2000) % 9000].map(NodeId)).collect();
+        let carrier_count = 9000;
+        let connectivity: Vec<[CarrierId; 4]> = (0..9000)
+            .map(|e| [e, (e + 1) % 9000, (e + 90) % 9000, (e + 2000) % 9000].map(CarrierId))
+            .collect();
         let couplings = vec![Coupling::full(3); connectivity.len()];
-        let group = ElementGroup::new(node_count, connectivity, couplings);
-        let dofs = DofMap::<3>::new(node_count, |node, c| (node.index() + c) % 5 != 0);
+        let group = ElementGroup::new(carrier_count, connectivity, couplings);
+        let dofs = DofMap::<3>::new(carrier_count, |carrier, c| (carrier.index() + c) % 5 != 0);
         same_on_any_threads(|| {
             let pattern = BlockPattern::rectangular(&dofs, &dofs, &group);
             let bound = pattern.bind(&group);

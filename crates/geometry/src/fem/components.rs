@@ -22,7 +22,7 @@ use crate::fem::cholesky::{Cholesky, CholeskyAnalysis};
 use crate::fem::csr::{CsrMatrix, CsrStructure};
 use crate::fem::dofs::DofMap;
 use crate::fem::ordering;
-use crate::ids::NodeId;
+use crate::ids::CarrierId;
 
 /// The unknowns of one component, its block's pattern, and the symbolic factor, shared between equal patterns.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl ComponentAnalysis {
         // Number of every equation in its own block.
         let mut local = vec![0u32; dofs.count()];
         let mut equations: [Vec<u32>; C] = std::array::from_fn(|_| Vec::new());
-        for node in (0..dofs.node_count()).map(NodeId::new) {
+        for node in (0..dofs.carrier_count()).map(CarrierId::new) {
             for (c, own) in equations.iter_mut().enumerate() {
                 if let Some(equation) = dofs.equation(node, c) {
                     component[equation] = c as u8;
@@ -245,7 +245,7 @@ mod tests {
         let place = |i: usize| [i / m / m, i / m % m, i % m];
         let dofs = DofMap::<3>::new(m * m * m, |node, c| c < 2 || place(node.index())[0] > 0);
         let row = |(node, c): (usize, usize)| {
-            dofs.equation(NodeId::new(node), c)?;
+            dofs.equation(CarrierId::new(node), c)?;
             // Diagonally dominant: 6.1 against six neighbours of −0.9 and two components of 0.3.
             let mut row = vec![((node, c), 6.1)];
             row.extend((0..3).filter(|&d| d != c).map(|d| ((node, d), 0.3)));
@@ -253,7 +253,7 @@ mod tests {
                 row.extend((at > 0).then(|| ((node - stride, c), -0.9)));
                 row.extend((at + 1 < m).then(|| ((node + stride, c), -0.9)));
             }
-            let unknown = |((n, d), v)| Some((dofs.equation(NodeId::new(n), d)?, v));
+            let unknown = |((n, d), v)| Some((dofs.equation(CarrierId::new(n), d)?, v));
             Some(row.into_iter().filter_map(unknown).collect())
         };
         let rows = (0..m * m * m).flat_map(|node| (0..3).map(move |c| (node, c))).filter_map(row);

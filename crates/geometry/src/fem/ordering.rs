@@ -11,7 +11,7 @@ use fluxmorph_petsc::metis;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
-use crate::ids::NodeId;
+use crate::ids::CarrierId;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
 pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
@@ -34,7 +34,7 @@ pub fn nested_dissection_of_nodes<const C: usize>(
     dofs: &DofMap<C>,
 ) -> Option<Vec<u32>> {
     let (nodes, graph) = node_graph(structure, dofs);
-    let unknowns = |node: NodeId| (0..C).filter_map(move |c| dofs.equation(node, c));
+    let unknowns = |node: CarrierId| (0..C).filter_map(move |c| dofs.equation(node, c));
     let weights: Vec<i32> = nodes.iter().map(|&node| unknowns(node).count() as i32).collect();
     let order = metis::nested_dissection(&graph.row_starts, &graph.columns, Some(weights))?;
     Some(order.iter().flat_map(|&i| unknowns(nodes[i as usize])).map(|equation| equation as u32).collect())
@@ -44,18 +44,18 @@ pub fn nested_dissection_of_nodes<const C: usize>(
 pub(super) fn node_dissection<const C: usize>(
     dofs: &DofMap<C>,
     structure: &CsrStructure,
-) -> Option<Vec<NodeId>> {
+) -> Option<Vec<CarrierId>> {
     let (nodes, graph) = node_graph(structure, dofs);
     let order = dissection(&graph)?;
     Some(order.into_iter().map(|position| nodes[position as usize]).collect())
 }
 
 /// The nodes that have an unknown, and which of them the matrix couples.
-fn node_graph<const C: usize>(structure: &CsrStructure, dofs: &DofMap<C>) -> (Vec<NodeId>, CsrStructure) {
-    let mut nodes: Vec<NodeId> = Vec::new();
+fn node_graph<const C: usize>(structure: &CsrStructure, dofs: &DofMap<C>) -> (Vec<CarrierId>, CsrStructure) {
+    let mut nodes: Vec<CarrierId> = Vec::new();
     // Place in `nodes` of every equation's node.
     let mut place = vec![0u32; dofs.count()];
-    for node in (0..dofs.node_count()).map(NodeId::new) {
+    for node in (0..dofs.carrier_count()).map(CarrierId::new) {
         let own = (0..C).filter_map(|c| dofs.equation(node, c));
         if own.map(|equation| place[equation] = nodes.len() as u32).count() > 0 {
             nodes.push(node);
@@ -161,16 +161,16 @@ mod tests {
         let n = 60;
         let dofs = DofMap::<2>::new(n, |node, c| c == 1 || node.index() % 3 > 0);
         let row = |(node, c): (usize, usize)| {
-            dofs.equation(NodeId::new(node), c)?;
+            dofs.equation(CarrierId::new(node), c)?;
             let around = [(node + n - 1) % n, node, (node + 1) % n];
-            let coupled = around.into_iter().filter_map(|other| dofs.equation(NodeId::new(other), c));
+            let coupled = around.into_iter().filter_map(|other| dofs.equation(CarrierId::new(other), c));
             Some(coupled.map(|equation| (equation, 0.0)).collect())
         };
         let rows = (0..n).flat_map(|node| [(node, 0), (node, 1)]).filter_map(row);
         let structure = CsrMatrix::from_rows(dofs.count(), rows).structure;
         let order = nested_dissection_of_nodes(&structure, &dofs).expect("METIS orders a ring");
         let inverse = inverse_permutation(&order);
-        for node in (0..n).map(NodeId::new) {
+        for node in (0..n).map(CarrierId::new) {
             if let (Some(first), Some(second)) = (dofs.equation(node, 0), dofs.equation(node, 1)) {
                 assert_eq!(inverse[first] + 1, inverse[second]);
             }

@@ -1,8 +1,8 @@
-//! The sparsity pattern: which components at which nodes are coupled, from topology and couplings alone.
+//! The sparsity pattern: which components at which carriers are coupled, from topology and couplings alone.
 //!
 //! Elements come in groups of one shape (tetrahedra, triangles …), each element with the [`Coupling`] of components
 //! that it can produce. An entry is stored where at least one element couples it: never by looking at values, so that
-//! the pattern does not change while the mesh moves. The stored components of node `a` against node `b` are a *block*.
+//! the pattern does not change while the mesh moves. The stored components of carrier `a` against carrier `b` are a *block*.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ use rayon::prelude::*;
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
 use crate::fem::scalar::Scalar;
-use crate::ids::{ElementId, NodeId};
+use crate::ids::{CarrierId, ElementId};
 use crate::incidence::Incidence;
 
-/// Nodes of one assembly task at least: a smaller one is not worth the elements on its border, which are computed twice.
-const NODES_PER_TASK: usize = 2048;
+/// Carriers of one assembly task at least: a smaller one is not worth the elements on its border, which are computed twice.
+const CARRIERS_PER_TASK: usize = 2048;
 /// Tasks a thread: enough to even out their cost. The bits do not depend on the tasks, so the number of threads may
 /// decide.
 const TASKS_PER_THREAD: usize = 4;
 
-/// A set of component pairs `(row i, column j)` of a block with up to four components a node.
+/// A set of component pairs `(row i, column j)` of a block with up to four components a carrier.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Coupling(u16);
 
@@ -83,45 +83,51 @@ impl Coupling {
     }
 }
 
-/// Elements of one shape with `N` nodes, and what each couples.
+/// Elements of one shape with `N` carriers, and what each couples.
 #[derive(Clone, Debug)]
 pub struct ElementGroup<const N: usize> {
-    connectivity: Vec<[NodeId; N]>,
+    connectivity: Vec<[CarrierId; N]>,
     couplings: Vec<Coupling>,
     incidence: Incidence,
 }
 
 impl<const N: usize> ElementGroup<N> {
-    /// A group on `node_count` nodes; one coupling per element.
+    /// A group on `carrier_count` carriers; one coupling per element.
     ///
     /// # Panics
-    /// If the lengths differ or a node is out of range.
-    pub fn new(node_count: usize, connectivity: Vec<[NodeId; N]>, couplings: Vec<Coupling>) -> Self {
+    /// If the lengths differ or a carrier is out of range.
+    pub fn new<I: Into<CarrierId>>(
+        carrier_count: usize,
+        connectivity: Vec<[I; N]>,
+        couplings: Vec<Coupling>,
+    ) -> Self {
         assert_eq!(connectivity.len(), couplings.len(), "one coupling an element");
-        let incidence = Incidence::new(node_count, &connectivity);
+        let connectivity: Vec<[CarrierId; N]> =
+            connectivity.into_iter().map(|of| of.map(Into::into)).collect();
+        let incidence = Incidence::new(carrier_count, &connectivity);
         Self { connectivity, couplings, incidence }
     }
 }
 
 /// What the pattern asks of a group of elements of any shape.
 trait Couples: Sync {
-    /// Appends every node that elements of the group couple with `node`, and how; nodes may repeat.
-    fn couple(&self, node: NodeId, row: &mut Vec<(NodeId, Coupling)>);
+    /// Appends every carrier that elements of the group couple with `carrier`, and how; carriers may repeat.
+    fn couple(&self, carrier: CarrierId, row: &mut Vec<(CarrierId, Coupling)>);
 }
 
 impl<const N: usize> Couples for ElementGroup<N> {
-    fn couple(&self, node: NodeId, row: &mut Vec<(NodeId, Coupling)>) {
-        for e in self.incidence.around(node) {
+    fn couple(&self, carrier: CarrierId, row: &mut Vec<(CarrierId, Coupling)>) {
+        for e in self.incidence.around(carrier) {
             let coupling = self.couplings[e.index()];
             row.extend(self.connectivity[e.index()].iter().map(|&other| (other, coupling)));
         }
     }
 }
 
-/// The stored components of one node against another.
+/// The stored components of one carrier against another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Block {
-    node: NodeId,
+    carrier: CarrierId,
     coupling: Coupling,
     /// Entries of each row that come before this block.
     before: [u16; 4],
@@ -132,17 +138,17 @@ pub(super) struct Block {
 /// An entry that is not stored.
 const NO_ENTRY: u16 = u16::MAX;
 
-/// Where the rows of a node start, counted from the first entry of a task; meaningless for what is not an unknown.
+/// Where the rows of a carrier start, counted from the first entry of a task; meaningless for what is not an unknown.
 pub(super) type RowStarts = [usize; 4];
 
-/// Sparsity pattern of a system with `C ≤ 4` components a node.
+/// Sparsity pattern of a system with `C ≤ 4` components a carrier.
 #[derive(Debug)]
 pub struct BlockPattern<const C: usize> {
     rows: DofMap<C>,
     structure: Arc<CsrStructure>,
     block_starts: Vec<u32>,
     blocks: Vec<Block>,
-    /// Nodes of each assembly task.
+    /// Carriers of each assembly task.
     pub(super) tasks: Vec<std::ops::Range<usize>>,
 }
 
@@ -156,7 +162,7 @@ impl<const C: usize> BlockPattern<C> {
         Self::of_rows(dofs, dofs, volumes, surfaces)
     }
 
-    /// The pattern of some rows of that system: `rows` has the unknowns of some nodes only, `columns` all.
+    /// The pattern of some rows of that system: `rows` has the unknowns of some carriers only, `columns` all.
     pub fn of_rows<const N: usize, const M: usize>(
         rows: &DofMap<C>,
         columns: &DofMap<C>,
@@ -176,10 +182,10 @@ impl<const C: usize> BlockPattern<C> {
     }
 
     fn new(rows: &DofMap<C>, columns: &DofMap<C>, groups: &[&dyn Couples]) -> Self {
-        let node_count = rows.node_count();
-        let row_blocks: Vec<Vec<Block>> = (0..node_count)
+        let carrier_count = rows.carrier_count();
+        let row_blocks: Vec<Vec<Block>> = (0..carrier_count)
             .into_par_iter()
-            .map_init(Vec::new, |found, a| blocks_of(NodeId::new(a), rows, columns, groups, found))
+            .map_init(Vec::new, |found, a| blocks_of(CarrierId::new(a), rows, columns, groups, found))
             .collect();
 
         let mut row_starts = vec![0u32];
@@ -188,7 +194,7 @@ impl<const C: usize> BlockPattern<C> {
         let mut blocks = Vec::with_capacity(row_blocks.iter().map(Vec::len).sum());
         for (a, row) in row_blocks.into_iter().enumerate() {
             for i in 0..C {
-                if rows.equation(NodeId::new(a), i).is_none() {
+                if rows.equation(CarrierId::new(a), i).is_none() {
                     continue;
                 }
                 for block in &row {
@@ -196,7 +202,7 @@ impl<const C: usize> BlockPattern<C> {
                     column_indices.extend(
                         (0..C)
                             .filter(|j| coupled >> j & 1 == 1)
-                            .filter_map(|j| columns.equation(block.node, j))
+                            .filter_map(|j| columns.equation(block.carrier, j))
                             .map(|equation| equation as u32),
                     );
                 }
@@ -209,9 +215,10 @@ impl<const C: usize> BlockPattern<C> {
         let structure =
             Arc::new(CsrStructure { column_count: columns.count(), row_starts, columns: column_indices });
         let most = TASKS_PER_THREAD * rayon::current_num_threads();
-        let task_count = (node_count / NODES_PER_TASK).clamp(1, most);
-        let tasks =
-            (0..task_count).map(|t| t * node_count / task_count..(t + 1) * node_count / task_count).collect();
+        let task_count = (carrier_count / CARRIERS_PER_TASK).clamp(1, most);
+        let tasks = (0..task_count)
+            .map(|t| t * carrier_count / task_count..(t + 1) * carrier_count / task_count)
+            .collect();
         Self { rows: rows.clone(), structure, block_starts, blocks, tasks }
     }
 
@@ -225,26 +232,31 @@ impl<const C: usize> BlockPattern<C> {
         &self.rows
     }
 
-    /// Finds the block of every pair of nodes of every element, once for all assemblies.
+    /// Finds the block of every pair of carriers of every element, once for all assemblies.
     ///
     /// # Panics
     /// If the group was not among those the pattern was made of.
     pub fn bind<const N: usize>(&self, group: &ElementGroup<N>) -> BoundGroup<N> {
-        let block_of = |a: NodeId, b: NodeId| {
+        let block_of = |a: CarrierId, b: CarrierId| {
             let row = self.blocks_at(a);
-            row.binary_search_by_key(&b, |block| block.node).map_or(NO_BLOCK, |p| p as u16)
+            row.binary_search_by_key(&b, |block| block.carrier).map_or(NO_BLOCK, |p| p as u16)
         };
         let blocks = group
             .connectivity
             .par_iter()
-            .map(|nodes| std::array::from_fn(|a| std::array::from_fn(|b| block_of(nodes[a], nodes[b]))))
+            .map(|carriers| {
+                std::array::from_fn(|a| std::array::from_fn(|b| block_of(carriers[a], carriers[b])))
+            })
             .collect();
         let elements = self
             .tasks
             .par_iter()
-            .map(|nodes| {
-                let mut touched: Vec<ElementId> =
-                    nodes.clone().flat_map(|a| group.incidence.around(NodeId::new(a))).copied().collect();
+            .map(|carriers| {
+                let mut touched: Vec<ElementId> = carriers
+                    .clone()
+                    .flat_map(|a| group.incidence.around(CarrierId::new(a)))
+                    .copied()
+                    .collect();
                 touched.sort_unstable();
                 touched.dedup();
                 touched
@@ -253,42 +265,42 @@ impl<const C: usize> BlockPattern<C> {
         BoundGroup { connectivity: group.connectivity.clone(), blocks, elements }
     }
 
-    pub(super) fn blocks_at(&self, node: NodeId) -> &[Block] {
-        let i = node.index();
+    pub(super) fn blocks_at(&self, carrier: CarrierId) -> &[Block] {
+        let i = carrier.index();
         &self.blocks[self.block_starts[i] as usize..self.block_starts[i + 1] as usize]
     }
 
-    /// Where the rows of a node start, counted from the entry `first`.
+    /// Where the rows of a carrier start, counted from the entry `first`.
     #[inline]
-    pub(super) fn row_starts_of(&self, node: NodeId, first: usize) -> RowStarts {
+    pub(super) fn row_starts_of(&self, carrier: CarrierId, first: usize) -> RowStarts {
         let mut starts = [0; 4];
         for (i, start) in starts.iter_mut().enumerate().take(C) {
-            if let Some(equation) = self.rows.equation(node, i) {
+            if let Some(equation) = self.rows.equation(carrier, i) {
                 *start = self.structure.row_starts[equation] as usize - first;
             }
         }
         starts
     }
 
-    /// The block at a position among those of a node.
+    /// The block at a position among those of a carrier.
     #[inline]
-    pub(super) fn block(&self, node: NodeId, position: u16) -> Option<&Block> {
+    pub(super) fn block(&self, carrier: CarrierId, position: u16) -> Option<&Block> {
         if position == NO_BLOCK {
             return None;
         }
-        self.blocks.get(self.block_starts[node.index()] as usize + position as usize)
+        self.blocks.get(self.block_starts[carrier.index()] as usize + position as usize)
     }
 
-    /// Range of the stored entries of the rows of a range of nodes.
-    pub(super) fn entries_of(&self, nodes: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+    /// Range of the stored entries of the rows of a range of carriers.
+    pub(super) fn entries_of(&self, carriers: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let first_equation_from = |start: usize| {
-            (start..self.rows.node_count())
+            (start..self.rows.carrier_count())
                 .flat_map(|a| (0..C).map(move |c| (a, c)))
-                .find_map(|(a, c)| self.rows.equation(NodeId::new(a), c))
+                .find_map(|(a, c)| self.rows.equation(CarrierId::new(a), c))
                 .unwrap_or(self.rows.count())
         };
-        let start = self.structure.row_starts[first_equation_from(nodes.start)] as usize;
-        let end = self.structure.row_starts[first_equation_from(nodes.end)] as usize;
+        let start = self.structure.row_starts[first_equation_from(carriers.start)] as usize;
+        let end = self.structure.row_starts[first_equation_from(carriers.end)] as usize;
         start..end
     }
 }
@@ -327,33 +339,33 @@ impl Block {
     }
 }
 
-/// A pair of nodes of which nothing is stored.
+/// A pair of carriers of which nothing is stored.
 const NO_BLOCK: u16 = u16::MAX;
 
 /// A group of elements with the places of its blocks in one pattern.
 #[derive(Debug)]
 pub struct BoundGroup<const N: usize> {
-    pub(super) connectivity: Vec<[NodeId; N]>,
+    pub(super) connectivity: Vec<[CarrierId; N]>,
     pub(super) blocks: Vec<[[u16; N]; N]>,
-    /// Elements that touch the nodes of each task.
+    /// Elements that touch the carriers of each task.
     pub(super) elements: Vec<Vec<ElementId>>,
 }
 
 impl<const N: usize> BoundGroup<N> {
-    /// Nodes of an element of the group.
+    /// Carriers of an element of the group.
     #[inline]
-    pub fn nodes_of(&self, e: ElementId) -> [NodeId; N] {
+    pub fn carriers_of(&self, e: ElementId) -> [CarrierId; N] {
         self.connectivity[e.index()]
     }
 }
 
-/// The blocks of one node, ascending by node.
+/// The blocks of one carrier, ascending by carrier.
 fn blocks_of<const C: usize>(
-    a: NodeId,
+    a: CarrierId,
     rows: &DofMap<C>,
     columns: &DofMap<C>,
     groups: &[&dyn Couples],
-    found: &mut Vec<(NodeId, Coupling)>,
+    found: &mut Vec<(CarrierId, Coupling)>,
 ) -> Vec<Block> {
     let row_bits = rows.unknown_bits(a);
     if row_bits == 0 {
@@ -363,15 +375,15 @@ fn blocks_of<const C: usize>(
     for group in groups {
         group.couple(a, found);
     }
-    found.sort_unstable_by_key(|&(node, _)| node);
+    found.sort_unstable_by_key(|&(carrier, _)| carrier);
     let mut blocks = Vec::new();
     let mut before = [0u16; 4];
     for same in found.chunk_by(|x, y| x.0 == y.0) {
-        let node = same[0].0;
+        let carrier = same[0].0;
         let coupling = same
             .iter()
             .fold(Coupling::NONE, |set, &(_, c)| set.union(c))
-            .restrict(row_bits, columns.unknown_bits(node));
+            .restrict(row_bits, columns.unknown_bits(carrier));
         if coupling == Coupling::NONE {
             continue;
         }
@@ -380,14 +392,14 @@ fn blocks_of<const C: usize>(
             let lower = row & ((1 << i) - 1);
             if row >> i & 1 == 1 { before[i] + lower.count_ones() as u16 } else { NO_ENTRY }
         });
-        blocks.push(Block { node, coupling, before, diagonal });
+        blocks.push(Block { carrier, coupling, before, diagonal });
         for (i, before) in before.iter_mut().enumerate() {
             *before += coupling.row(i).count_ones() as u16;
         }
         // Four more entries would have to be counted after the last block.
         assert!(before.iter().all(|&b| b < NO_ENTRY - 4), "fewer than 65531 entries a row");
     }
-    assert!(blocks.len() < NO_BLOCK as usize, "fewer than 65535 neighbours a node");
+    assert!(blocks.len() < NO_BLOCK as usize, "fewer than 65535 neighbours a carrier");
     blocks
 }
 

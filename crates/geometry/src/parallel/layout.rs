@@ -2,7 +2,7 @@
 
 use crate::fem::c64;
 use crate::fem::dofs::DofMap;
-use crate::ids::NodeId;
+use crate::ids::CarrierId;
 
 /// Who owns which equation of a system, and its number in the distributed matrix.
 ///
@@ -27,11 +27,11 @@ impl RowLayout {
         dofs: &DofMap<C>,
         ranks: usize,
         rank: usize,
-        owner_of: impl Fn(NodeId) -> usize,
+        owner_of: impl Fn(CarrierId) -> usize,
     ) -> Self {
         let mut owner = vec![0u32; dofs.count()];
         let mut counts = vec![0u32; ranks];
-        for node in (0..dofs.node_count()).map(NodeId::new) {
+        for node in (0..dofs.carrier_count()).map(CarrierId::new) {
             for equation in (0..C).filter_map(|c| dofs.equation(node, c)) {
                 let own = owner_of(node);
                 owner[equation] = own as u32;
@@ -114,7 +114,7 @@ mod tests {
     fn what_is_distributed_by_rows_is_joined_again() {
         let dofs = DofMap::<3>::new(40, |node, c| (node.index() + c) % 4 != 0);
         // Rank 2 owns nothing.
-        let owner = |node: NodeId| [0, 3, 1][node.index() % 3];
+        let owner = |node: CarrierId| [0, 3, 1][node.index() % 3];
         let layouts: Vec<RowLayout> = (0..4).map(|rank| RowLayout::new(&dofs, 4, rank, owner)).collect();
         let values: Vec<c64> = (0..dofs.count()).map(|e| c64::new(e as f64, -(e as f64))).collect();
         let numbers: Vec<f64> = numbers_of(&values).collect();

@@ -9,12 +9,12 @@
 //! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
 //! order, [`interface`] the triangles, [`impedance`] the Leontovich surface with `ψ` on it; [`lagrange`], [`quadrature`] and
 //! [`tabulated`] what they are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
-//! [`density`] integrals of energy and loss with their derivatives; [`edge`] all of that for edge elements.
+//! [`density`] integrals of energy and loss with their derivatives; `edge` all of that for edge elements.
 
 pub mod density;
 #[cfg(test)]
 mod differences;
-pub mod edge;
+pub(crate) mod edge;
 pub mod impedance;
 pub mod interface;
 pub mod lagrange;
@@ -26,6 +26,8 @@ mod triangle;
 pub mod volume;
 
 use fluxmorph_geometry::fem::c64;
+
+pub use edge::FieldPoint;
 
 /// The three components of a nodal vector potential, or of its adjoint.
 pub type Complex3 = [c64; 3];

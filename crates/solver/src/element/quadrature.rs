@@ -3,6 +3,17 @@
 /// A point and its share of the volume.
 pub type Node = ([f64; 4], f64);
 
+/// The four vertices, in their order: exact for linear polynomials.
+pub fn vertices() -> &'static [Node; 4] {
+    const RULE: [Node; 4] = [
+        ([1.0, 0.0, 0.0, 0.0], 0.25),
+        ([0.0, 1.0, 0.0, 0.0], 0.25),
+        ([0.0, 0.0, 1.0, 0.0], 0.25),
+        ([0.0, 0.0, 0.0, 1.0], 0.25),
+    ];
+    &RULE
+}
+
 /// Four points, exact for quadratic polynomials (Hammer, Marlowe and Stroud, Math. Tables Aids Comput. 10 (1956) 130).
 pub fn degree_2() -> &'static [Node; 4] {
     const NEAR: f64 = 0.585_410_196_624_968_5;

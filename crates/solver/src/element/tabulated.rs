@@ -14,6 +14,8 @@ use super::quadrature::{self, Node};
 pub enum Rule {
     /// The centroid: exact for linear polynomials.
     Centroid,
+    /// The vertices, in their order: exact for linear polynomials.
+    Vertices,
     /// Exact for polynomials of degree 2.
     Degree2,
     /// Exact for polynomials of degree 5.
@@ -22,12 +24,13 @@ pub enum Rule {
 
 impl Rule {
     /// All rules, in the order of their tables.
-    pub const ALL: [Self; 3] = [Self::Centroid, Self::Degree2, Self::Degree5];
+    pub const ALL: [Self; 4] = [Self::Centroid, Self::Vertices, Self::Degree2, Self::Degree5];
 
     /// Points and weights.
     pub fn nodes(self) -> &'static [Node] {
         match self {
             Self::Centroid => &[([0.25; 4], 1.0)],
+            Self::Vertices => quadrature::vertices(),
             Self::Degree2 => quadrature::degree_2(),
             Self::Degree5 => quadrature::degree_5(),
         }

@@ -4,7 +4,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
 use super::FunctionalValue;
@@ -133,14 +133,14 @@ impl<'a> Sum<'a> {
         for chunk in elements.chunks(CHUNK) {
             let integrals: Vec<_> = chunk.par_iter().map(|&e| integral(e)).collect();
             for (&e, integral) in chunk.iter().zip(&integrals) {
-                self.add(self.model.space().nodes_of(e), &self.model.topology().tet(e), integral);
+                self.add(self.model.space().carriers_of(e), &self.model.topology().tet(e), integral);
             }
         }
     }
 
     fn add<const M: usize>(
         &mut self,
-        carriers: &[NodeId],
+        carriers: &[CarrierId],
         vertices: &[NodeId; M],
         integral: &LocalIntegral<M>,
     ) {

@@ -109,7 +109,7 @@ impl Observation {
             let by_b = by_b.map(|c| c / volume);
             for &e in cell {
                 let cell = model.space().cell(mesh, e);
-                let carriers = model.space().nodes_of(e);
+                let carriers = model.space().carriers_of(e);
                 model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
                     let mut local = [c64::default(); 4];
                     local[component] = (0..3).map(|d| by_b[d] * (share * cell.tet.volume * curl[d])).sum();

@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::NodeId;
+use fluxmorph_geometry::CarrierId;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap, c64};
 
@@ -32,13 +32,13 @@ type Graph = Vec<Vec<(u32, f64)>>;
 pub(crate) fn prolongation(
     dofs: &DofMap<4>,
     matrix: &CsrMatrix<c64>,
-    kept: impl Fn(NodeId) -> bool,
+    kept: impl Fn(CarrierId) -> bool,
     passes: usize,
 ) -> CsrMatrix<f64> {
     let n = dofs.count();
     let mut component = vec![0u8; n];
     let mut active = vec![false; n];
-    for node in (0..dofs.node_count()).map(NodeId::new) {
+    for node in (0..dofs.carrier_count()).map(CarrierId::new) {
         for c in 0..4 {
             if let Some(equation) = dofs.equation(node, c) {
                 component[equation] = c as u8;

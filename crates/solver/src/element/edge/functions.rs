@@ -23,7 +23,7 @@ use super::polynomial::Polynomial;
 use crate::space::Order;
 
 /// Component of the Whitney function of an edge.
-pub const WHITNEY: usize = 0;
+pub(crate) const WHITNEY: usize = 0;
 
 /// Whether a component of an edge or of a face is a gradient.
 pub(crate) fn is_gradient(order: Order, is_edge: bool, component: usize) -> bool {
@@ -31,10 +31,10 @@ pub(crate) fn is_gradient(order: Order, is_edge: bool, component: usize) -> bool
 }
 
 /// Local vertices of the faces of a simplex with ascending vertices.
-pub const ASCENDING_FACES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
+pub(crate) const ASCENDING_FACES: [[usize; 3]; 4] = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
 
 /// Local edges of a triangle with ascending vertices.
-pub const ASCENDING_TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
+pub(crate) const ASCENDING_TRIANGLE_EDGES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];
 
 /// A function `Σ_n p_n ∇λ_n`, and where it belongs.
 #[derive(Clone, Debug)]

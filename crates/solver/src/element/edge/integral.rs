@@ -19,7 +19,7 @@ struct Density {
 
 impl<const N: usize, const M: usize> EdgeShape<N, M> {
     /// `f ∫|B − B_r|² dV`; `remanence` is `B_r` [T], zero outside magnets.
-    pub fn flux_energy(
+    pub(crate) fn flux_energy(
         &self,
         cell: (&Tet4, &Ascending),
         factor: f64,
@@ -42,7 +42,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// `f ∫|A + ∇ψ|² dV`.
-    pub fn eddy_loss(
+    pub(crate) fn eddy_loss(
         &self,
         cell: (&Tet4, &Ascending),
         factor: f64,
@@ -62,7 +62,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// The mean of `|A + ∇ψ|²` [T² m²].
-    pub fn mean_square(&self, tet: &Ascending, coefficients: &[[c64; 4]]) -> f64 {
+    pub(crate) fn mean_square(&self, tet: &Ascending, coefficients: &[[c64; 4]]) -> f64 {
         let square = |at: &FieldPoint| at.electric_potential.iter().map(|c| c.norm_sqr()).sum::<f64>();
         self.fields(self.value_rule(), tet, coefficients).map(|(share, at)| share * square(&at)).sum()
     }

@@ -8,11 +8,11 @@
 //! it with their derivatives ([`integral`]), the impedance surface ([`triangle`]). Does not live here: who has which
 //! unknown ([`crate::space`], [`crate::unknowns`]).
 
-pub mod functions;
-pub mod integral;
+pub(crate) mod functions;
+mod integral;
 mod polynomial;
-pub mod tet;
-pub mod triangle;
+pub(crate) mod tet;
+pub(crate) mod triangle;
 
 use std::sync::LazyLock;
 
@@ -26,19 +26,19 @@ use functions::ASCENDING_FACES;
 
 /// A tetrahedron as its edge functions see it: the vertices in ascending order of their numbers.
 #[derive(Clone, Copy, Debug)]
-pub struct Ascending {
+pub(crate) struct Ascending {
     /// `V` [m³].
-    pub volume: f64,
+    pub(crate) volume: f64,
     /// `∇λ_n` [1/m].
-    pub gradients: [Point; 4],
+    pub(crate) gradients: [Point; 4],
     /// `∇λ_m × ∇λ_n` [1/m²] for the pairs of [`EDGES`].
-    pub products: [Point; 6],
+    pub(crate) products: [Point; 6],
 }
 
 impl Ascending {
     /// From a tetrahedron and the place of each ascending vertex in it.
     #[inline]
-    pub fn new(tet: &Tet4, order: [u8; 4]) -> Self {
+    pub(crate) fn new(tet: &Tet4, order: [u8; 4]) -> Self {
         let gradients = order.map(|place| tet.gradients[usize::from(place)]);
         let products = EDGES.map(|[m, n]| cross(gradients[m], gradients[n]));
         Self { volume: tet.volume, gradients, products }
@@ -74,7 +74,7 @@ pub(super) struct At<const M: usize> {
 
 /// Edge functions of one order: `N` edges and faces with unknowns, `M` functions.
 #[derive(Debug)]
-pub struct EdgeShape<const N: usize, const M: usize> {
+pub(crate) struct EdgeShape<const N: usize, const M: usize> {
     all: Vec<functions::Function>,
     curls: Vec<[polynomial::Polynomial; 6]>,
     /// Carrier and component of every function, the rotational ones first.
@@ -93,14 +93,14 @@ static SECOND: LazyLock<EdgeShape<10, 30>> = LazyLock::new(|| EdgeShape::new(Ord
 
 impl EdgeShape<6, 12> {
     /// First order: six edges.
-    pub fn tet() -> &'static Self {
+    pub(crate) fn tet() -> &'static Self {
         &FIRST
     }
 }
 
 impl EdgeShape<10, 30> {
     /// Second order: six edges and four faces.
-    pub fn tet() -> &'static Self {
+    pub(crate) fn tet() -> &'static Self {
         &SECOND
     }
 }
@@ -137,7 +137,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// Carrier, component, value [1/m] and curl [1/m²] of every function at a point given by the ascending coordinates.
-    pub fn functions_at(
+    pub(crate) fn functions_at(
         &self,
         tet: &Ascending,
         lambda: &[f64; 4],
@@ -189,12 +189,22 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// The field at a point given by the ascending coordinates.
-    pub fn field_at(&self, tet: &Ascending, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
+    pub(crate) fn field_at(
+        &self,
+        tet: &Ascending,
+        lambda: &[f64; 4],
+        coefficients: &[[c64; 4]],
+    ) -> FieldPoint {
         self.field(&self.at(lambda, 1.0), tet, coefficients)
     }
 
+    /// The field at one of the ascending vertices.
+    pub(crate) fn at_vertex(&self, tet: &Ascending, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint {
+        self.field(&self.tables[Rule::Vertices as usize][vertex], tet, coefficients)
+    }
+
     /// The field at the centroid.
-    pub fn at_centroid(&self, tet: &Ascending, coefficients: &[[c64; 4]]) -> FieldPoint {
+    pub(crate) fn at_centroid(&self, tet: &Ascending, coefficients: &[[c64; 4]]) -> FieldPoint {
         self.field(&self.tables[Rule::Centroid as usize][0], tet, coefficients)
     }
 }

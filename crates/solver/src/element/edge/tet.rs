@@ -13,7 +13,7 @@ use super::{Ascending, EdgeShape, combine};
 /// The matrix of a tetrahedron with `N` carriers and `M` functions, shape `(N × 4, N × 4)`; zero where a carrier has no
 /// function of a component.
 #[derive(Clone, Copy, Debug)]
-pub struct EdgeTet<const N: usize, const M: usize> {
+pub(crate) struct EdgeTet<const N: usize, const M: usize> {
     shape: &'static EdgeShape<N, M>,
     coefficients: Coefficients,
     /// `∫curl·curl`, of rotational functions.
@@ -24,7 +24,7 @@ pub struct EdgeTet<const N: usize, const M: usize> {
 
 impl<const N: usize, const M: usize> EdgeTet<N, M> {
     /// The element matrix for given geometry and coefficients.
-    pub fn new(shape: &'static EdgeShape<N, M>, tet: &Ascending, coefficients: Coefficients) -> Self {
+    pub(crate) fn new(shape: &'static EdgeShape<N, M>, tet: &Ascending, coefficients: Coefficients) -> Self {
         let mut curl = [[0.0; M]; M];
         for at in &shape.tables[shape.curl_rule() as usize] {
             let weight = at.share * tet.volume;
@@ -72,7 +72,7 @@ impl<const N: usize, const M: usize> LocalMatrix<c64, N, 4> for EdgeTet<N, M> {
 
 impl<const N: usize, const M: usize> EdgeShape<N, M> {
     /// `∂/∂x_k (λᵀ K_e u)` for the four vertices of `plain`, shape `(4, 3)`; the coefficients are held.
-    pub fn shape_derivative(
+    pub(crate) fn shape_derivative(
         &self,
         (plain, tet): (&Tet4, &Ascending),
         law: &Coefficients,
@@ -93,7 +93,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
 
     /// `λ_b`-weighted source moments `M_b = ∫T λ_b dV` [A m²], in ascending order of the vertices, to the load
     /// `f_a = ∫T·curl w_a`.
-    pub fn curl_load(&self, tet: &Ascending, moments: &[Complex3; 4]) -> [[c64; 4]; N] {
+    pub(crate) fn curl_load(&self, tet: &Ascending, moments: &[Complex3; 4]) -> [[c64; 4]; N] {
         let mut load = [[c64::default(); 4]; N];
         let along = moments.map(|m| tet.products.map(|x| (0..3).map(|d| m[d] * x[d]).sum::<c64>()));
         for (f, &(carrier, component)) in self.slots.iter().enumerate().take(self.rotational) {
@@ -106,7 +106,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// Load `∫J·w_a dV` of a current density that is constant in the element [A/m²].
-    pub fn current_load(&self, tet: &Ascending, current_density: &Complex3) -> [[c64; 4]; N] {
+    pub(crate) fn current_load(&self, tet: &Ascending, current_density: &Complex3) -> [[c64; 4]; N] {
         let mut load = [[c64::default(); 4]; N];
         for at in &self.tables[self.value_rule() as usize] {
             let weight = at.share * tet.volume;
@@ -121,7 +121,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
 
     /// `∂/∂x_k (λᵀ f)` for the load of a source `T` that is constant in the element and moves with it, shape `(4, 3)`:
     /// `δ∫T·B = ∫T·(∇v)B`.
-    pub fn magnet_shape_derivative(
+    pub(crate) fn magnet_shape_derivative(
         &self,
         (plain, tet): (&Tet4, &Ascending),
         source: Point,

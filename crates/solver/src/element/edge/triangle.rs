@@ -17,7 +17,7 @@ use crate::space::Order;
 
 /// Edge functions on a triangle: `N` edges and faces with unknowns, `M` functions.
 #[derive(Debug)]
-pub struct EdgeTriangleShape<const N: usize, const M: usize> {
+pub(crate) struct EdgeTriangleShape<const N: usize, const M: usize> {
     slots: [(usize, usize); M],
     /// `⟨p_m q_n⟩`, index `[f][g][m][n]`.
     means: Vec<[[[f64; 3]; 3]; M]>,
@@ -29,21 +29,21 @@ static SECOND: LazyLock<EdgeTriangleShape<4, 12>> =
 
 impl EdgeTriangleShape<3, 6> {
     /// First order: three edges.
-    pub fn triangle() -> &'static Self {
+    pub(crate) fn triangle() -> &'static Self {
         &FIRST
     }
 }
 
 impl EdgeTriangleShape<4, 12> {
     /// Second order: three edges and the face.
-    pub fn triangle() -> &'static Self {
+    pub(crate) fn triangle() -> &'static Self {
         &SECOND
     }
 }
 
 /// The matrix of one triangle, shape `(N × 4, N × 4)`.
 #[derive(Clone, Copy, Debug)]
-pub struct EdgeTriangle<const N: usize> {
+pub(crate) struct EdgeTriangle<const N: usize> {
     entries: [[[[f64; 4]; 4]; N]; N],
     coefficient: c64,
 }
@@ -67,7 +67,7 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
     }
 
     /// The matrix for three vertices [m] and the coefficient `jω/Zs` [1/H].
-    pub fn matrix(&self, vertices: [Point; 3], coefficient: c64) -> EdgeTriangle<N> {
+    pub(crate) fn matrix(&self, vertices: [Point; 3], coefficient: c64) -> EdgeTriangle<N> {
         let geometry = Triangle::new(vertices);
         let mut entries = [[[[0.0; 4]; 4]; N]; N];
         for (f, &(a, i)) in self.slots.iter().enumerate() {
@@ -97,7 +97,7 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
     }
 
     /// `∂/∂x_k (λᵀ M u)` for the three vertices, shape `(3, 3)`: of `c/4S Σ_mn R_mn e_m·e_n`.
-    pub fn shape_derivative(
+    pub(crate) fn shape_derivative(
         &self,
         vertices: [Point; 3],
         coefficient: c64,
@@ -110,7 +110,12 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
     }
 
     /// `f ∫|(A + ∇ψ)_t|² dS`.
-    pub fn loss(&self, vertices: [Point; 3], factor: f64, field: &[[c64; 4]]) -> ElementIntegral<N, 3> {
+    pub(crate) fn loss(
+        &self,
+        vertices: [Point; 3],
+        factor: f64,
+        field: &[[c64; 4]],
+    ) -> ElementIntegral<N, 3> {
         let coefficient = c64::new(factor, 0.0);
         let field: &[[c64; 4]; N] = field.try_into().expect("one entry a carrier");
         quadratic_form(&self.matrix(vertices, coefficient), field, |conjugate| {
