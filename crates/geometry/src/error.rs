@@ -87,6 +87,14 @@ pub enum MeshError {
         /// Most there may be.
         most: usize,
     },
+    /// A refinement would pass a limit.
+    #[error("a finer mesh would have more than {most} {what}: it is refined as far as it may be")]
+    RefinementLimit {
+        /// What there would be too many of.
+        what: &'static str,
+        /// Most there may be.
+        most: usize,
+    },
     /// A sparse factorisation failed.
     #[error("the sparse factorisation of {unknowns} unknowns failed: {cause}")]
     Factorisation {

@@ -21,6 +21,7 @@ pub mod locate;
 pub mod mesh;
 pub mod parallel;
 pub mod quality;
+pub mod refine;
 pub mod tet4;
 pub mod topology;
 

@@ -5,6 +5,7 @@ mod msh;
 mod msh_damaged;
 mod msh_support;
 mod properties;
+mod refine;
 mod regressions;
 mod shield;
 mod tet_counts;
