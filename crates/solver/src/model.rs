@@ -126,6 +126,7 @@ impl FieldModel {
         let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
+            hosts: fine.hosts(),
             reference: &|| fine.assemble(&weak_form, mesh),
             prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
         };

@@ -1,8 +1,8 @@
 //! The nodal finite-element kernel shared by the elastic and the electromagnetic problem.
 //!
 //! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
-//! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`]),
-//! the sparse Cholesky factor ([`cholesky`]), the factor of complex symmetric systems ([`ldlt`]), the one without fill
+//! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`], and
+//! [`lifted_ordering`] of functions on edges and faces), the sparse Cholesky factor ([`cholesky`]), the factor of complex symmetric systems ([`ldlt`]), the one without fill
 //! ([`incomplete`]) and, for elastic systems too large for a factor, conjugate gradients
 //! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here:
 //! any weak form, any material, any boundary condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
@@ -16,6 +16,7 @@ pub mod csr;
 pub mod dofs;
 pub mod incomplete;
 pub mod ldlt;
+pub mod lifted_ordering;
 pub mod ordering;
 pub mod pattern;
 pub mod scalar;
@@ -28,5 +29,6 @@ pub use csr::CsrMatrix;
 pub use dofs::DofMap;
 pub use incomplete::{Incomplete, IncompleteAnalysis};
 pub use ldlt::{FactorScalar, Ldlt, LdltAnalysis};
+pub use lifted_ordering::{Hosts, lifted_dissection};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
 pub use scalar::{Scalar, advance, axpy, c32, c64, dot, norm, scale_add};

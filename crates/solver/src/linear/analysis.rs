@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, c64, ordering};
+use fluxmorph_geometry::fem::{
+    CsrMatrix, Hosts, IncompleteAnalysis, LdltAnalysis, c64, lifted_dissection, ordering,
+};
 
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
@@ -17,6 +19,8 @@ use crate::space::Order;
 pub(crate) struct SystemPattern<'a> {
     /// The pattern.
     pub(crate) structure: &'a Arc<CsrStructure>,
+    /// What the unknowns are ordered by, where they are not vertices' alone.
+    pub(crate) hosts: Option<Hosts>,
     /// Makes the matrix on the reference mesh: strong couplings are taken from it, once.
     pub(crate) reference: &'a dyn Fn() -> CsrMatrix<c64>,
     /// Makes the prolongation from a coarse level, for that matrix.
@@ -33,6 +37,7 @@ pub struct SystemAnalysis {
     field: FieldKind,
     order: Order,
     structure: Arc<CsrStructure>,
+    hosts: Option<Hosts>,
     method: Method,
     /// Once made; the cause where it cannot be.
     complete: Mutex<Option<Result<Arc<LdltAnalysis>, String>>>,
@@ -48,7 +53,7 @@ impl SystemAnalysis {
     /// # Errors
     /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
     pub(crate) fn new(
-        pattern: SystemPattern<'_>,
+        mut pattern: SystemPattern<'_>,
         (field, order): (FieldKind, Order),
         settings: LinearSolverSettings,
     ) -> Result<Self, SolverError> {
@@ -57,6 +62,7 @@ impl SystemAnalysis {
             field,
             order,
             structure: Arc::clone(pattern.structure),
+            hosts: pattern.hosts.take(),
             method: Method::Incomplete,
             complete: Mutex::default(),
             incomplete: None,
@@ -204,7 +210,10 @@ impl SystemAnalysis {
         let mut held = self.complete.lock().unwrap_or_else(PoisonError::into_inner);
         let analysis = held.get_or_insert_with(|| {
             // On the graph of the matrix, not of the mesh: components that do not couple are graphs of their own.
-            let order = ordering::dissection(&self.structure);
+            let order = match &self.hosts {
+                None => ordering::dissection(&self.structure),
+                Some(hosts) => lifted_dissection(&self.structure, hosts),
+            };
             LdltAnalysis::new(&self.structure, order).map_err(|error| error.to_string())
         });
         analysis
