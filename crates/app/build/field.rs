@@ -1,5 +1,7 @@
 //! The field problems of a configuration.
 
+use std::sync::Arc;
+
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{Mesh, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -8,10 +10,11 @@ use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
 };
 use fluxmorph_solver::{
-    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Order, SolverError, SurfaceLaw,
-    UniformField,
+    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError,
+    SurfaceLaw, UniformField,
 };
 
+use super::curves::Curves;
 use super::locate_error::DiagnosticSink;
 use crate::config::{
     self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
@@ -115,7 +118,7 @@ pub(super) fn field_models(
     config: &Config,
     mesh: &Mesh,
     conductors: &[Conductor],
-    coils: &[coil::Coil],
+    (coils, curves): (&[coil::Coil], &Curves),
     share: Option<&Ownership>,
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
@@ -125,7 +128,7 @@ pub(super) fn field_models(
             Some(model) => model.at_frequency(mesh, frequency)?,
             None => {
                 let sources = (conductors.to_vec(), coils.to_vec());
-                field_model(config, mesh, frequency, sources, share)?
+                field_model(config, mesh, frequency, (sources, curves), share)?
             }
         });
     }
@@ -136,10 +139,19 @@ fn field_model(
     config: &Config,
     mesh: &Mesh,
     frequency: f64,
-    (conductors, coils): (Vec<Conductor>, Vec<coil::Coil>),
+    ((conductors, coils), curves): ((Vec<Conductor>, Vec<coil::Coil>), &Curves),
     share: Option<&Ownership>,
 ) -> Result<FieldModel, Error> {
-    let materials = mesh.topology().region_names().iter().map(|name| super::material(config, name)).collect();
+    let names = mesh.topology().region_names();
+    let bh: Vec<Option<Arc<BhCurve>>> = names.iter().map(|name| curves.of(config, name)).collect();
+    let material = |(name, curve): (&String, &Option<Arc<BhCurve>>)| match curve {
+        None => super::material(config, name),
+        // What is left of a linear material is the penalty of nodal elements.
+        Some(curve) => {
+            Material { relative_permeability: curve.largest_permeability(), ..super::material(config, name) }
+        }
+    };
+    let materials = names.iter().zip(&bh).map(material).collect();
     let of = |names: &[String], boundary: Boundary| -> Vec<(String, Boundary)> {
         names.iter().map(|name| (name.clone(), boundary)).collect()
     };
@@ -157,6 +169,7 @@ fn field_model(
         order: order(config),
         materials,
         remanence: remanences(config, mesh.topology()),
+        bh,
         conductors,
         coils,
         boundaries,

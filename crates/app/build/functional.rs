@@ -8,7 +8,7 @@ use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_optimizer::{Error as OptimizerError, geometric};
 use fluxmorph_solver::functional::{Observed, Weighting};
-use fluxmorph_solver::{FieldModel, Functional};
+use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use crate::config::{
     self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, UpperBound,
@@ -29,22 +29,28 @@ pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
 }
 
 /// Key path and name of every region that objective and constraints name.
-pub(super) fn regions(config: &Config) -> Vec<(String, &str)> {
+pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     let fields = functionals(config)
         .into_iter()
+        .filter(|(_, f)| !f.kind.is_of_a_body())
         .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
+    let forces = config.forces.iter().enumerate().flat_map(|(k, force)| {
+        let path = move |(i, name): (usize, &'a String)| (format!("forces[{k}].regions[{i}]"), name.as_str());
+        force.regions.iter().enumerate().map(path)
+    });
     let bodies = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
         let Written::Body { region, .. } = &constraint.limit else { return None };
         Some((format!("constraints[{k}].region"), region.as_str()))
     });
-    fields.chain(bodies).collect()
+    fields.chain(forces).chain(bodies).collect()
 }
 
 /// What objective and constraints ask of regions that these cannot give.
 pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     let known = |name: &&str| topology.region(name).is_ok();
-    for (path, functional) in functionals(config) {
+    faults.extend(body_faults(config, source));
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| !f.kind.is_of_a_body()) {
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
         let entry = config.regions.get(region);
         if functional.kind == ObjectiveKind::Loss {
@@ -84,6 +90,28 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
                 )),
                 None => fault.expected("a region with a material, or kind = \"volume\""),
             });
+        }
+    }
+    faults
+}
+
+/// Bodies that are not there, and bodies that are not meshed.
+fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known: Vec<&str> = config.forces.iter().map(|force| force.name.as_str()).collect();
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_body()) {
+        let name = functional.region.as_deref().unwrap_or_default();
+        if !name.is_empty() && !known.contains(&name) {
+            faults.push(source.unknown_name(&format!("{path}.region"), "body of [[forces]]", name, &known));
+        }
+    }
+    for (k, force) in config.forces.iter().enumerate() {
+        for (i, name) in force.regions.iter().enumerate() {
+            if config.regions.get(name).is_some_and(|region| region.model != RegionModel::Volume) {
+                let path = format!("forces[{k}].regions[{i}]");
+                let message = format!("`{name}` is replaced by its surface, so there is no body to displace");
+                faults.push(source.diagnostic(&path, message).expected("a region that is meshed"));
+            }
         }
     }
     faults
@@ -144,6 +172,16 @@ fn term(
         ObjectiveKind::Energy => {
             Functional::energy(model, functional.region.is_some().then(region).transpose()?)?
         }
+        ObjectiveKind::Force | ObjectiveKind::Torque => {
+            let body = config.forces.iter().find(|body| body.name == name).expect("checked with the names");
+            let direction = functional.direction.unwrap_or_default();
+            let motion = if functional.kind == ObjectiveKind::Force {
+                RigidMotion::Translation(direction)
+            } else {
+                RigidMotion::Rotation { axis: direction, about: body.about }
+            };
+            force(body, mesh, model, motion)?
+        }
     };
     Ok(Term {
         functional: measured,
@@ -155,6 +193,18 @@ fn term(
             frequency: functional.frequency,
         },
     })
+}
+
+/// A component of the force or torque on a body.
+pub(crate) fn force(
+    body: &config::ForceBody,
+    mesh: &Mesh,
+    model: &FieldModel,
+    motion: RigidMotion,
+) -> Result<Functional, Error> {
+    let regions = body.regions.iter().map(|name| mesh.topology().region(name));
+    let regions = regions.collect::<Result<Vec<_>, _>>()?;
+    Ok(Functional::force(model, mesh, &body.name, &regions, motion)?)
 }
 
 /// Elements that must not move, with the key path of the region they observe.

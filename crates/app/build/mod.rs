@@ -4,6 +4,7 @@
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
 //! surface, `shape` the elastic map, `plausible` what cannot be meant, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
+mod curves;
 mod design;
 mod elastic_body;
 mod field;
@@ -29,6 +30,8 @@ use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
 
+use self::curves::Curves;
+pub(crate) use self::functional::force;
 use self::locate_error::DiagnosticSink;
 use crate::config::{
     self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap,
@@ -152,6 +155,8 @@ fn build_problem(
     progress.stage(Stage::Unknowns);
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
+    let curves = sink.take(Curves::read(config, source))?.unwrap_or_default();
+    warnings.extend(curves.warnings());
     if !motion_alone {
         let coils = coils.as_deref().unwrap_or_default();
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);
@@ -173,7 +178,9 @@ fn build_problem(
     };
     // Neither needs the other: faults in both are reported together.
     let states = match coils {
-        Some(coils) => sink.take(field::field_models(config, &mesh, &conductors, &coils, share.as_ref()))?,
+        Some(coils) => {
+            sink.take(field::field_models(config, &mesh, &conductors, (&coils, &curves), share.as_ref()))?
+        }
         None => None,
     };
     sink.check()?;

@@ -45,7 +45,8 @@ impl SourceMap {
             let directory = source.written.directory.as_deref().unwrap_or(&default);
             let directory =
                 (output == OutputNamedBy::Configuration).then_some(("output.directory", directory));
-            for (key, path) in mesh.into_iter().chain(directory) {
+            let curves = source.written.curves.iter().map(|(key, path)| (key.as_str(), path.as_str()));
+            for (key, path) in mesh.into_iter().chain(directory).chain(curves) {
                 // Overrides are the user's own words.
                 let by_user = source.spans.get(key).is_some_and(|span| span.document > 0);
                 let mut steps = Path::new(path);
@@ -82,10 +83,10 @@ fn explained(key: &str, escape: &Escape) -> (String, String) {
             format!("and the link `{}` leads nowhere", link.display().to_string().escape_debug())
         }
     };
-    let help = if key == "mesh.file" {
-        "put the mesh beside the configuration, or give --allow-outside if you trust the file"
-    } else {
-        "give --out DIR, or --allow-outside if you trust the file"
+    let help = match key {
+        "mesh.file" => "put the mesh beside the configuration, or give --allow-outside if you trust the file",
+        "output.directory" => "give --out DIR, or --allow-outside if you trust the file",
+        _ => "put the table beside the configuration, or give --allow-outside if you trust the file",
     };
     (why, help.to_owned())
 }

@@ -44,6 +44,12 @@ pub struct RunResult {
     pub probes: Vec<ProbeResult>,
     /// Eddy-current loss by region, of the meshed part, at the first frequency [W].
     pub losses_w: BTreeMap<String, f64>,
+    /// Force and torque on every body of the configuration, at the first frequency.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<ForceResult>,
+    /// Newton's method and saturation, where there is a B–H curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturation: Option<SaturationResult>,
     /// Losses and probes at every frequency; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateResult>,
@@ -118,6 +124,41 @@ pub struct ConstraintResult {
     pub bound: f64,
     /// Whether the value keeps within the bound.
     pub satisfied: bool,
+}
+
+/// Force and torque on a body, of the meshed part; in harmonics the time average.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ForceResult {
+    /// The body.
+    pub name: String,
+    /// [N].
+    pub force_n: [f64; 3],
+    /// About the point of the configuration [N m].
+    pub torque_nm: [f64; 3],
+}
+
+/// A nonlinear solution, and how far it goes into the curves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SaturationResult {
+    /// Steps of Newton's method.
+    pub newton_steps: usize,
+    /// Every region with a B–H curve.
+    pub regions: Vec<SaturatedRegion>,
+}
+
+/// How far a region goes into its curve.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SaturatedRegion {
+    /// The region.
+    pub region: String,
+    /// Largest `|B|` of an element's mean [T].
+    pub highest_b_t: f64,
+    /// Where [m].
+    pub place_m: [f64; 3],
+    /// Last `B` of the curve's points [T].
+    pub table_ends_b_t: f64,
+    /// Share of its volume beyond the knee: where the differential permeability is below a tenth of its largest.
+    pub volume_share_beyond_knee: f64,
 }
 
 /// What depends on the frequency.
@@ -276,6 +317,8 @@ pub(crate) mod tests {
             frequencies_hz: vec![60.0],
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
+            forces: Vec::new(),
+            saturation: None,
             states: vec![],
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],

@@ -7,13 +7,15 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timings};
-use fluxmorph_solver::{SolverError, recovery};
+use fluxmorph_solver::{RigidMotion, SolverError, recovery, saturation};
 
 use super::Session;
+use crate::build::force;
+use crate::config;
 use crate::error::Error;
 use crate::files::{
-    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ProbeResult, RunResult, StateResult,
-    StopReason, TermResult, peak_memory_bytes,
+    ConstraintResult, DesignResult, ForceResult, LinearSolverResult, MeshResult, ProbeResult, RunResult,
+    SaturatedRegion, SaturationResult, StateResult, StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -65,11 +67,35 @@ impl Session<'_> {
             frequencies_hz: self.config.analysis.frequencies().to_vec(),
             probes,
             losses_w,
+            forces: self.forces(analysis)?,
+            saturation: saturation(problem, analysis),
             states: if states.len() > 1 { states } else { Vec::new() },
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             peak_memory_bytes: peak_memory_bytes(),
         })
+    }
+
+    /// Force and torque on every body.
+    fn forces(&self, analysis: &Analysis) -> Result<Vec<ForceResult>, Error> {
+        let (model, mesh) = (&self.setup.problem.states()[0], &analysis.mesh);
+        let along = |body: &config::ForceBody, motion: fn(Point, Point) -> RigidMotion| {
+            let mut components = [0.0; 3];
+            for (d, component) in components.iter_mut().enumerate() {
+                let unit = std::array::from_fn(|i| f64::from(u8::from(i == d)));
+                let functional = force(body, mesh, model, motion(unit, body.about))?;
+                *component = functional.evaluate(model, mesh, &analysis.solutions[0])?.value;
+            }
+            Ok::<_, Error>(components)
+        };
+        let of = |body: &config::ForceBody| {
+            Ok(ForceResult {
+                name: body.name.clone(),
+                force_n: along(body, |direction, _| RigidMotion::Translation(direction))?,
+                torque_nm: along(body, |axis, about| RigidMotion::Rotation { axis, about })?,
+            })
+        };
+        self.config.forces.iter().map(of).collect()
     }
 
     /// Seconds of every stage.
@@ -132,6 +158,22 @@ impl Session<'_> {
             probes,
         }
     }
+}
+
+/// How far every region goes into its B–H curve; `None` where all is linear.
+fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult> {
+    let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
+    let of = |found: saturation::Saturation| SaturatedRegion {
+        region: found.region,
+        highest_b_t: found.highest,
+        place_m: found.place,
+        table_ends_b_t: found.end,
+        volume_share_beyond_knee: found.share_beyond_knee,
+    };
+    (!model.is_linear()).then(|| SaturationResult {
+        newton_steps: solution.newton_steps(),
+        regions: saturation::by_region(model, &analysis.mesh, solution).into_iter().map(of).collect(),
+    })
 }
 
 /// The terms of the objective at a design.

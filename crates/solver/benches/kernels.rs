@@ -68,11 +68,23 @@ fn element_kernels(group: &mut BenchmarkGroup<'_, CpuTime>) {
     }
     let (u, u_quadratic) = (field::<4>(1), field::<10>(1));
     group.bench_function("energy, linear", |b| {
-        b.iter(|| density::flux_energy(linear, &Tet4::new(black_box(VERTICES)), 0.7, [0.0; 3], &u));
+        b.iter(|| {
+            density::flux_integral(
+                linear,
+                &Tet4::new(black_box(VERTICES)),
+                &u,
+                density::squared_deviation(0.7, [0.0; 3]),
+            )
+        });
     });
     group.bench_function("energy, quadratic", |b| {
         b.iter(|| {
-            density::flux_energy(quadratic, &Tet4::new(black_box(VERTICES)), 0.7, [0.0; 3], &u_quadratic)
+            density::flux_integral(
+                quadratic,
+                &Tet4::new(black_box(VERTICES)),
+                &u_quadratic,
+                density::squared_deviation(0.7, [0.0; 3]),
+            )
         });
     });
     group.bench_function("eddy loss, linear", |b| {

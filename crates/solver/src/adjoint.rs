@@ -16,6 +16,7 @@ use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::linear::{LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
+use crate::nonlinear;
 use crate::solution::FieldSolution;
 use crate::surface::SurfaceTerm;
 
@@ -71,7 +72,14 @@ pub(crate) fn gradient_of(
         .map(|&e| {
             let law = model.coefficients_of(e);
             let (l, u) = (adjoint.element(model, e), state.element(model, e));
-            scale(-2.0, &elements.shape_derivative(&space.cell(mesh, e), law, l.values(), u.values()))
+            let cell = space.cell(mesh, e);
+            let mut terms = elements.shape_derivative(&cell, law, l.values(), u.values());
+            if let Some(curve) = model.curve_of(e) {
+                let response = |l, u| nonlinear::response(curve, law.reluctivity, l, u);
+                let added = elements.flux_shape_derivative(&cell, l.values(), u.values(), &response);
+                terms.iter_mut().flatten().zip(added.as_flattened()).for_each(|(sum, term)| *sum += term);
+            }
+            scale(-2.0, &terms)
         })
         .collect();
     let mut gradient = sum_by_node(topology, moving, &contributions);

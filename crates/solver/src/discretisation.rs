@@ -15,6 +15,7 @@ use crate::error::SolverError;
 use crate::family::{self, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
+use crate::nonlinear::Tangents;
 use crate::prolongation::{ScalarSpace, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, ElementFamily, Order, Space};
@@ -39,7 +40,7 @@ pub(crate) struct Discretisation {
 /// Elements and surface triangles bound to the pattern: what adds their matrices.
 trait Bound: std::fmt::Debug + Send + Sync {
     /// Adds the matrices of all elements and triangles of this rank to `values`.
-    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]);
+    fn add(&self, of: &Discretisation, form: (&WeakForm, Option<&Tangents>), mesh: &Mesh, values: &mut [c64]);
     /// `f −= K A_prescribed` of the elements and triangles that prescribed values touch.
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]);
 }
@@ -58,11 +59,17 @@ impl<K, const N: usize, const F: usize> std::fmt::Debug for Groups<K, N, F> {
 }
 
 impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F> {
-    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]) {
+    fn add(
+        &self,
+        of: &Discretisation,
+        (weak_form, tangents): (&WeakForm, Option<&Tangents>),
+        mesh: &Mesh,
+        values: &mut [c64],
+    ) {
         let local = of.local.as_ref();
         of.add_group(&self.tets, values, |e| {
             let e = local.map_or(e, |local| local.elements[e.index()]);
-            weak_form.tet(self.matrices, of.space.cell(mesh, e), e)
+            weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, tangents))
         });
         of.add_group(&self.triangles, values, |t| {
             let t = local.map_or(t.index(), |local| local.triangles[t.index()]);
@@ -73,7 +80,7 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
         let (elements, triangles) = &of.lifted;
         for &e in elements {
-            let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
+            let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, None));
             of.subtract_lift(of.space.carriers_of(e), &matrix, load);
         }
         for &t in triangles {
@@ -105,7 +112,7 @@ impl Discretisation {
                 // Gradients have no curl: they couple in conductors alone.
                 return Coupling::full(if weak_form.conducts(e) { 4 } else { 2 });
             }
-            let decoupled = !weak_form.couples_components() && !turned(space.carriers_of(e));
+            let decoupled = !weak_form.couples_components(e) && !turned(space.carriers_of(e));
             let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
             if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
         };
@@ -173,10 +180,15 @@ impl Discretisation {
         Some(Hosts::new(hosts))
     }
 
-    /// Assembles the matrix, or the rows of this rank, on a mesh with this topology.
-    pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
+    /// Assembles the matrix, or the rows of this rank, on a mesh with this topology; of linear parts alone without tangents.
+    pub(crate) fn assemble(
+        &self,
+        weak_form: &WeakForm,
+        tangents: Option<&Tangents>,
+        mesh: &Mesh,
+    ) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
-        self.groups.add(self, weak_form, mesh, &mut matrix.values);
+        self.groups.add(self, (weak_form, tangents), mesh, &mut matrix.values);
         matrix
     }
 

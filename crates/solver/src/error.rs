@@ -101,6 +101,41 @@ pub enum SolverError {
         /// What it looks like.
         cause: NonConvergence,
     },
+    /// The layer around a body on which a force is sought is not free.
+    #[error(
+        "the force on `{body}` is taken in the layer of elements around it, which meets {what} in `{region}` at ({:.3}, \
+         {:.3}, {:.3}) mm: a body needs a layer of air around it; add what it touches to its regions",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    Layer {
+        /// Name of the body.
+        body: String,
+        /// The region that the layer meets.
+        region: String,
+        /// Where [m].
+        place: [f64; 3],
+        /// What is there.
+        what: &'static str,
+    },
+    /// Newton's method did not reach its residual.
+    #[error(
+        "Newton's method stopped after {steps} steps at the relative residual {residual:.1e}; least settled is the region \
+         `{region}` at ({:.3}, {:.3}, {:.3}) mm with |B| = {flux_density:.3} T: check the units of its B–H table and the \
+         currents",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    Newton {
+        /// Steps done.
+        steps: usize,
+        /// `|residual| / |load|`.
+        residual: f64,
+        /// Name of the region whose field changes most.
+        region: String,
+        /// Where [m].
+        place: [f64; 3],
+        /// `|B|` there [T].
+        flux_density: f64,
+    },
     /// A field or objective that is not a finite number.
     #[error("the {what} is {value}: the field problem has no usable solution")]
     NotFinite {

@@ -11,13 +11,15 @@ use std::sync::LazyLock;
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{Point, Tet4, cross};
 
-use crate::element::density::{self, ElementIntegral};
+use crate::element::density::{self, ElementIntegral, OfFlux};
 use crate::element::edge::triangle::{EdgeTriangle, EdgeTriangleShape};
 use crate::element::edge::{Ascending, EdgeShape, FieldPoint, tet::EdgeTet};
 use crate::element::lagrange::Lagrange;
 use crate::element::point::{self, PointField};
 use crate::element::quadratic::LagrangeTet;
 use crate::element::tabulated::Rule;
+use crate::element::tangent::Curls;
+use crate::element::virtual_work::{self, VirtualWork};
 use crate::element::volume::{AphiTet, Coefficients, NodalField};
 use crate::element::{Complex3, impedance, interface};
 use crate::space::{ElementFamily, Order};
@@ -92,6 +94,12 @@ impl<const N: usize, const M: usize> From<ElementIntegral<N, M>> for LocalIntegr
     }
 }
 
+impl<const N: usize> From<VirtualWork<N>> for (LocalIntegral<4>, [Point; 4]) {
+    fn from(VirtualWork { rate, by_velocity }: VirtualWork<N>) -> Self {
+        (rate.into(), by_velocity)
+    }
+}
+
 /// What receives functions: carrier, component, value [1/m or 1], curl [1/m² or 1/m].
 pub type EachFunction<'a> = dyn FnMut(usize, usize, Point, Point) + 'a;
 
@@ -121,14 +129,30 @@ pub(crate) trait Family: Sync {
     fn current_load(&self, cell: &Cell, current_density: &Complex3) -> Local;
     /// `∂/∂x_k (λᵀ f)` for the load of a constant `T` [A/m] that moves with the element.
     fn magnet_shape_derivative(&self, cell: &Cell, source: Point, adjoint: &[[c64; 4]]) -> [Complex3; 4];
-    /// `f ∫|B − B_r|² dV`.
-    fn flux_energy(
+    /// The integral of a density of `B`.
+    fn flux_integral(
         &self,
         cell: &Cell,
-        factor: f64,
-        remanence: Point,
         coefficients: &[[c64; 4]],
+        density: &mut dyn FnMut(Complex3) -> OfFlux,
     ) -> LocalIntegral<4>;
+    /// `∂/∂x_k ∫ H(B_u)·B_l` of a law that gives `H(B_u)` and `∂H/∂B B_l` from `B_l` and `B_u`.
+    fn flux_shape_derivative(
+        &self,
+        cell: &Cell,
+        adjoint: &[[c64; 4]],
+        state: &[[c64; 4]],
+        law: &dyn Fn(Complex3, Complex3) -> [Complex3; 2],
+    ) -> [Complex3; 4];
+    /// The rate of `c ∫(|B|² + p |div A|²) dV` for velocities of the vertices, and its derivatives by these; `law` is `c` and
+    /// the penalty factor `p`, which edge elements do not have.
+    fn virtual_work(
+        &self,
+        cell: &Cell,
+        law: [f64; 2],
+        velocities: &[Point; 4],
+        coefficients: &[[c64; 4]],
+    ) -> (LocalIntegral<4>, [Point; 4]);
     /// `f ∫|A + ∇ψ|² dV`.
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4>;
     /// `∂/∂x_k (λᵀ M u)` of a surface term.
@@ -147,6 +171,8 @@ pub(crate) trait Family: Sync {
 pub(crate) trait Matrices<const N: usize, const F: usize>: Sync {
     /// Of a tetrahedron.
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4>;
+    /// Curls of its functions.
+    fn curls(&self, cell: &Cell) -> Curls<N>;
     /// Of a surface term.
     fn triangle(&self, vertices: [Point; 3], term: SurfaceTerm) -> impl LocalMatrix<c64, F, 4>;
 }
@@ -271,14 +297,33 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
         point::magnet_shape_derivative(self.tet, &cell.tet, source, &nodal(adjoint))
     }
 
-    fn flux_energy(
+    fn flux_integral(
         &self,
         cell: &Cell,
-        factor: f64,
-        remanence: Point,
         coefficients: &[[c64; 4]],
+        density: &mut dyn FnMut(Complex3) -> OfFlux,
     ) -> LocalIntegral<4> {
-        density::flux_energy(self.tet, &cell.tet, factor, remanence, &nodal(coefficients)).into()
+        density::flux_integral(self.tet, &cell.tet, &nodal(coefficients), density).into()
+    }
+
+    fn flux_shape_derivative(
+        &self,
+        cell: &Cell,
+        adjoint: &[[c64; 4]],
+        state: &[[c64; 4]],
+        law: &dyn Fn(Complex3, Complex3) -> [Complex3; 2],
+    ) -> [Complex3; 4] {
+        point::flux_shape_derivative(self.tet, &cell.tet, &nodal(adjoint), &nodal(state), law)
+    }
+
+    fn virtual_work(
+        &self,
+        cell: &Cell,
+        law: [f64; 2],
+        velocities: &[Point; 4],
+        coefficients: &[[c64; 4]],
+    ) -> (LocalIntegral<4>, [Point; 4]) {
+        virtual_work::virtual_work(self.tet, &cell.tet, law, velocities, &nodal(coefficients)).into()
     }
 
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4> {
@@ -317,6 +362,10 @@ impl Matrices<4, 3> for Nodal<4, 3> {
         AphiTet::new(cell.tet, law)
     }
 
+    fn curls(&self, cell: &Cell) -> Curls<4> {
+        point::curls(self.tet, &cell.tet)
+    }
+
     #[inline]
     fn triangle(&self, vertices: [Point; 3], term: SurfaceTerm) -> impl LocalMatrix<c64, 3, 4> {
         SurfaceMatrix::new(self.triangle, vertices, term)
@@ -327,6 +376,10 @@ impl Matrices<10, 6> for Nodal<10, 6> {
     #[inline]
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, 10, 4> {
         LagrangeTet::new(self.tet, cell.tet, law)
+    }
+
+    fn curls(&self, cell: &Cell) -> Curls<10> {
+        point::curls(self.tet, &cell.tet)
     }
 
     #[inline]
@@ -384,14 +437,33 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         self.tet.magnet_shape_derivative((&cell.tet, &cell.ascending()), source, adjoint)
     }
 
-    fn flux_energy(
+    fn flux_integral(
         &self,
         cell: &Cell,
-        factor: f64,
-        remanence: Point,
         coefficients: &[[c64; 4]],
+        density: &mut dyn FnMut(Complex3) -> OfFlux,
     ) -> LocalIntegral<4> {
-        self.tet.flux_energy((&cell.tet, &cell.ascending()), factor, remanence, coefficients).into()
+        self.tet.flux_integral((&cell.tet, &cell.ascending()), coefficients, density).into()
+    }
+
+    fn flux_shape_derivative(
+        &self,
+        cell: &Cell,
+        adjoint: &[[c64; 4]],
+        state: &[[c64; 4]],
+        law: &dyn Fn(Complex3, Complex3) -> [Complex3; 2],
+    ) -> [Complex3; 4] {
+        self.tet.flux_shape_derivative((&cell.tet, &cell.ascending()), adjoint, state, law)
+    }
+
+    fn virtual_work(
+        &self,
+        cell: &Cell,
+        [factor, _]: [f64; 2],
+        velocities: &[Point; 4],
+        coefficients: &[[c64; 4]],
+    ) -> (LocalIntegral<4>, [Point; 4]) {
+        self.tet.virtual_work((&cell.tet, &cell.ascending()), factor, velocities, coefficients).into()
     }
 
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4> {
@@ -422,6 +494,10 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Matrices<N,
     #[inline]
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4> {
         EdgeTet::new(self.tet, &cell.ascending(), law)
+    }
+
+    fn curls(&self, cell: &Cell) -> Curls<N> {
+        self.tet.curls(&cell.ascending())
     }
 
     #[inline]

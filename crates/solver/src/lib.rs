@@ -9,6 +9,7 @@
 
 pub mod adjoint;
 pub mod audit;
+pub mod bh;
 pub mod boundary;
 pub mod coil;
 mod discretisation;
@@ -24,19 +25,23 @@ mod load;
 mod local_entities;
 pub mod material;
 pub mod model;
+pub mod newton;
+mod nonlinear;
 pub mod prolongation;
 pub mod recovery;
 mod reentrant;
 mod rotated;
+pub mod saturation;
 pub mod solution;
 pub mod space;
 pub mod surface;
 pub mod unknowns;
 mod weak_form;
 
+pub use bh::BhCurve;
 pub use boundary::{Boundary, UniformField};
 pub use error::{NonConvergence, SolverError};
-pub use functional::{Functional, FunctionalValue};
+pub use functional::{Functional, FunctionalValue, RigidMotion};
 pub use linear::{LinearSolver, LinearSolverReport};
 pub use material::Material;
 pub use model::{FieldModel, FieldModelSetup};

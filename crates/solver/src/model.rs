@@ -12,6 +12,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
+use crate::bh::BhCurve;
 use crate::boundary::Boundary;
 use crate::coil::{Coil, Condition, ConditionedSurface, planes};
 use crate::discretisation::Discretisation;
@@ -24,6 +25,8 @@ use crate::linear::{
 };
 use crate::load::Sources;
 use crate::material::Material;
+use crate::newton::{self, NewtonObserver};
+use crate::nonlinear::Tangents;
 use crate::solution::FieldSolution;
 use crate::space::{ElementFamily, Order, Space};
 use crate::surface::{Conductor, SurfaceTerm};
@@ -45,6 +48,9 @@ pub struct FieldModelSetup {
     pub materials: Vec<Material>,
     /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
     pub remanence: Vec<Point>,
+    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Statics only. The permeability of the region's
+    /// material is then that of the penalty of nodal elements.
+    pub bh: Vec<Option<Arc<BhCurve>>>,
     /// Conductors replaced by their surfaces.
     pub conductors: Vec<Conductor>,
     /// Coils.
@@ -67,6 +73,7 @@ impl Default for FieldModelSetup {
             order: Order::default(),
             materials: Vec::new(),
             remanence: Vec::new(),
+            bh: Vec::new(),
             conductors: Vec::new(),
             coils: Vec::new(),
             boundaries: Vec::new(),
@@ -127,7 +134,7 @@ impl FieldModel {
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             hosts: fine.hosts(),
-            reference: &|| fine.assemble(&weak_form, mesh),
+            reference: &|| fine.assemble(&weak_form, None, mesh),
             prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
         };
         let analysis = match ownership {
@@ -188,12 +195,18 @@ impl FieldModel {
             &setup.boundaries,
             &setup.conductors,
         )?;
-        Ok((angular_frequency, form))
+        Ok((angular_frequency, form.with_curves(&setup.bh)))
     }
 
-    /// Assembles the matrix on a mesh with this model's topology: the rows of this rank, where there are several.
+    /// Assembles the matrix on a mesh with this model's topology: the rows of this rank, where there are several. Of B–H
+    /// laws it has the linear parts.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {
-        self.shared.fine.assemble(&self.weak_form, mesh)
+        self.shared.fine.assemble(&self.weak_form, None, mesh)
+    }
+
+    /// As [`FieldModel::assemble`], with the tangents of B–H laws.
+    pub(crate) fn assemble_tangent(&self, mesh: &Mesh, tangents: &Tangents) -> CsrMatrix<c64> {
+        self.shared.fine.assemble(&self.weak_form, Some(tangents), mesh)
     }
 
     /// The matrix on a mesh with this model's topology, wherever it is to be.
@@ -251,9 +264,30 @@ impl FieldModel {
     /// # Errors
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+        if !self.is_linear() {
+            return self.solve_nonlinear(mesh, &LinearSolverCache::default(), &mut |_| {});
+        }
         let mut system = self.prepare(self.assembled(mesh))?;
         let state = self.solve_prepared(&mut system, &self.load(mesh))?;
         Ok((state, system))
+    }
+
+    /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
+    /// adjoint. Of `cache` only the method that worked last takes part.
+    ///
+    /// # Errors
+    /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].
+    ///
+    /// # Panics
+    /// Where all is linear.
+    pub fn solve_nonlinear(
+        &self,
+        mesh: &Mesh,
+        cache: &LinearSolverCache,
+        observer: &mut NewtonObserver<'_>,
+    ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+        assert!(!self.is_linear(), "a model with B–H laws");
+        newton::solve(self, mesh, cache, observer)
     }
 
     /// Solves the state problem with a prepared system and a load.
@@ -308,6 +342,22 @@ impl FieldModel {
     pub fn remanence_of(&self, e: ElementId) -> Point {
         let region = self.topology().region_of()[e.index()];
         self.setup.remanence.get(region.index()).copied().unwrap_or_default()
+    }
+
+    /// The B–H law of the region of an element; `None` where it is linear.
+    #[inline]
+    pub fn curve_of(&self, e: ElementId) -> Option<&BhCurve> {
+        self.weak_form.curve_of(e)
+    }
+
+    /// Elements with a B–H law, ascending.
+    pub fn elements_with_a_law(&self) -> &[ElementId] {
+        self.weak_form.elements_with_a_law()
+    }
+
+    /// Whether no element has a B–H law.
+    pub fn is_linear(&self) -> bool {
+        self.elements_with_a_law().is_empty()
     }
 
     /// Conductors replaced by their surfaces.
@@ -417,6 +467,7 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
         return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
     }
+    check_laws(setup)?;
     for conductor in &setup.conductors {
         if conductor.surface.is_empty() {
             return Err(SolverError::EmptyRegion {
@@ -424,6 +475,39 @@ fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
                 expected: "the surface that replaces a conductor needs faces",
             });
         }
+    }
+    Ok(())
+}
+
+/// Refuses B–H laws where they have no meaning.
+fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let refuse = |what: &str, value: String, expected: &str| {
+        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
+    };
+    let has_law = |r: usize| setup.bh.get(r).is_some_and(Option::is_some);
+    if setup.bh.len() > setup.materials.len() {
+        return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");
+    }
+    if !setup.bh.iter().any(Option::is_some) {
+        return Ok(());
+    }
+    if setup.frequency > 0.0 {
+        return refuse("frequency", setup.frequency.to_string(), "0 Hz: a B–H curve is a static law");
+    }
+    if setup.ownership.is_some() {
+        return refuse(
+            "ranks",
+            "several".to_owned(),
+            "one process: a B–H curve is solved by Newton's method in one",
+        );
+    }
+    if let Some(r) = (0..setup.remanence.len()).find(|&r| has_law(r) && setup.remanence[r] != [0.0; 3]) {
+        let remanence = format!("{:?}", setup.remanence[r]);
+        return refuse(
+            "remanence",
+            remanence,
+            "a material with a permeability: a magnet has a straight recoil line",
+        );
     }
     Ok(())
 }

@@ -62,8 +62,10 @@ pub fn recovered_flux_density(
 ) -> Complex3 {
     let topology = model.topology();
     // A magnet's face is one even where its permeability is that of air.
-    let material =
-        |e: ElementId| (model.materials()[topology.region_of()[e.index()].index()], model.remanence_of(e));
+    let material = |e: ElementId| {
+        let linear = model.materials()[topology.region_of()[e.index()].index()];
+        (linear, model.remanence_of(e), model.curve_of(e))
+    };
     let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {
         elements = elements

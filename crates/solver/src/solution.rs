@@ -28,11 +28,13 @@ pub struct FieldSolution {
     values: Vec<c64>,
     role: Role,
     report: LinearSolverReport,
+    /// Of Newton's method; zero where all is linear.
+    newton_steps: usize,
 }
 
 impl FieldSolution {
     pub(crate) fn state(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::State, report }
+        Self { values, role: Role::State, report, newton_steps: 0 }
     }
 
     /// The solution of a state of which nothing but its unknowns is known, one per equation.
@@ -41,7 +43,17 @@ impl FieldSolution {
     }
 
     pub(crate) fn adjoint(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::Adjoint, report }
+        Self { values, role: Role::Adjoint, report, newton_steps: 0 }
+    }
+
+    /// The same, found in some steps of Newton's method.
+    pub(crate) fn after_newton(self, steps: usize) -> Self {
+        Self { newton_steps: steps, ..self }
+    }
+
+    /// Steps of Newton's method; zero where all is linear.
+    pub fn newton_steps(&self) -> usize {
+        self.newton_steps
     }
 
     /// The unknowns, one per equation.

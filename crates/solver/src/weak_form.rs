@@ -8,11 +8,14 @@ use std::sync::Arc;
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
+use crate::bh::BhCurve;
 use crate::boundary::Boundary;
+use crate::element::tangent::{CurlMatrix, WithTangent};
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
+use crate::nonlinear::Tangents;
 use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
 use crate::unknowns::Conductors;
@@ -23,6 +26,10 @@ pub(crate) struct WeakForm {
     topology: Arc<Topology>,
     /// By region.
     coefficients: Vec<Coefficients>,
+    /// By region; shorter where the rest is linear.
+    curves: Vec<Option<Arc<BhCurve>>>,
+    /// Those of a region with a curve, ascending.
+    elements_with_a_law: Vec<ElementId>,
     surfaces: Surfaces,
 }
 
@@ -50,7 +57,26 @@ impl WeakForm {
             .collect();
         let surfaces =
             Surfaces::new(mesh, elements, &coefficients, boundaries, conductors, angular_frequency)?;
-        Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces })
+        let topology = Arc::clone(mesh.topology());
+        Ok(Self { topology, coefficients, curves: Vec::new(), elements_with_a_law: Vec::new(), surfaces })
+    }
+
+    /// The same with B–H laws by region; the rest is linear.
+    pub(crate) fn with_curves(mut self, curves: &[Option<Arc<BhCurve>>]) -> Self {
+        self.curves = curves.to_vec();
+        self.elements_with_a_law = self.topology.elements().filter(|&e| self.curve_of(e).is_some()).collect();
+        self
+    }
+
+    /// The B–H law of an element.
+    #[inline]
+    pub(crate) fn curve_of(&self, e: ElementId) -> Option<&BhCurve> {
+        self.curves.get(self.topology.region_of()[e.index()].index())?.as_deref()
+    }
+
+    /// Elements with a B–H law, ascending.
+    pub(crate) fn elements_with_a_law(&self) -> &[ElementId] {
+        &self.elements_with_a_law
     }
 
     /// The topology.
@@ -69,9 +95,9 @@ impl WeakForm {
         self.coefficients_of(e).eddy != c64::default()
     }
 
-    /// Whether the three components of `A` couple inside the regions.
-    pub(crate) fn couples_components(&self) -> bool {
-        self.coefficients.iter().any(|c| c.extra_penalty != 0.0)
+    /// Whether the three components of `A` couple inside an element.
+    pub(crate) fn couples_components(&self, e: ElementId) -> bool {
+        self.coefficients.iter().any(|c| c.extra_penalty != 0.0) || self.curve_of(e).is_some()
     }
 
     /// Triangles with a term.
@@ -101,15 +127,17 @@ impl WeakForm {
         self.surfaces.iter()
     }
 
-    /// The matrix of a tetrahedron.
+    /// The matrix of a tetrahedron, with the tangents of B–H laws where they are given.
     #[inline]
     pub(crate) fn tet<const N: usize, const F: usize>(
         &self,
         matrices: &impl Matrices<N, F>,
         cell: Cell,
-        e: ElementId,
+        (e, tangents): (ElementId, Option<&Tangents>),
     ) -> impl LocalMatrix<c64, N, 4> {
-        matrices.tet(cell, *self.coefficients_of(e))
+        let tangent = tangents.and_then(|tangents| tangents.of(e));
+        let tangent = tangent.map(|tensors| Box::new(CurlMatrix::new(matrices.curls(&cell), tensors)));
+        WithTangent { linear: matrices.tet(cell, *self.coefficients_of(e)), tangent }
     }
 
     /// The matrix of a triangle, by its number.

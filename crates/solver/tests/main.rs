@@ -5,6 +5,7 @@ mod edge;
 mod grounding;
 mod guards;
 mod prisms;
+mod saturation;
 mod sources;
 mod two_level;
 

@@ -12,6 +12,7 @@ use crate::support::shield::quick;
 use crate::support::{changed, setup, setup_of};
 
 mod functionals;
+mod saturation;
 mod sources;
 
 /// Small meshes: the exactness of a discrete gradient does not depend on the mesh.

@@ -22,6 +22,7 @@ mod known;
 mod polygon;
 mod problem;
 mod refine;
+mod saturation;
 mod source;
 mod table;
 mod unstructured;

@@ -9,6 +9,7 @@ use super::boundary::Boundaries;
 use super::coil::Coil;
 use super::constraint::{Constraint, Limit};
 use super::design::Design;
+use super::force::ForceBody;
 use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
@@ -22,7 +23,8 @@ use crate::config::table::table;
 use crate::config::text::source::SourceMap;
 
 /// The tables that only mean something to a field problem.
-const OF_THE_FIELD: [&str; 6] = ["coils", "objective", "boundaries", "constraints", "materials", "regions"];
+const OF_THE_FIELD: [&str; 7] =
+    ["coils", "forces", "objective", "boundaries", "constraints", "materials", "regions"];
 
 table! {
     /// The configuration of a run of Fluxmorph. A quantity is a text with a unit, such as "10 mm", or a bare number in SI.
@@ -41,6 +43,8 @@ table! {
         coils: Vec<Coil> = TABLES => Vec::new();
         /// The boundary conditions.
         boundaries: Boundaries = TABLE => Boundaries::default();
+        /// Bodies on which the force is reported.
+        forces: Vec<ForceBody> = TABLES => Vec::new();
         /// What is optimised; needed by `run` and `gradient`.
         objective: Option<Objective> = TABLE;
         /// What must keep within bounds meanwhile.
@@ -81,6 +85,8 @@ impl Config {
         material::check_regions(root, &self.regions, &self.materials, frequencies);
         let coils = self.coils.iter().map(|coil| &coil.name);
         root.named_twice("coils", coils, "coils", "a different name for each coil");
+        let forces = self.forces.iter().map(|force| &force.name);
+        root.named_twice("forces", forces, "forces", "a different name for each body");
         self.check_functionals(root, frequencies);
         let constraints = self.constraints.iter().map(|constraint| &constraint.name);
         root.named_twice("constraints", constraints, "constraints", "a different `name` for each constraint");
@@ -142,6 +148,9 @@ impl Config {
             self.title.clone_from(&source.stem);
         }
         if let MeshConfig::File { path, .. } = &mut self.mesh {
+            *path = source.directory.join(&*path);
+        }
+        for path in self.materials.values_mut().filter_map(|material| material.bh_file.as_mut()) {
             *path = source.directory.join(&*path);
         }
         let surfaces = self.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();

@@ -127,6 +127,8 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
         (is("kind", &["field_component"]), Dimension::FluxDensity, Range::FINITE),
         (is("kind", &["loss"]), Dimension::Power, Range::POSITIVE),
         (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
+        (is("kind", &["force"]), Dimension::Force, Range::FINITE),
+        (is("kind", &["torque"]), Dimension::Torque, Range::FINITE),
         (is("kind", &["volume"]), Dimension::Volume, Range::POSITIVE),
         (is("kind", &["mass"]), Dimension::Mass, Range::POSITIVE),
     ];
@@ -202,6 +204,10 @@ choice! {
         Loss = "loss",
         /// As in `[objective]`.
         Energy = "energy",
+        /// As in `[objective]`; a least force is a bound on the force in the opposite `direction`.
+        Force = "force",
+        /// As in `[objective]`.
+        Torque = "torque",
         /// Volume of a region [m³], meshed or replaced by its impedance surface.
         Volume = "volume",
         /// Mass of a region [kg], by the `density` of its material.
@@ -252,6 +258,8 @@ impl Group for Limit {
             Kind::FieldComponent => ObjectiveKind::FieldComponent,
             Kind::Loss => ObjectiveKind::Loss,
             Kind::Energy => ObjectiveKind::Energy,
+            Kind::Force => ObjectiveKind::Force,
+            Kind::Torque => ObjectiveKind::Torque,
             Kind::Volume => return Self::body(BodyKind::Volume, Dimension::Volume, written, section),
             Kind::Mass => return Self::body(BodyKind::Mass, Dimension::Mass, written, section),
             Kind::Thickness => return Self::thickness(&written, section),
@@ -266,7 +274,7 @@ impl Limit {
         let mut functional = Functional { kind, region, weighting, target, direction, frequency };
         functional.check(section);
         let range = match kind {
-            ObjectiveKind::FieldComponent => Range::FINITE,
+            ObjectiveKind::FieldComponent | ObjectiveKind::Force | ObjectiveKind::Torque => Range::FINITE,
             _ => Range::POSITIVE,
         };
         let bound = UpperBound::of(upper_ratio, section, functional.dimension(), range);

@@ -12,15 +12,15 @@ table! {
     pub struct Functional {
         /// What is measured. The default is the paper's objective.
         kind: ObjectiveKind = WORD => ObjectiveKind::FluxDensitySquared;
-        /// The region it is measured in. Required, but for `energy`: without it the energy is that of everything that is
-        /// meshed.
+        /// The region it is measured in; for `force` and `torque` a body of `[[forces]]`. Required, but for `energy`: without it
+        /// the energy is that of everything that is meshed.
         region: Option<String> = TEXT;
         /// For `flux_density_squared` and `target_field`: how the cells of the region are weighted. Default `"point"`, as in the
         /// paper.
         weighting: Option<Weighting> = WORD;
         /// For `target_field`, required: the flux density wished for [T].
         target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
-        /// For `field_component`, required: a vector along the component; its length does not matter.
+        /// For `field_component`, `force` and `torque`, required: a vector along the component; its length does not matter.
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// The one frequency it is taken at [Hz], one of `[analysis]`. Default: the values at all frequencies are added.
@@ -30,16 +30,22 @@ table! {
 
 /// The words of a deviation from a field that is wished for, with the one of earlier versions.
 pub(super) const TARGET_FIELD: [&str; 2] = ["target_field", "uniformity"];
+/// Kinds that are a component.
+const DIRECTED: [&str; 3] = ["field_component", "force", "torque"];
 
 /// Which keys go with which kind.
 pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
     rules
         .unless("kind", &["energy"], Then { required: &["region"], refused: &[] })
-        .when("kind", &["field_component", "loss", "energy"], Then { required: &[], refused: &["weighting"] })
+        .when(
+            "kind",
+            &["field_component", "loss", "energy", "force", "torque"],
+            Then { required: &[], refused: &["weighting"] },
+        )
         .when("kind", &TARGET_FIELD, Then { required: &["target"], refused: &[] })
         .unless("kind", &TARGET_FIELD, Then { required: &[], refused: &["target"] })
-        .when("kind", &["field_component"], Then { required: &["direction"], refused: &[] })
-        .unless("kind", &["field_component"], Then { required: &[], refused: &["direction"] })
+        .when("kind", &DIRECTED, Then { required: &["direction"], refused: &[] })
+        .unless("kind", &DIRECTED, Then { required: &[], refused: &["direction"] })
 }
 
 choice! {
@@ -58,6 +64,11 @@ choice! {
         /// Energy of the magnetic field [J]: ½ ∫ ν |B|² dV in statics, its time average ¼ ∫ ν |B|² dV in harmonics. The region
         /// is meshed and may move.
         Energy = "energy",
+        /// Force on a body of `[[forces]]` along `direction` [N], of the meshed part; in harmonics its time average. The body may
+        /// move.
+        Force = "force",
+        /// Torque on a body of `[[forces]]` along `direction` about its point `about` [N m]. The body may move.
+        Torque = "torque",
     }
 }
 
@@ -76,6 +87,11 @@ impl ObjectiveKind {
     fn sums_over_cells(self) -> bool {
         matches!(self, Self::FluxDensitySquared | Self::TargetField)
     }
+
+    /// Whether it acts on a body of `[[forces]]`.
+    pub fn is_of_a_body(self) -> bool {
+        matches!(self, Self::Force | Self::Torque)
+    }
 }
 
 impl Functional {
@@ -88,7 +104,7 @@ impl Functional {
         for (key, example, wanted) in [
             ("weighting", None, kind.sums_over_cells()),
             ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::TargetField),
-            ("direction", Some("direction = [0, 0, 1]"), kind == ObjectiveKind::FieldComponent),
+            ("direction", Some("direction = [0, 0, 1]"), DIRECTED.contains(&kind.name())),
         ] {
             match (section.has(key), example) {
                 (true, _) if !wanted => {
@@ -133,6 +149,8 @@ impl Functional {
             (ObjectiveKind::FieldComponent, _) => Dimension::FluxDensity,
             (ObjectiveKind::Loss, _) => Dimension::Power,
             (ObjectiveKind::Energy, _) => Dimension::Energy,
+            (ObjectiveKind::Force, _) => Dimension::Force,
+            (ObjectiveKind::Torque, _) => Dimension::Torque,
         }
     }
 }

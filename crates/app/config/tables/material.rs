@@ -1,14 +1,18 @@
 //! `[materials.NAME]` and `[regions.NAME]`: what fills the regions of the mesh.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde_json::json;
 
 use crate::config::section::Section;
+use crate::config::table::rules::{Rules, present};
 use crate::config::table::table;
 use crate::config::value::choice::choice;
 
 table! {
-    /// A linear, isotropic material. Any number of them, each with a name of its own. A list or table in place of a number, an
-    /// anisotropic material, is refused.
+    /// An isotropic material: linear, or with a B–H curve in magnetostatics. Any number of them, each with a name of its own. A
+    /// list or table in place of a number, an anisotropic material, is refused.
     ///
     /// ```toml
     /// [materials.steel]
@@ -19,12 +23,29 @@ table! {
     pub struct Material {
         /// Permeability over that of vacuum; below 1 too. Most conductors are not magnetic.
         relative_permeability: f64 = number(POSITIVE) => 1.0;
+        /// B–H curve of iron that saturates: points `[H, B]` [A/m, T] in ascending order, from the origin, which may be left out.
+        /// Instead of `relative_permeability`, and for magnetostatics only. Between the points the curve is a smooth monotone
+        /// cubic, beyond the last one its slope is that of vacuum.
+        bh: Option<Vec<[f64; 2]>> = not_empty(number(FINITE));
+        /// The same from a file, relative to the folder of the configuration: on each line H [A/m] and B [T], with a comma between
+        /// them; lines that begin with `#` are comments. Instead of `bh`.
+        bh_file: Option<PathBuf> = TEXT;
         /// Electric conductivity [S/m]. A material conducts only when it is told to.
         conductivity: f64 = quantity(Conductivity, NOT_NEGATIVE) => 0.0;
         /// Mass density [kg/m³]; needed where `[[constraints]]` limit a mass.
         density: Option<f64> = quantity(MassDensity, POSITIVE);
     }
     unused = Material::anisotropic;
+    check = Material::check;
+    rules = one_law;
+}
+
+/// A curve comes from one place, and stands in place of the permeability.
+fn one_law(rules: Rules) -> Rules {
+    rules.not_both(["bh", "bh_file"]).add(json!({
+        "if": { "anyOf": present(&["bh", "bh_file"]) },
+        "then": { "properties": { "relative_permeability": { "const": 1 } } },
+    }))
 }
 
 choice! {
@@ -67,6 +88,26 @@ table! {
 }
 
 impl Material {
+    /// Whether it has a B–H curve.
+    pub fn saturates(&self) -> bool {
+        self.bh.is_some() || self.bh_file.is_some()
+    }
+
+    /// A curve comes from one place, and stands in place of the permeability.
+    fn check(&mut self, section: &Section<'_>) {
+        if section.has("bh") && section.has("bh_file") {
+            let message = format!("`{}` has both `bh` and `bh_file`", section.path());
+            section.clash(["bh", "bh_file"], message, "one of them");
+        }
+        if self.saturates() && self.relative_permeability != 1.0 {
+            let message = format!(
+                "`{}` has a relative permeability beside its B–H curve, which says it for every field",
+                section.path()
+            );
+            section.wrong("relative_permeability", message, "one of the two");
+        }
+    }
+
     /// Refuses anisotropic materials by name.
     fn anisotropic(section: &Section<'_>) -> Vec<&'static str> {
         let examples = [("relative_permeability", "800"), ("conductivity", "\"7e6 S/m\"")];
@@ -115,10 +156,14 @@ pub(super) fn check_regions(
             continue;
         }
         match materials.get(&region.material) {
-            Some(material) if region.model == RegionModel::Impedance => {
-                check_impedance(&section, &region.material, material, least);
+            Some(material) => {
+                if material.saturates() {
+                    check_curve(&section, region, largest);
+                }
+                if region.model == RegionModel::Impedance {
+                    check_impedance(&section, &region.material, material, least);
+                }
             }
-            Some(_) => {}
             None => {
                 let message = format!("there is no material `{}`", region.material.escape_debug());
                 section.unknown_name("material", message, &region.material, &known);
@@ -141,6 +186,37 @@ fn check_impedance(section: &Section<'_>, name: &str, material: &Material, frequ
             "model",
             format!("`{}` has an impedance surface, but `{name}` does not conduct", section.path()),
             format!("a conductivity above 0 S/m in materials.{name}, or model = \"volume\""),
+        );
+    }
+}
+
+/// A B–H curve is a law of static fields in what is meshed.
+fn check_curve(section: &Section<'_>, region: &Region, frequency: f64) {
+    let name = &region.material;
+    if frequency > 0.0 {
+        section.wrong(
+            "material",
+            format!(
+                "`{name}` has a B–H curve, but the frequency is {frequency} Hz: it is a law of static fields"
+            ),
+            format!("analysis.frequency = 0, or a relative_permeability in materials.{name}"),
+        );
+    }
+    if region.model == RegionModel::Impedance {
+        section.wrong(
+            "model",
+            format!(
+                "`{}` has an impedance surface, which takes one permeability, but `{name}` has a B–H curve",
+                section.path()
+            ),
+            "model = \"volume\", or a material with a relative_permeability",
+        );
+    }
+    if region.remanence.is_some() {
+        section.wrong(
+            "remanence",
+            format!("`{}` is a permanent magnet, but `{name}` has a B–H curve", section.path()),
+            "a material with the relative_permeability of the recoil line, about 1.05",
         );
     }
 }

@@ -6,6 +6,7 @@ mod coil;
 mod config;
 mod constraint;
 mod design;
+mod force;
 mod functional;
 mod initial;
 mod linear_solver;
@@ -27,6 +28,7 @@ pub use coil::{
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
+pub use force::ForceBody;
 pub use functional::{Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};

@@ -92,6 +92,12 @@ dimensions! {
     /// An energy [J].
     Energy = "an energy", in "J", such as "1.5 J":
         decimal("J", 0), decimal("mJ", -3), decimal("kJ", 3);
+    /// A force [N].
+    Force = "a force", in "N", such as "20 N":
+        decimal("N", 0), decimal("mN", -3), decimal("kN", 3);
+    /// A torque [N m].
+    Torque = "a torque", in "N m", such as "1.5 N m":
+        decimal("N m", 0), decimal("Nm", 0), decimal("mN m", -3), decimal("mNm", -3), decimal("kN m", 3), decimal("kNm", 3);
     /// A volume [m³].
     Volume = "a volume", in "m\u{b3}", such as "400 cm3":
         decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("cm3", -6),

@@ -37,17 +37,21 @@ pub(super) fn functional(functional: &Functional) -> String {
             let target = functional.target.unwrap_or_default().map(given).join(", ");
             sum(&format!("|B − ({target}) T|²"))
         }
-        ObjectiveKind::FieldComponent => {
-            let along = functional.direction.unwrap_or_default().map(|c| trim_zeros(c, 3)).join(", ");
-            format!("the mean of B along ({along}) in {region}")
-        }
+        ObjectiveKind::FieldComponent => format!("the mean of B along ({}) in {region}", along(functional)),
         ObjectiveKind::Loss => format!("the eddy-current loss in {region}"),
         ObjectiveKind::Energy => format!("the magnetic energy in {region}"),
+        ObjectiveKind::Force => format!("the force on {region} along ({})", along(functional)),
+        ObjectiveKind::Torque => format!("the torque on {region} about ({})", along(functional)),
     };
     match functional.frequency {
         Some(frequency) => format!("{what} at {} Hz", trim_zeros(frequency, 6)),
         None => what,
     }
+}
+
+/// The direction of a component.
+fn along(functional: &Functional) -> String {
+    functional.direction.unwrap_or_default().map(|c| trim_zeros(c, 3)).join(", ")
 }
 
 /// The frequencies.

@@ -186,6 +186,9 @@ fn solve_state<'a>(
     work: &mut Work<'_>,
     cache: &mut SolverCache,
 ) -> Result<Solved<'a>, Error> {
+    if !model.is_linear() {
+        return solve_nonlinear_state(index, model, work, cache);
+    }
     let mut clock = Stopwatch::start();
     work.progress.stage(Stage::Assembling);
     let (matrix, load) = (model.assembled(work.mesh), model.load(work.mesh));
@@ -196,6 +199,25 @@ fn solve_state<'a>(
     work.timings.factor += clock.lap();
     work.progress.stage(Stage::State);
     let state = model.solve_prepared(&mut system, &load).map_err(named())?;
+    finite::state(model, work.mesh, &state)?;
+    work.report.include(&state);
+    work.timings.state += clock.lap();
+    Ok(Solved { index, model, system, state })
+}
+
+/// Solves a state with B–H laws; its factors count as part of the state.
+fn solve_nonlinear_state<'a>(
+    index: usize,
+    model: &'a FieldModel,
+    work: &mut Work<'_>,
+    cache: &mut SolverCache,
+) -> Result<Solved<'a>, Error> {
+    let mut clock = Stopwatch::start();
+    work.progress.stage(Stage::State);
+    let progress = &mut *work.progress;
+    let solved =
+        model.solve_nonlinear(work.mesh, cache.of_state(index), &mut |newton| progress.newton(newton));
+    let (state, system) = solved.map_err(finite::of_field("the state", model))?;
     finite::state(model, work.mesh, &state)?;
     work.report.include(&state);
     work.timings.state += clock.lap();

@@ -2,6 +2,8 @@
 //!
 //! Each stage is reported as it begins; how it is shown is decided by the caller.
 
+use fluxmorph_solver::newton::NewtonProgress;
+
 /// What is being computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
@@ -52,6 +54,9 @@ impl Stage {
 pub trait Progress {
     /// A stage begins.
     fn stage(&mut self, stage: Stage);
+
+    /// Newton's method has done a step of a state with B–H laws.
+    fn newton(&mut self, _: NewtonProgress) {}
 }
 
 impl<F: FnMut(Stage)> Progress for F {

@@ -5,8 +5,9 @@ use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::lagrange::Lagrange;
 use super::tabulated::{Rule, Tabulated};
+use super::tangent::Curls;
 use super::volume::{Coefficients, NodalField};
-use super::{Complex3, dot3};
+use super::{Complex3, cross3, dot3};
 
 /// `A`, its gradient, and `∇ψ` at a point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -163,6 +164,48 @@ pub fn stretch(tet: &Tet4, tensor: &[Complex3; 3]) -> [Complex3; 4] {
             tet.volume * (tensor[d][0] * g[0] + tensor[d][1] * g[1] + tensor[d][2] * g[2])
         })
     })
+}
+
+/// `∂/∂x_k ∫ H(B_u)·B_l` for the four vertices, shape `(4, 3)`, of a law that gives `H(B_u)` and `∂H/∂B B_l` from `B_l` and
+/// `B_u`; the values at the nodes are held.
+pub fn flux_shape_derivative<const N: usize>(
+    shape: &Lagrange<N, 4>,
+    tet: &Tet4,
+    adjoint: &NodalField<N>,
+    state: &NodalField<N>,
+    law: impl Fn(Complex3, Complex3) -> [Complex3; 2],
+) -> [Complex3; 4] {
+    let mut tensor = [[c64::default(); 3]; 3];
+    for at in shape.at(if N == 4 { Rule::Centroid } else { Rule::Degree2 }) {
+        let l = PointField::tabulated(at, tet, adjoint);
+        let u = PointField::tabulated(at, tet, state);
+        let b = l.flux_density();
+        let [field, turned] = law(b, u.flux_density());
+        let integrand = dot3(field, b);
+        for d in 0..3 {
+            // H·δB = −∇λ_k · (∂_d A × H).
+            let (of_l, of_u) = (cross3(l.gradient[d], field), cross3(u.gradient[d], turned));
+            for i in 0..3 {
+                tensor[d][i] -= at.share * (of_l[i] + of_u[i]);
+            }
+            tensor[d][d] += at.share * integrand;
+        }
+    }
+    stretch(tet, &tensor)
+}
+
+/// Curls of all functions at the points of the rule that is exact for their products.
+pub fn curls<const N: usize>(shape: &Lagrange<N, 4>, tet: &Tet4) -> Curls<N> {
+    let mut of = Curls::default();
+    for at in shape.at(if N == 4 { Rule::Centroid } else { Rule::Degree2 }) {
+        of.weights[of.count] = at.share * tet.volume;
+        for (a, curls) in of.curls[of.count].iter_mut().enumerate() {
+            let [x, y, z] = at.gradient(&tet.gradients, a);
+            *curls = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0], [0.0; 3]];
+        }
+        of.count += 1;
+    }
+    of
 }
 
 /// Adds `share` times the Eshelby tensor of the weak form's integrand at a point.

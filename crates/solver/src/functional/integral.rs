@@ -7,10 +7,13 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
-use super::FunctionalValue;
+use super::{FunctionalValue, is_static};
+use crate::element::Complex3;
+use crate::element::density::squared_deviation;
 use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
+use crate::nonlinear;
 use crate::solution::FieldSolution;
 use crate::surface::{SurfaceLaw, SurfaceTerm};
 
@@ -20,7 +23,7 @@ const CHUNK: usize = 8192;
 /// The integral of a density.
 #[derive(Clone, Debug)]
 pub enum Integral {
-    /// `½∫ν|B − B_r|²` [J] in statics, `¼∫ν|B|²` in harmonics, over these elements, ascending.
+    /// `½∫ν|B − B_r|²` [J] in statics, `∫w(|B|)` where there is a B–H law, `¼∫ν|B|²` in harmonics, over these elements, ascending.
     Energy(Vec<ElementId>),
     /// `½∫σ|E|²` [W] over these elements, ascending.
     VolumeLoss(Vec<ElementId>),
@@ -79,11 +82,16 @@ impl Integral {
         let elements = space.elements();
         match self {
             Self::Energy(of) => {
-                let share = if model.angular_frequency() == 0.0 { 0.5 } else { 0.25 };
+                let share = if is_static(model) { 0.5 } else { 0.25 };
                 sum.elements(of, |e| {
+                    let (cell, field) = (space.cell(mesh, e), solution.element(model, e));
+                    if let Some(curve) = model.curve_of(e) {
+                        let density = &mut |b: Complex3| nonlinear::energy(curve, b.map(|c| c.re));
+                        return elements.flux_integral(&cell, field.values(), density);
+                    }
                     let factor = share * model.coefficients_of(e).reluctivity;
-                    let field = solution.element(model, e);
-                    elements.flux_energy(&space.cell(mesh, e), factor, model.remanence_of(e), field.values())
+                    let density = squared_deviation(factor, model.remanence_of(e));
+                    elements.flux_integral(&cell, field.values(), &mut |b| density(b))
                 });
             }
             Self::VolumeLoss(of) => sum.elements(of, |e| {
@@ -112,7 +120,7 @@ impl Integral {
 }
 
 /// Gathers element integrals.
-struct Sum<'a> {
+pub(super) struct Sum<'a> {
     model: &'a FieldModel,
     value: f64,
     derivative: Vec<c64>,
@@ -120,7 +128,7 @@ struct Sum<'a> {
 }
 
 impl<'a> Sum<'a> {
-    fn new(model: &'a FieldModel) -> Self {
+    pub(super) fn new(model: &'a FieldModel) -> Self {
         Self {
             model,
             value: 0.0,
@@ -129,7 +137,11 @@ impl<'a> Sum<'a> {
         }
     }
 
-    fn elements(&mut self, elements: &[ElementId], integral: impl Fn(ElementId) -> LocalIntegral<4> + Sync) {
+    pub(super) fn elements(
+        &mut self,
+        elements: &[ElementId],
+        integral: impl Fn(ElementId) -> LocalIntegral<4> + Sync,
+    ) {
         for chunk in elements.chunks(CHUNK) {
             let integrals: Vec<_> = chunk.par_iter().map(|&e| integral(e)).collect();
             for (&e, integral) in chunk.iter().zip(&integrals) {
@@ -155,7 +167,7 @@ impl<'a> Sum<'a> {
         }
     }
 
-    fn into_value(self) -> FunctionalValue {
+    pub(super) fn into_value(self) -> FunctionalValue {
         FunctionalValue { value: self.value, derivative: self.derivative, explicit: Some(self.explicit) }
     }
 }

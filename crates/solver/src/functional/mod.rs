@@ -3,8 +3,9 @@
 //! `dF/dx = explicit − 2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )` with `K λ = ∂F/∂u`: [`FunctionalValue::derivative`] is the right
 //! side of the adjoint problem, [`FunctionalValue::explicit`] the first term, and [`crate::adjoint`] the second.
 //! `observation` holds what is a function of B in cells that do not move, `integral` the integrals of densities over
-//! regions that may. Weighted sums, bounds and several frequencies are the optimiser's business.
+//! regions that may, `force` the virtual work around a body. Weighted sums, bounds and several frequencies are the optimiser's business.
 
+mod force;
 mod integral;
 mod observation;
 
@@ -16,6 +17,7 @@ use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+pub use force::{Force, RigidMotion};
 pub use integral::Integral;
 pub use observation::{Observation, Observed, Weighting};
 
@@ -26,6 +28,8 @@ pub enum Functional {
     Observation(Observation),
     /// An integral over elements or an impedance surface, which may move.
     Integral(Integral),
+    /// A force or torque on a body, which may move.
+    Force(Force),
 }
 
 /// Value of a functional, and what its gradient needs.
@@ -65,11 +69,25 @@ impl Functional {
         Ok(Self::Integral(Integral::energy(model, region)?))
     }
 
+    /// A force [N] or torque [N m] on the body that some regions make up, of the meshed part; in harmonics the time average.
+    ///
+    /// # Errors
+    /// As [`Force::new`].
+    pub fn force(
+        model: &FieldModel,
+        mesh: &Mesh,
+        name: &str,
+        regions: &[RegionId],
+        motion: RigidMotion,
+    ) -> Result<Self, SolverError> {
+        Ok(Self::Force(Force::new(model, mesh, name, regions, motion)?))
+    }
+
     /// Elements that must stay where they are: those of an observation.
     pub fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         let observation = match self {
             Self::Observation(observation) => Some(observation),
-            Self::Integral(_) => None,
+            Self::Integral(_) | Self::Force(_) => None,
         };
         observation.into_iter().flat_map(Observation::elements)
     }
@@ -83,7 +101,7 @@ impl Functional {
     ) -> Vec<Complex3> {
         match self {
             Self::Observation(observation) => observation.cell_flux_densities(model, mesh, solution),
-            Self::Integral(_) => Vec::new(),
+            Self::Integral(_) | Self::Force(_) => Vec::new(),
         }
     }
 
@@ -100,10 +118,16 @@ impl Functional {
         let result = match self {
             Self::Observation(observation) => observation.evaluate(model, mesh, solution),
             Self::Integral(integral) => integral.evaluate(model, mesh, solution),
+            Self::Force(force) => force.evaluate(model, mesh, solution),
         };
         if !result.value.is_finite() {
             return Err(SolverError::NotFinite { what: "objective", value: result.value });
         }
         Ok(result)
     }
+}
+
+/// Whether the field does not alternate.
+fn is_static(model: &FieldModel) -> bool {
+    model.angular_frequency() == 0.0
 }

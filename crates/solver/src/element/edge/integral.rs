@@ -4,40 +4,37 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::super::Complex3;
-use super::super::density::ElementIntegral;
+use super::super::density::{ElementIntegral, OfFlux};
 use super::super::tabulated::Rule;
 use super::{Ascending, EdgeShape, FieldPoint, combine};
 
 /// A density at a point: its value, its derivatives by `B` and by `A + ∇ψ` (halved, as in [`super::super::density`]), and
 /// its Eshelby tensor.
-struct Density {
-    value: f64,
-    by_curl: Complex3,
-    by_potential: Complex3,
-    tensor: [Point; 3],
+pub(super) struct Density {
+    pub(super) value: f64,
+    pub(super) by_curl: Complex3,
+    pub(super) by_potential: Complex3,
+    pub(super) tensor: [Point; 3],
 }
 
 impl<const N: usize, const M: usize> EdgeShape<N, M> {
-    /// `f ∫|B − B_r|² dV`; `remanence` is `B_r` [T], zero outside magnets.
-    pub(crate) fn flux_energy(
+    /// The integral of a density of `B`, by the rule that is exact for squares.
+    pub(crate) fn flux_integral(
         &self,
         cell: (&Tet4, &Ascending),
-        factor: f64,
-        remanence: Point,
         coefficients: &[[c64; 4]],
+        mut density: impl FnMut(Complex3) -> OfFlux,
     ) -> ElementIntegral<N, 4> {
         self.integrate(self.curl_rule(), cell, coefficients, |at| {
             let b = at.flux_density;
-            let conjugate: Complex3 = std::array::from_fn(|d| (b[d] - remanence[d]).conj());
-            let square: f64 = conjugate.iter().map(|c| c.norm_sqr()).sum();
+            let (value, by_curl) = density(b);
             // δB = (∇v) B − (div v) B.
-            let along: f64 = (0..3).map(|d| (conjugate[d] * b[d]).re).sum();
+            let along: f64 = (0..3).map(|d| (by_curl[d] * b[d]).re).sum();
             let tensor = tensor(|d, i| {
-                let diagonal = if d == i { square - 2.0 * along } else { 0.0 };
-                factor * (diagonal + 2.0 * (conjugate[d] * b[i]).re)
+                let diagonal = if d == i { value - 2.0 * along } else { 0.0 };
+                diagonal + 2.0 * (by_curl[d] * b[i]).re
             });
-            let by_curl = conjugate.map(|c| factor * c);
-            Density { value: factor * square, by_curl, by_potential: [c64::default(); 3], tensor }
+            Density { value, by_curl, by_potential: [c64::default(); 3], tensor }
         })
     }
 
@@ -67,12 +64,12 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
         self.fields(self.value_rule(), tet, coefficients).map(|(share, at)| share * square(&at)).sum()
     }
 
-    fn integrate(
+    pub(super) fn integrate(
         &self,
         rule: Rule,
         (plain, tet): (&Tet4, &Ascending),
         coefficients: &[[c64; 4]],
-        density: impl Fn(&FieldPoint) -> Density,
+        mut density: impl FnMut(&FieldPoint) -> Density,
     ) -> ElementIntegral<N, 4> {
         let mut integral =
             ElementIntegral { value: 0.0, potentials: [[c64::default(); 4]; N], positions: [[0.0; 3]; 4] };
@@ -106,6 +103,7 @@ fn tensor(entry: impl Fn(usize, usize) -> f64) -> [Point; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::density::squared_deviation;
     use super::super::super::differences::{SKEW, derivatives_hold};
     use super::*;
 
@@ -116,7 +114,7 @@ mod tests {
         };
         derivatives_hold::<N, 4>(SKEW, |x, u| {
             let (plain, tet) = cell(x);
-            shape.flux_energy((&plain, &tet), 0.7, [0.4, -0.2, 0.9], &u)
+            shape.flux_integral((&plain, &tet), &u, squared_deviation(0.7, [0.4, -0.2, 0.9]))
         });
         derivatives_hold::<N, 4>(SKEW, |x, u| {
             let (plain, tet) = cell(x);

@@ -5,9 +5,10 @@
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{Point, Tet4, dot};
 
-use super::super::Complex3;
 use super::super::point::stretch;
+use super::super::tangent::Curls;
 use super::super::volume::Coefficients;
+use super::super::{Complex3, dot3};
 use super::{Ascending, EdgeShape, combine};
 
 /// The matrix of a tetrahedron with `N` carriers and `M` functions, shape `(N × 4, N × 4)`; zero where a carrier has no
@@ -89,6 +90,43 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
             }
         }
         stretch(plain, &tensor)
+    }
+
+    /// `∂/∂x_k ∫ H(B_u)·B_l` for the four vertices of `plain`, shape `(4, 3)`, of a law that gives `H(B_u)` and `∂H/∂B B_l`
+    /// from `B_l` and `B_u`; the coefficients are held.
+    pub(crate) fn flux_shape_derivative(
+        &self,
+        (plain, tet): (&Tet4, &Ascending),
+        adjoint: &[[c64; 4]],
+        state: &[[c64; 4]],
+        law: impl Fn(Complex3, Complex3) -> [Complex3; 2],
+    ) -> [Complex3; 4] {
+        let mut tensor = [[c64::default(); 3]; 3];
+        let rule = self.curl_rule();
+        for ((share, l), (_, u)) in self.fields(rule, tet, adjoint).zip(self.fields(rule, tet, state)) {
+            let (l, u) = (l.flux_density, u.flux_density);
+            let [field, turned] = law(l, u);
+            for d in 0..3 {
+                for i in 0..3 {
+                    tensor[d][i] += share * (field[d] * l[i] + turned[d] * u[i]);
+                }
+                tensor[d][d] -= share * dot3(turned, u);
+            }
+        }
+        stretch(plain, &tensor)
+    }
+
+    /// Curls of all functions at the points of the rule that is exact for their products.
+    pub(crate) fn curls(&self, tet: &Ascending) -> Curls<N> {
+        let mut of = Curls::default();
+        for at in &self.tables[self.curl_rule() as usize] {
+            of.weights[of.count] = at.share * tet.volume;
+            for (f, &(carrier, component)) in self.slots.iter().enumerate().take(self.rotational) {
+                of.curls[of.count][carrier][component] = combine(&at.curl[f], &tet.products);
+            }
+            of.count += 1;
+        }
+        of
     }
 
     /// `λ_b`-weighted source moments `M_b = ∫T λ_b dV` [A m²], in ascending order of the vertices, to the load

@@ -1,0 +1,145 @@
+//! Force and torque on a body, by virtual work in the layer of elements around it.
+//!
+//! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
+//! The force is minus the rate at which their field energy changes at fixed potentials ([`crate::element::virtual_work`]); inside
+//! the body nothing is deformed. The same number is the stress `∫σ:∇v` over the layer, which holds with eddy currents as well:
+//! in harmonics it is the time average. The layer must be without current, magnetisation and conductivity.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::{Point, cross, sub};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+
+use super::integral::Sum;
+use super::{FunctionalValue, is_static};
+use crate::coil::CoilShape;
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+
+/// A component of force or torque: the work per unit of a rigid motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RigidMotion {
+    /// Along a unit vector: a force [N].
+    Translation(Point),
+    /// Around an axis: a torque [N m].
+    Rotation {
+        /// Unit vector along the axis.
+        axis: Point,
+        /// A point on the axis [m].
+        about: Point,
+    },
+}
+
+impl RigidMotion {
+    /// The velocity [m per unit] of a point of the body.
+    fn velocity(&self, x: Point) -> Point {
+        match *self {
+            Self::Translation(direction) => direction,
+            Self::Rotation { axis, about } => cross(axis, sub(x, about)),
+        }
+    }
+}
+
+/// The force on some regions.
+#[derive(Clone, Debug)]
+pub struct Force {
+    /// Elements that touch the body from outside, ascending.
+    layer: Vec<ElementId>,
+    body: BTreeSet<NodeId>,
+    motion: RigidMotion,
+}
+
+impl Force {
+    /// The force on the body that some regions make up.
+    ///
+    /// # Errors
+    /// [`SolverError::EmptyRegion`] for a body without elements, [`SolverError::Layer`] where the layer around it is not free.
+    pub fn new(
+        model: &FieldModel,
+        mesh: &Mesh,
+        name: &str,
+        regions: &[RegionId],
+        motion: RigidMotion,
+    ) -> Result<Self, SolverError> {
+        let topology = model.topology();
+        let region_of = |e: ElementId| topology.region_of()[e.index()];
+        let inside = |e: &ElementId| regions.contains(&region_of(*e));
+        let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
+        let body: BTreeSet<NodeId> = of_body.collect();
+        let around = body.iter().flat_map(|&node| topology.elements_around(node)).copied();
+        let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
+        if layer.is_empty() {
+            let expected = "a force needs a body with mesh around it";
+            return Err(SolverError::EmptyRegion { region: name.to_owned(), expected });
+        }
+        let fault = |e: ElementId, what| SolverError::Layer {
+            body: name.to_owned(),
+            region: topology.region_names()[region_of(e).index()].clone(),
+            place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
+            what,
+        };
+        for &e in &layer {
+            if model.curve_of(e).is_some() {
+                return Err(fault(e, "iron with a B–H curve"));
+            }
+            if model.remanence_of(e) != [0.0; 3] {
+                return Err(fault(e, "a magnet"));
+            }
+            if model.materials()[region_of(e).index()].conductivity > 0.0 {
+                return Err(fault(e, "a conductor"));
+            }
+            if carries_current(model, mesh, e) {
+                return Err(fault(e, "a winding"));
+            }
+        }
+        Ok(Self { layer: layer.into_iter().collect(), body, motion })
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> FunctionalValue {
+        let space = model.space();
+        let share = if is_static(model) { 0.5 } else { 0.25 };
+        let velocity_of = |node: NodeId| {
+            if self.body.contains(&node) { self.motion.velocity(mesh.point(node)) } else { [0.0; 3] }
+        };
+        let mut sum = Sum::new(model);
+        sum.elements(&self.layer, |e| {
+            let nodes = model.topology().tet(e);
+            // Minus the rate: the velocities are turned round.
+            let velocities = nodes.map(|node| velocity_of(node).map(|v| -v));
+            let law = [share * model.coefficients_of(e).reluctivity, model.setup().penalty];
+            let field = solution.element(model, e);
+            let (mut rate, by_velocity) =
+                space.elements().virtual_work(&space.cell(mesh, e), law, &velocities, field.values());
+            if let RigidMotion::Rotation { axis, .. } = self.motion {
+                // A node of the body that moves by δx has the velocity axis × δx more.
+                for (k, _) in nodes.iter().enumerate().filter(|(_, node)| self.body.contains(node)) {
+                    let more = cross(by_velocity[k], axis);
+                    (0..3).for_each(|d| rate.positions[k][d] -= more[d]);
+                }
+            }
+            rate
+        });
+        sum.into_value()
+    }
+}
+
+/// Whether the current of a coil flows in an element.
+fn carries_current(model: &FieldModel, mesh: &Mesh, e: ElementId) -> bool {
+    let vertices = mesh.vertices(e);
+    let centre = fluxmorph_geometry::tet4::centroid(vertices);
+    model.coils().iter().any(|coil| match &coil.shape {
+        // A point just inside every corner: faces of the winding may lie along those of elements.
+        CoilShape::Racetrack(racetrack) => vertices
+            .iter()
+            .map(|x| std::array::from_fn(|d| 0.999 * x[d] + 0.001 * centre[d]))
+            .chain([centre])
+            .any(|x| racetrack.current_density(x) != [0.0; 3]),
+        CoilShape::Region(current) => current.current_density().binary_search_by_key(&e, |(e, _)| *e).is_ok(),
+    })
+}

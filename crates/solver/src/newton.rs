@@ -1,0 +1,178 @@
+//! Magnetostatics with B–H laws: the minimum of the energy by Newton's method.
+//!
+//! The state minimises `W(A) = ∫w(|B|) − ∫T·B` (with the penalty of nodal elements), which is convex. Newton's steps have the
+//! exact tangent; a step is halved until the energy falls by a small part of what its slope promises (Armijo; Nocedal and
+//! Wright, Numerical Optimization, 2006, section 3.1). The start is zero and nothing of other designs takes part but the method
+//! of the linear solver, so that a state is a function of mesh and model. Within one solution a factor serves as long as it
+//! pays.
+
+use fluxmorph_geometry::fem::scalar::{axpy, dot, norm};
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::tet4::{Point, centroid};
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use crate::error::SolverError;
+use crate::linear::{LinearSolverCache, LinearSolverReport, PreparedSystem};
+use crate::model::FieldModel;
+use crate::nonlinear::{self, Added};
+use crate::solution::FieldSolution;
+
+/// Steps after which there is no hope: a start from zero takes eight to fifteen.
+const MOST_STEPS: usize = 60;
+
+/// Halvings of one step: the energy is convex, so that one of them is short enough unless rounding is all that is left.
+const MOST_HALVINGS: usize = 30;
+
+/// Relative residual above which a state is refused [1].
+const REQUIRED: f64 = 1e-10;
+
+/// The part of the promised decrease that is asked for (Nocedal and Wright: 1e-4).
+const ARMIJO: f64 = 1e-4;
+
+/// Rounding of the energy relative to its terms: sums over some thousand elements.
+const ENERGY_ROUNDING: f64 = 1e-13;
+
+/// A residual that a step leaves at more than this part of itself is rounding, once it is below `REQUIRED`.
+const STAGNATION: f64 = 0.1;
+
+/// Where Newton's method stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NewtonProgress {
+    /// Steps done.
+    pub steps: usize,
+    /// `|residual| / |load|`.
+    pub residual: f64,
+    /// `W` [J].
+    pub energy: f64,
+    /// Length of the last step over Newton's own: one, or what halving left of it.
+    pub damping: f64,
+}
+
+/// Watches the steps.
+pub type NewtonObserver<'a> = dyn FnMut(NewtonProgress) + 'a;
+
+/// A state on the way.
+struct Iterate {
+    solution: FieldSolution,
+    energy: f64,
+    /// What rounding may do to the energy.
+    rounding: f64,
+    added: Added,
+    /// `K u − f` and what the laws add.
+    residual: Vec<c64>,
+}
+
+/// The problem of one mesh.
+struct Energy<'a> {
+    model: &'a FieldModel,
+    mesh: &'a Mesh,
+    /// Of the linear parts.
+    matrix: CsrMatrix<c64>,
+    load: Vec<c64>,
+}
+
+impl Energy<'_> {
+    /// Energy and residual of some unknowns.
+    fn at(&self, values: Vec<c64>) -> Iterate {
+        let mut residual = vec![c64::default(); values.len()];
+        self.matrix.mul(&values, &mut residual);
+        let (quadratic, work) = (0.5 * dot(&values, &residual).re, dot(&values, &self.load).re);
+        let solution = FieldSolution::of_state(values);
+        let added = nonlinear::added(self.model, self.mesh, &solution);
+        axpy(c64::from(-1.0), &self.load, &mut residual);
+        axpy(c64::from(1.0), &added.residual, &mut residual);
+        Iterate {
+            energy: quadratic - work + added.energy,
+            rounding: ENERGY_ROUNDING * (quadratic.abs() + work.abs() + added.energy.abs()),
+            solution,
+            added,
+            residual,
+        }
+    }
+
+    /// The longest of Newton's step and its halves that lowers the energy, and its length.
+    fn search(&self, from: &Iterate, step: &[c64]) -> Option<(Iterate, f64)> {
+        let slope = dot(&from.residual, step).re;
+        let mut length = 1.0;
+        for _ in 0..MOST_HALVINGS {
+            let mut values = from.solution.values().to_vec();
+            axpy(c64::from(length), step, &mut values);
+            let trial = self.at(values);
+            if trial.energy <= from.energy + ARMIJO * length * slope + from.rounding {
+                return Some((trial, length));
+            }
+            length *= 0.5;
+        }
+        None
+    }
+}
+
+/// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the adjoint.
+///
+/// # Errors
+/// [`SolverError::Newton`], and those of the linear solver.
+pub(crate) fn solve(
+    model: &FieldModel,
+    mesh: &Mesh,
+    cache: &LinearSolverCache,
+    observer: &mut NewtonObserver<'_>,
+) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+    let problem = Energy { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
+    let scale = norm(&problem.load);
+    let tolerance = model.setup().linear_solver.tolerance;
+    let mut iterate = problem.at(vec![c64::default(); problem.load.len()]);
+    let mut cache = LinearSolverCache::with_method(cache.method());
+    let (mut steps, mut iterations, mut before, mut damping) = (0, 0, f64::INFINITY, 1.0);
+    loop {
+        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
+        observer(NewtonProgress { steps, residual, energy: iterate.energy, damping });
+        let tangent = model.assemble_tangent(mesh, &iterate.added.tangents);
+        let mut system = model.prepare_with(tangent, &mut cache)?;
+        if residual <= tolerance || residual <= REQUIRED && residual > STAGNATION * before {
+            let report = LinearSolverReport { iterations, residual };
+            let values = iterate.solution.values().to_vec();
+            return Ok((FieldSolution::state(values, report).after_newton(steps), system));
+        }
+        let refused = |from: &FieldSolution, to: &FieldSolution| {
+            let (element, flux_density) = least_settled(model, mesh, from, to);
+            let region = model.topology().region_of()[element.index()];
+            SolverError::Newton {
+                steps,
+                residual,
+                region: model.topology().region_names()[region.index()].clone(),
+                place: centroid(mesh.vertices(element)),
+                flux_density,
+            }
+        };
+        let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
+        let (step, report) = system.solve(&right_side)?;
+        let Some((next, length)) = problem.search(&iterate, &step).filter(|_| steps < MOST_STEPS) else {
+            let mut values = iterate.solution.values().to_vec();
+            axpy(c64::from(1.0), &step, &mut values);
+            return Err(refused(&iterate.solution, &FieldSolution::of_state(values)));
+        };
+        cache = system.into_cache().without_initial_guess();
+        iterations += report.iterations;
+        (steps, before, damping, iterate) = (steps + 1, residual, length, next);
+    }
+}
+
+/// The element with a law whose `B` a step changes most, and its `|B|` [T] before.
+fn least_settled(
+    model: &FieldModel,
+    mesh: &Mesh,
+    from: &FieldSolution,
+    to: &FieldSolution,
+) -> (ElementId, f64) {
+    let elements = model.elements_with_a_law();
+    let fields = |of: &FieldSolution| of.flux_densities_of(model, mesh, elements);
+    let size = |b: Point| b.iter().map(|b| b * b).sum::<f64>().sqrt();
+    let mut worst = (elements[0], 0.0, -1.0);
+    for ((&e, a), b) in elements.iter().zip(fields(from)).zip(fields(to)) {
+        let change = size(std::array::from_fn(|d| b[d].re - a[d].re));
+        if change > worst.2 {
+            worst = (e, size(a.map(|c| c.re)), change);
+        }
+    }
+    (worst.0, worst.1)
+}

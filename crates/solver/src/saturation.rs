@@ -1,0 +1,58 @@
+//! How far every region with a B–H curve goes into it.
+
+use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+
+/// The saturation of a region.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Saturation {
+    /// Its name.
+    pub region: String,
+    /// The largest mean `|B|` of an element [T].
+    pub highest: f64,
+    /// Where [m].
+    pub place: Point,
+    /// The last `B` of the curve's points [T].
+    pub end: f64,
+    /// Share of the volume in which the differential permeability is below a tenth of its largest.
+    pub share_beyond_knee: f64,
+}
+
+/// Every region with a B–H curve, in the order of the regions.
+pub fn by_region(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<Saturation> {
+    let topology = model.topology();
+    let elements = model.elements_with_a_law();
+    let mut found: Vec<Option<(Saturation, [f64; 2])>> = vec![None; topology.region_names().len()];
+    let sizes = solution.flux_densities_of(model, mesh, elements);
+    for (&e, b) in elements.iter().zip(sizes) {
+        let size = b.iter().map(|c| c.re * c.re).sum::<f64>().sqrt();
+        let region = topology.region_of()[e.index()].index();
+        let (saturation, volumes) = found[region]
+            .get_or_insert_with(|| (of_region(model, &topology.region_names()[region], e), [0.0; 2]));
+        if size > saturation.highest {
+            (saturation.highest, saturation.place) = (size, centroid(mesh.vertices(e)));
+        }
+        let v = volume(mesh.vertices(e));
+        let knee = model.curve_of(e).map_or(f64::INFINITY, |curve| curve.knee());
+        volumes[0] += if size > knee { v } else { 0.0 };
+        volumes[1] += v;
+    }
+    let share = |(saturation, [beyond, all]): (Saturation, [f64; 2])| Saturation {
+        share_beyond_knee: beyond / all,
+        ..saturation
+    };
+    found.into_iter().flatten().map(share).collect()
+}
+
+fn of_region(model: &FieldModel, name: &str, e: ElementId) -> Saturation {
+    Saturation {
+        region: name.to_owned(),
+        highest: 0.0,
+        place: [0.0; 3],
+        end: model.curve_of(e).map_or(0.0, |curve| curve.end()[1]),
+        share_beyond_knee: 0.0,
+    }
+}

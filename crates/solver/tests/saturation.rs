@@ -1,0 +1,215 @@
+//! Iron with a B–H law: the linear limit, Newton's convergence, and derivatives against differences, for all elements.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::linear::{LinearSolverCache, LinearSolverSettings};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::newton::NewtonProgress;
+use fluxmorph_solver::{
+    BhCurve, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, RigidMotion,
+    SolverError, adjoint,
+};
+
+use crate::{OUTSIDE, flux_parallel};
+
+const ALL: [(ElementFamily, Order); 4] = [
+    (ElementFamily::Nodal, Order::Linear),
+    (ElementFamily::Nodal, Order::Quadratic),
+    (ElementFamily::Edge, Order::Linear),
+    (ElementFamily::Edge, Order::Quadratic),
+];
+
+/// An iron block under a coil, with cells of air that are observed; some hundred nodes.
+fn mesh() -> Mesh {
+    let line = |n: usize, h: f64| (0..=n).map(|i| h * i as f64).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(5, 0.012), line(5, 0.012), line(7, 0.01)]).expect("a grid");
+    let region = |x: Point| {
+        let iron = (0.02..0.04).contains(&x[2]) && x[0] > 0.012 && x[1] > 0.012 && x[0] < 0.048;
+        RegionId(u32::from(iron) + 2 * u32::from(x[2] < 0.01 && x[0] < 0.03))
+    };
+    let topology = grid.topology(&["air", "iron", "observed"], region).expect("a topology");
+    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+}
+
+/// A law that saturates at 1.8 T with an initial permeability of 2000, in steps of a tenth of its field strength.
+fn law() -> BhCurve {
+    let point = |i: i32| {
+        let h = 20.0 * (1.3_f64.powi(i) - 1.0);
+        [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
+    };
+    BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
+}
+
+fn setup((family, order): (ElementFamily, Order), iron: Material, bh: Option<BhCurve>) -> FieldModelSetup {
+    let shape = Racetrack::new([0.03, 0.03, 0.06], 2, [0.008, 0.008], 0.01, 0.01, Corner::Mitred)
+        .expect("a racetrack inside the mesh");
+    FieldModelSetup {
+        family,
+        order,
+        materials: vec![Material::AIR, iron, Material::AIR],
+        bh: vec![None, bh.map(Arc::new)],
+        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::from(600e3), shape: shape.into() }],
+        boundaries: flux_parallel(&OUTSIDE),
+        // Differences of functionals need the last digits.
+        linear_solver: LinearSolverSettings { tolerance: 1e-13, ..LinearSolverSettings::default() },
+        ..FieldModelSetup::default()
+    }
+}
+
+/// The material of the linear part: any one will do.
+const SOFT: Material = Material { relative_permeability: 2000.0, conductivity: 0.0 };
+
+#[test]
+fn a_straight_table_gives_the_field_of_the_linear_material() {
+    let mesh = mesh();
+    let steel = Material { relative_permeability: 500.0, conductivity: 0.0 };
+    let straight =
+        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * steel.reluctivity(), b])).expect("a sound table");
+    for elements in ALL {
+        // Of nodal elements with the same penalty, of edge elements with any linear part.
+        let part = if elements.0 == ElementFamily::Nodal { steel } else { SOFT };
+        let solved = |iron: Material, bh: Option<BhCurve>| {
+            let model = FieldModel::new(&mesh, setup(elements, iron, bh)).expect("a sound problem");
+            let (solution, _) = model.solve(&mesh).expect("it converges");
+            (solution.flux_densities(&model, &mesh), solution.newton_steps())
+        };
+        let (linear, _) = solved(steel, None);
+        let (newton, steps) = solved(part, Some(straight.clone()));
+        assert!((1..=2).contains(&steps), "{steps}");
+        let largest = linear.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
+        let off = linear.iter().flatten().zip(newton.iter().flatten()).map(|(a, b)| (a - b).norm());
+        let worst = off.fold(0.0, f64::max) / largest;
+        assert!(worst < 1e-10, "{elements:?}: {worst:e}");
+    }
+}
+
+#[test]
+fn newton_converges_from_zero_to_the_same_field_whatever_the_linear_part() {
+    let mesh = mesh();
+    for elements in ALL {
+        let solved = |relative_permeability: f64| {
+            let iron = Material { relative_permeability, conductivity: 0.0 };
+            let model = FieldModel::new(&mesh, setup(elements, iron, Some(law()))).expect("a sound problem");
+            let mut progress: Vec<NewtonProgress> = Vec::new();
+            let observer = &mut |step| progress.push(step);
+            let solved = model.solve_nonlinear(&mesh, &LinearSolverCache::default(), observer);
+            (solved.expect("it converges").0.flux_densities(&model, &mesh), progress)
+        };
+        let (field, progress) = solved(2000.0);
+        let residuals: Vec<String> =
+            progress.iter().map(|p| format!("{:.1e}/{}", p.residual, p.damping)).collect();
+        let iron = mesh.topology().elements_of(RegionId(1));
+        let most = iron.iter().map(|e| field[e.index()].iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt());
+        let most = most.fold(0.0, f64::max);
+        println!("{elements:?}: up to {most:.2} T, {residuals:?}");
+        assert!(most > 2.0, "it saturates");
+        assert!(progress.len() <= 16, "{elements:?}: {} steps", progress.len() - 1);
+        assert!(
+            progress.windows(2).all(|pair| pair[1].energy <= pair[0].energy + 1e-9 * pair[0].energy.abs())
+        );
+        if elements.0 == ElementFamily::Edge {
+            let (other, _) = solved(50.0);
+            let largest = field.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
+            let worst = field.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm());
+            // The residuals of two solutions to 1e-13, over the conditioning of the block.
+            assert!(worst.fold(0.0, f64::max) < 1e-9 * largest);
+        }
+    }
+}
+
+/// Moves the inside of the mesh off the coil smoothly, by `s` metres at most.
+fn moved(mesh: &Mesh, s: f64) -> Mesh {
+    let bump = |x: f64, l: f64| (std::f64::consts::PI * x / l).sin();
+    let to = |x: &Point| {
+        let height = if x[2] < 0.0501 {
+            (std::f64::consts::PI * (x[2] - 0.01).max(0.0) / 0.04).sin().max(0.0)
+        } else {
+            0.0
+        };
+        let shift = s * bump(x[0], 0.06) * bump(x[1], 0.06) * height;
+        [x[0] + 0.4 * shift, x[1] - 0.3 * shift, x[2] + shift]
+    };
+    Mesh::new(Arc::clone(mesh.topology()), mesh.points().iter().map(to).collect()).expect("a mesh")
+}
+
+#[test]
+fn derivatives_of_every_functional_match_differences() {
+    let start = mesh();
+    for elements in ALL {
+        let model = FieldModel::new(&start, setup(elements, SOFT, Some(law()))).expect("a sound problem");
+        let topology = start.topology();
+        let observed = topology.region("observed").expect("it is named");
+        let iron = topology.region("iron").expect("it is named");
+        let square = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
+        let functionals = [
+            Functional::observation(&start, observed, square),
+            Functional::observation(&start, observed, Observed::Component { direction: [0.0, 0.0, 1.0] }),
+            Functional::energy(&model, None),
+            Functional::energy(&model, Some(iron)),
+            Functional::force(&model, &start, "iron", &[iron], RigidMotion::Translation([0.36, 0.48, 0.8])),
+            Functional::force(
+                &model,
+                &start,
+                "iron",
+                &[iron],
+                RigidMotion::Rotation { axis: [0.6, 0.0, 0.8], about: [0.01, 0.05, 0.0] },
+            ),
+        ]
+        .map(|functional| functional.expect("a functional"));
+        let values = |s: f64| {
+            let mesh = moved(&start, s);
+            let (state, _) = model.solve(&mesh).expect("it converges");
+            functionals.each_ref().map(|f| f.evaluate(&model, &mesh, &state).expect("finite").value)
+        };
+        let moving: Vec<ElementId> =
+            topology.elements().filter(|&e| start.vertices(e).iter().all(|x| x[2] < 0.0501)).collect();
+        let (state, mut system) = model.solve(&start).expect("it converges");
+        let velocity: Vec<Point> = {
+            let far = moved(&start, 1e-3);
+            far.points()
+                .iter()
+                .zip(start.points())
+                .map(|(a, b)| std::array::from_fn(|d| (a[d] - b[d]) / 1e-3))
+                .collect()
+        };
+        let step = 5e-7;
+        let (plus, minus) = (values(step), values(-step));
+        for (k, functional) in functionals.iter().enumerate() {
+            let value = functional.evaluate(&model, &start, &state).expect("finite");
+            let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
+            let implicit =
+                adjoint::node_gradient(&model, &start, &state, &lambda, &moving).expect("one process");
+            let explicit = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; implicit.len()]);
+            let along = |gradient: &[Point]| -> f64 {
+                gradient.iter().zip(&velocity).map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum()
+            };
+            let exact = along(&implicit) + along(&explicit);
+            let difference = (plus[k] - minus[k]) / (2.0 * step);
+            let error = (difference / exact - 1.0).abs();
+            println!("{elements:?} {k}: {exact:e} {difference:e} {error:.1e}");
+            assert!(error < 1e-6, "{elements:?}, functional {k}: {exact} against {difference}");
+        }
+    }
+}
+
+#[test]
+fn laws_are_refused_where_they_have_no_meaning() {
+    let mesh = mesh();
+    let refused = |change: &dyn Fn(&mut FieldModelSetup)| {
+        let mut setup = setup(ALL[2], SOFT, Some(law()));
+        change(&mut setup);
+        match FieldModel::new(&mesh, setup) {
+            Err(SolverError::Parameter { what, .. }) => what,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(&|setup| setup.frequency = 50.0), "frequency");
+    assert_eq!(refused(&|setup| setup.remanence = vec![[0.0; 3], [0.0, 0.0, 1.0]]), "remanence");
+    assert_eq!(refused(&|setup| setup.bh.extend([None, None])), "number of B–H laws");
+}

@@ -1,0 +1,78 @@
+//! Gradients through iron with a B–H curve: the state is the end of Newton's method, the adjoint one solve with its tangent.
+
+use fluxmorph_optimizer::verify::{Settings, certify};
+
+use super::{MESHED, check, wavy};
+use crate::problems::analysed;
+use crate::support::setup;
+
+/// A construction steel that saturates near 2 T; it ends saturated.
+const STEEL: &str = "materials.steel={ bh = [[80, 0.1], [160, 0.3], [250, 0.6], [400, 0.95], [700, 1.25], [1500, 1.5], \
+                     [4e3, 1.65], [1.2e4, 1.85], [4e4, 2.08], [1e5, 2.2], [2e5, 2.36]] }";
+
+/// Constraints of every kind that a static field has, with force and torque on the plate.
+const CONSTRAINTS: &str = r#"constraints=[
+    { kind = "field_component", region = "observation", direction = [0.2, -0.1, 1.0], upper = "1 T" },
+    { kind = "energy", upper = "1 kJ" },
+    { kind = "energy", name = "inside", region = "plate", upper = "1 kJ" },
+    { kind = "force", region = "shield", direction = [0.3, -0.2, 1.0], upper = "1 kN" },
+    { kind = "torque", region = "shield", direction = [1.0, 0.5, -0.3], upper = "1 kN m" },
+]"#;
+
+/// The certificates of the objective and of all constraints, on a design that is flat nowhere.
+fn all_hold(elements: &str, order: u8, directions: usize) {
+    let mut overrides = MESHED.to_vec();
+    let (elements, order) = (format!("analysis.elements=\"{elements}\""), format!("analysis.order={order}"));
+    overrides.extend([
+        "analysis.frequency=\"0 Hz\"",
+        "mesh.shield.refinement=0.3",
+        "mesh.shield.skin=[\"4 mm\"]",
+        "coils=[{ name = \"coil\", shape = \"racetrack\", ampere_turns = \"120 kA\", center = [\"0 mm\", \"0 mm\", \
+         \"60 mm\"], axis = \"z\", half_window = [\"60 mm\", \"160 mm\"], width = \"20 mm\", height = \"40 mm\", \
+         corner = \"mitred\" }]",
+        "analysis.linear_solver.tolerance=1e-13",
+        "forces=[{ name = \"shield\", regions = [\"plate\"], about = [\"10 mm\", \"-20 mm\", \"5 mm\"] }]",
+        "materials.steel.relative_permeability=1",
+        STEEL,
+        CONSTRAINTS,
+        elements.as_str(),
+        order.as_str(),
+    ]);
+    let setup = setup("shield_quick.toml", &overrides);
+    let p = wavy(&setup.problem);
+    let analysis = analysed(&setup.problem, &p);
+    let model = &setup.problem.states()[0];
+    let saturation =
+        &fluxmorph_solver::saturation::by_region(model, &analysis.mesh, &analysis.solutions[0])[0];
+    let steps = analysis.solutions[0].newton_steps();
+    println!("{elements} {order}: {steps} steps, {saturation:?}");
+    assert!(saturation.share_beyond_knee > 0.05, "a part of the plate saturates");
+    let settings = Settings { directions, ..Settings::default() };
+    let certificates = certify(&setup.problem, &p, &settings, &|| false, |_, _, _| {});
+    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
+    check(&certificates.objective);
+    for constraint in &certificates.constraints {
+        println!("{} {:e}", constraint.name, constraint.certificate.objective);
+        check(&constraint.certificate);
+    }
+}
+
+#[test]
+fn gradients_through_a_curve_are_exact_on_linear_edge_elements() {
+    all_hold("edge", 1, 5);
+}
+
+#[test]
+fn gradients_through_a_curve_are_exact_on_quadratic_edge_elements() {
+    all_hold("edge", 2, 1);
+}
+
+#[test]
+fn gradients_through_a_curve_are_exact_on_linear_nodal_elements() {
+    all_hold("nodal", 1, 2);
+}
+
+#[test]
+fn gradients_through_a_curve_are_exact_on_quadratic_nodal_elements() {
+    all_hold("nodal", 2, 1);
+}

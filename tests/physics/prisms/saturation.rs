@@ -1,0 +1,109 @@
+//! Prisms with iron along a B–H curve: `H = (0, 0, T + c)` still holds, and `c` follows from a scalar equation.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::volume;
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{BhCurve, FieldModel};
+
+use super::boxed::{Cells, boxed};
+use super::discretisation::ALL;
+use super::exact::Prism;
+use super::problem::{Solved, set_up};
+use super::source::Source;
+use super::{cases, unstructured};
+
+/// The steel of TEAM problem 20, of `tests/reference/team20_bh.csv`.
+fn steel() -> BhCurve {
+    let rows = include_str!("../../reference/team20_bh.csv").lines().filter(|line| !line.starts_with('#'));
+    let point = |line: &str| -> [f64; 2] {
+        let numbers: Vec<f64> = line.split(',').map(|n| n.trim().parse().expect("a number")).collect();
+        numbers.try_into().expect("H and B")
+    };
+    BhCurve::new(&rows.map(point).collect::<Vec<_>>()).expect("a sound table")
+}
+
+/// `B` [T] of a field strength [A/m], with its sign.
+fn flux_density(curve: &BhCurve, h: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 10.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if curve.at(middle).field_strength < h.abs() { low = middle } else { high = middle }
+    }
+    high.copysign(h)
+}
+
+/// `c` [A/m] where the region `iron`, which `T` does not reach, follows the curve: `μ0 ∫(T + c) + A B(c) = 0`.
+fn constant(prism: &Prism, curve: &BhCurve) -> f64 {
+    let iron = prism.parts.iter().find(|part| part.name == "iron").expect("it has iron");
+    assert_eq!(prism.source.over(&iron.shape), 0.0, "no T in the iron");
+    let [around, inside] = [prism.outline.area() - iron.shape.area(), iron.shape.area()];
+    let source = prism.source.over(&prism.outline);
+    let flux = |c: f64| VACUUM_PERMEABILITY * (source + c * around) + inside * flux_density(curve, c);
+    let (mut low, mut high) = (-1e7, 0.0);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if flux(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// The same with another current.
+fn driven(prism: Prism, ampere_turns: f64) -> Prism {
+    Prism { source: Source { ampere_turns, ..prism.source }, ..prism }
+}
+
+#[test]
+fn saturated_prisms_are_exact_on_edge_elements() {
+    let curve = steel();
+    let cut = unstructured::all()
+        .into_iter()
+        .filter(|(prism, _)| prism.parts.iter().any(|part| part.name == "iron") && prism.parts.len() == 1);
+    let boxes = [cases::iron_corner(1e3), cases::iron_far(1e3)].map(|prism| {
+        let mesh = boxed(&prism, Cells::COARSE);
+        (prism, mesh)
+    });
+    let mut solved = 0;
+    for (prism, mesh) in boxes.into_iter().chain(cut) {
+        // The knee, saturation, and beyond the last point of the table.
+        for ampere_turns in [1e6, 4e6, 4e7] {
+            let prism = driven(prism.clone(), ampere_turns);
+            let c = constant(&prism, &curve);
+            let exact = flux_density(&curve, c);
+            let mean = prism.source.over(&prism.observation) / prism.observation.area();
+            for discretisation in ALL {
+                let (mesh, mut setup) = set_up(&prism, &mesh, 1.0);
+                let regions = mesh.topology().region_names().to_vec();
+                let law = |name: &String| (name == "iron").then(|| Arc::new(curve.clone()));
+                setup.bh = regions.iter().map(law).collect();
+                let model = FieldModel::new(&mesh, discretisation.of(setup)).expect("a sound problem");
+                let (solution, _) = model.solve(&mesh).expect("it converges");
+                let steps = solution.newton_steps();
+                let mut sum = [0.0; 2];
+                for &e in model.elements_with_a_law() {
+                    let v = volume(mesh.vertices(e));
+                    let b = solution.flux_density(&model, &mesh, e);
+                    let off = [b[0], b[1], b[2] - exact].iter().map(|c: &c64| c.norm_sqr()).sum::<f64>();
+                    sum = [sum[0] + v * off, sum[1] + v * exact * exact];
+                }
+                let of_iron = (sum[0] / sum[1]).sqrt();
+                let solved_prism = Solved { model, mesh, solution, cpu_seconds: 0.0 };
+                let observed =
+                    (solved_prism.observed()[2].re / (VACUUM_PERMEABILITY * (mean + c)) - 1.0).abs();
+                println!(
+                    "{:<40} {:<8} {ampere_turns:.0e} A: {exact:.3} T, {:.3} % in the iron, {:.3} % far off, {steps} steps",
+                    prism.name,
+                    discretisation.name,
+                    100.0 * of_iron,
+                    100.0 * observed
+                );
+                if discretisation.name.starts_with("edge") {
+                    assert!(of_iron.max(observed) < 0.005, "{} {}", prism.name, discretisation.name);
+                    solved += 1;
+                }
+            }
+        }
+    }
+    assert!(solved >= 12, "{solved}");
+}
