@@ -1,6 +1,7 @@
 //! One analysis with its directory: the field of a single design.
 
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, RoundStart, SolverCache, Stage};
 
 use super::prepared::Prepared;
@@ -44,7 +45,7 @@ pub fn solve(
         let problem = &session.setup.problem;
         session.continuation.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
-        let (cache, stages) = (&mut SolverCache::default(), &mut |stage| observer.stage(stage));
+        let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
         let analysis = problem.analyse(moved, p, Derivatives::First, cache, stages)?;
         let design = values.as_deref().map(|values| (values, rounds.as_slice()));
         session.write_analysis(design, &analysis, observer)

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use fluxmorph_optimizer::problem::Stage;
+use fluxmorph_solver::newton::NewtonProgress;
 
 use super::lines::Lines;
 use super::table::Columns;
@@ -68,6 +69,13 @@ impl<W: Write> Observer for Console<W> {
         self.end_stage();
         if !self.has_evaluations {
             self.stage = Some((stage, Instant::now()));
+        }
+    }
+
+    fn newton(&mut self, progress: NewtonProgress) {
+        if !self.has_evaluations {
+            let NewtonProgress { steps, residual, energy, .. } = progress;
+            self.line(&format!("  Newton step {steps:>2}: residual {residual:.1e}, energy {energy:.6e} J"));
         }
     }
 

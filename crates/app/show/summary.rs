@@ -3,7 +3,7 @@
 use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Goal, Objective};
-use crate::files::{ConstraintResult, ObjectiveResult, RunResult, RunStatus};
+use crate::files::{ConstraintResult, ForceResult, ObjectiveResult, RunResult, RunStatus, SaturatedRegion};
 use crate::printable::printable;
 
 /// What the objective of a run is called, and its unit.
@@ -55,6 +55,13 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
                 .map(|(region, loss)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)))),
         );
     }
+    for ForceResult { name, force_n: [x, y, z], .. } in &result.forces {
+        rows.push(("force", format!("({x:.6e}, {y:.6e}, {z:.6e}) N on {}", printable(name))));
+    }
+    if let Some(saturation) = &result.saturation {
+        rows.extend(saturation.regions.iter().map(saturated));
+        rows.push(("Newton steps", saturation.newton_steps.to_string()));
+    }
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
         rows.push(("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations)));
@@ -73,6 +80,18 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
     let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
     rows.chain(probes::lines(&result.probes, frequency)).collect()
+}
+
+/// How far a region goes into its B–H curve.
+fn saturated(region: &SaturatedRegion) -> Row {
+    let SaturatedRegion { region: name, highest_b_t: highest, table_ends_b_t: end, .. } = region;
+    let beyond = if highest > end { ", beyond its curve" } else { "" };
+    let share = 100.0 * region.volume_share_beyond_knee;
+    let text = format!(
+        "{highest:.3} T in {}{beyond}, which ends at {end} T; {share:.1} % is beyond the knee",
+        printable(name)
+    );
+    ("highest B", text)
 }
 
 /// How a run ended, and what it has gained.

@@ -11,13 +11,12 @@ const STEEL: &str = "materials.steel={ bh = [[80, 0.1], [160, 0.3], [250, 0.6], 
                      [4e3, 1.65], [1.2e4, 1.85], [4e4, 2.08], [1e5, 2.2], [2e5, 2.36]] }";
 
 /// Constraints of every kind that a static field has, with force and torque on the plate.
-const CONSTRAINTS: &str = r#"constraints=[
-    { kind = "field_component", region = "observation", direction = [0.2, -0.1, 1.0], upper = "1 T" },
-    { kind = "energy", upper = "1 kJ" },
-    { kind = "energy", name = "inside", region = "plate", upper = "1 kJ" },
-    { kind = "force", region = "shield", direction = [0.3, -0.2, 1.0], upper = "1 kN" },
-    { kind = "torque", region = "shield", direction = [1.0, 0.5, -0.3], upper = "1 kN m" },
-]"#;
+const CONSTRAINTS: &str = "constraints=[\
+    { kind = \"field_component\", region = \"observation\", direction = [0.2, -0.1, 1.0], upper = \"1 T\" }, \
+    { kind = \"energy\", upper = \"1 kJ\" }, \
+    { kind = \"energy\", name = \"inside\", region = \"plate\", upper = \"1 kJ\" }, \
+    { kind = \"force\", region = \"shield\", direction = [0.3, -0.2, 1.0], upper = \"1 kN\" }, \
+    { kind = \"torque\", region = \"shield\", direction = [1.0, 0.5, -0.3], upper = \"1 kN m\" }]";
 
 /// The certificates of the objective and of all constraints, on a design that is flat nowhere.
 fn all_hold(elements: &str, order: u8, directions: usize) {

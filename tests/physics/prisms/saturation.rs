@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::volume;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{BhCurve, FieldModel};
+use fluxmorph_solver::{BhCurve, FieldModel, Functional, RigidMotion};
 
 use super::boxed::{Cells, boxed};
 use super::discretisation::ALL;
@@ -52,6 +52,37 @@ fn constant(prism: &Prism, curve: &BhCurve) -> f64 {
 /// The same with another current.
 fn driven(prism: Prism, ampere_turns: f64) -> Prism {
     Prism { source: Source { ampere_turns, ..prism.source }, ..prism }
+}
+
+/// The field presses on the free faces of a piece of iron in a corner, as everywhere along `B`: `½ μ0 H²`.
+#[test]
+fn the_force_on_saturated_iron_is_the_pressure_on_its_faces() {
+    let curve = steel();
+    let prism = driven(cases::iron_far(1e3), 4e6);
+    let mesh = boxed(&prism, Cells::COARSE);
+    let pressure = 0.5 * VACUUM_PERMEABILITY * constant(&prism, &curve).powi(2) * prism.height;
+    // Faces at x = −0.8 over y from −1 to −0.4, and at y = −0.4 over x from −1 to −0.8.
+    let about_z = pressure * (0.5 * (0.4_f64.powi(2) - 1.0) - 0.5 * (0.8_f64.powi(2) - 1.0));
+    let along = |d: usize| std::array::from_fn(|i| f64::from(u8::from(i == d)));
+    let expected = [
+        (RigidMotion::Translation(along(0)), -0.6 * pressure),
+        (RigidMotion::Translation(along(1)), -0.2 * pressure),
+        (RigidMotion::Rotation { axis: along(2), about: [0.0; 3] }, about_z),
+    ];
+    for discretisation in ALL.into_iter().filter(|d| d.name.starts_with("edge")) {
+        let (mesh, mut setup) = set_up(&prism, &mesh, 1.0);
+        let iron = mesh.topology().region("iron").expect("it is named");
+        setup.bh = vec![None; iron.index()];
+        setup.bh.push(Some(Arc::new(curve.clone())));
+        let model = FieldModel::new(&mesh, discretisation.of(setup)).expect("a sound problem");
+        let (solution, _) = model.solve(&mesh).expect("it converges");
+        for (motion, exact) in expected {
+            let force = Functional::force(&model, &mesh, "iron", &[iron], motion).expect("a layer of air");
+            let found = force.evaluate(&model, &mesh, &solution).expect("finite").value;
+            println!("{}: {found:e}, exact {exact:e}", discretisation.name);
+            assert!((found / exact - 1.0).abs() < 0.01, "{}: {found} against {exact}", discretisation.name);
+        }
+    }
 }
 
 #[test]

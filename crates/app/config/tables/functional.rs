@@ -30,6 +30,7 @@ table! {
 
 /// The words of a deviation from a field that is wished for, with the one of earlier versions.
 pub(super) const TARGET_FIELD: [&str; 2] = ["target_field", "uniformity"];
+
 /// Kinds that are a component.
 const DIRECTED: [&str; 3] = ["field_component", "force", "torque"];
 

@@ -9,7 +9,7 @@ use fluxmorph_remesh::{Moved, RemeshError};
 use super::incumbent::{BestField, Comparison, Initial};
 use super::run::Run;
 use super::search::{Refusal, Stop};
-use super::{Evaluation, Record, StopReason, column, reference_hash};
+use super::{Evaluation, Record, StopReason, Watching, column, reference_hash};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::{Analysis, Derivatives, Measured, Stage};
@@ -51,7 +51,7 @@ impl Run<'_> {
         let moved = self.mesh(p)?;
         let remesh = clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;
-        let progress = &mut |stage| observer.stage(stage);
+        let progress = &mut Watching(&mut **observer);
         let mut analysis = problem.analyse(moved, p, Derivatives::First, cache, progress)?;
         analysis.timings.remesh += remesh;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();

@@ -39,7 +39,7 @@ use crate::error::Error;
 use crate::problem::Problem;
 
 pub use evaluation::{Evaluation, column};
-pub use observer::{Observer, Silent};
+pub use observer::{Observer, Silent, Watching};
 pub use outcome::{Best, Optimised};
 pub use record::{Record, reference_hash};
 pub use recorder::{Recorder, Unrecorded};

@@ -1,7 +1,9 @@
 //! Who watches an optimisation: the driver reports what happens, an observer shows it.
 
+use fluxmorph_solver::newton::NewtonProgress;
+
 use super::evaluation::Evaluation;
-use crate::problem::{RoundEvent, Stage};
+use crate::problem::{Progress, RoundEvent, Stage};
 
 /// Receives what happens during a run. Nothing is shown unless a method is overridden; whatever is shown as a line goes
 /// through [`Observer::line`].
@@ -19,6 +21,11 @@ pub trait Observer {
     /// A part of that work begins, also within an evaluation.
     fn stage(&mut self, stage: Stage) {
         let _ = stage;
+    }
+
+    /// Newton's method has done a step.
+    fn newton(&mut self, progress: NewtonProgress) {
+        let _ = progress;
     }
 
     /// Something has happened, in a line.
@@ -44,6 +51,19 @@ pub trait Observer {
     /// Something the user should know; the run continues.
     fn warning(&mut self, message: &str) {
         let _ = message;
+    }
+}
+
+/// Reports the progress of a piece of work to an observer.
+pub struct Watching<'a>(pub &'a mut dyn Observer);
+
+impl Progress for Watching<'_> {
+    fn stage(&mut self, stage: Stage) {
+        self.0.stage(stage);
+    }
+
+    fn newton(&mut self, progress: NewtonProgress) {
+        self.0.newton(progress);
     }
 }
 

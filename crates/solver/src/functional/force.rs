@@ -2,10 +2,11 @@
 //!
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
 //! The force is minus the rate at which their field energy changes at fixed potentials ([`crate::element::virtual_work`]); inside
-//! the body nothing is deformed. The same number is the stress `∫σ:∇v` over the layer, which holds with eddy currents as well:
+//! the body nothing is deformed. Where the body goes on beyond a conditioned plane, its nodes there keep to the plane, so that a
+//! force is that on the free faces of the meshed part. The same number is the stress `∫σ:∇v` over the layer, which holds with eddy currents as well:
 //! in harmonics it is the time average. The layer must be without current, magnetisation and conductivity.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::tet4::{Point, cross, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
@@ -46,7 +47,8 @@ impl RigidMotion {
 pub struct Force {
     /// Elements that touch the body from outside, ascending.
     layer: Vec<ElementId>,
-    body: BTreeSet<NodeId>,
+    /// Nodes of the body, with bits of the axes along which they cannot move: across a conditioned plane.
+    body: BTreeMap<NodeId, u8>,
     motion: RigidMotion,
 }
 
@@ -66,8 +68,11 @@ impl Force {
         let region_of = |e: ElementId| topology.region_of()[e.index()];
         let inside = |e: &ElementId| regions.contains(&region_of(*e));
         let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
-        let body: BTreeSet<NodeId> = of_body.collect();
-        let around = body.iter().flat_map(|&node| topology.elements_around(node)).copied();
+        let mut body: BTreeMap<NodeId, u8> = of_body.map(|node| (node, 0)).collect();
+        for (node, axes) in model.unknowns().plane_nodes() {
+            body.entry(node).and_modify(|held| *held |= axes);
+        }
+        let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
         let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
         if layer.is_empty() {
             let expected = "a force needs a body with mesh around it";
@@ -104,22 +109,23 @@ impl Force {
     ) -> FunctionalValue {
         let space = model.space();
         let share = if is_static(model) { 0.5 } else { 0.25 };
-        let velocity_of = |node: NodeId| {
-            if self.body.contains(&node) { self.motion.velocity(mesh.point(node)) } else { [0.0; 3] }
+        let free = |node: NodeId, vector: Point| -> Point {
+            let held = self.body.get(&node).copied().unwrap_or(0b111);
+            std::array::from_fn(|d| if held >> d & 1 == 1 { 0.0 } else { vector[d] })
         };
         let mut sum = Sum::new(model);
         sum.elements(&self.layer, |e| {
             let nodes = model.topology().tet(e);
             // Minus the rate: the velocities are turned round.
-            let velocities = nodes.map(|node| velocity_of(node).map(|v| -v));
+            let velocities = nodes.map(|node| free(node, self.motion.velocity(mesh.point(node))).map(|v| -v));
             let law = [share * model.coefficients_of(e).reluctivity, model.setup().penalty];
             let field = solution.element(model, e);
             let (mut rate, by_velocity) =
                 space.elements().virtual_work(&space.cell(mesh, e), law, &velocities, field.values());
             if let RigidMotion::Rotation { axis, .. } = self.motion {
                 // A node of the body that moves by δx has the velocity axis × δx more.
-                for (k, _) in nodes.iter().enumerate().filter(|(_, node)| self.body.contains(node)) {
-                    let more = cross(by_velocity[k], axis);
+                for (k, &node) in nodes.iter().enumerate() {
+                    let more = cross(free(node, by_velocity[k]), axis);
                     (0..3).for_each(|d| rate.positions[k][d] -= more[d]);
                 }
             }
