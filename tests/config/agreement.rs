@@ -30,6 +30,7 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
             "two coils are named",
             "two constraints are named",
             "two probes are named",
+            "two forces are named",
             "two surfaces are named",
             "two subregions are named",
             "two cases are named",
@@ -53,7 +54,13 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
     ),
     (
         "frequencies and what is analysed at them",
-        &["is a loss at 0 Hz", "has an impedance surface, but", "is a permanent magnet, but", "Hz twice"],
+        &[
+            "is a loss at 0 Hz",
+            "has an impedance surface",
+            "is a permanent magnet, but",
+            "has a B–H curve, but",
+            "Hz twice",
+        ],
     ),
     ("directions", &["has no part across the axis", "leaves the symmetry plane"]),
     ("an algorithm without constraints", &["cannot keep constraints"]),

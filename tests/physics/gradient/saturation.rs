@@ -46,7 +46,9 @@ fn all_hold(elements: &str, order: u8, directions: usize) {
     let steps = analysis.solutions[0].newton_steps();
     println!("{elements} {order}: {steps} steps, {saturation:?}");
     assert!(saturation.share_beyond_knee > 0.05, "a part of the plate saturates");
-    let settings = Settings { directions, ..Settings::default() };
+    // At the points of the curve the second derivative of h jumps, so that a central difference errs by a part of its step and
+    // not of the square of it: a quarter of a micrometre, which the tolerance of 1e-13 carries.
+    let settings = Settings { directions, difference_step: 1e-5, ..Settings::default() };
     let certificates = certify(&setup.problem, &p, &settings, &|| false, |_, _, _| {});
     let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
     check(&certificates.objective);
