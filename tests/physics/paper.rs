@@ -7,7 +7,7 @@
 use fluxmorph::build::Setup;
 use fluxmorph::config::Optimizer;
 use fluxmorph::files::{ObjectiveResult, StopReason};
-use fluxmorph::run::mesh_independence::{MeshIndependence, ShapePair};
+use fluxmorph::run::mesh_independence::{FreshMesh, MeshIndependence, ShapePair};
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::problem::Analysis;
@@ -184,7 +184,9 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
     };
     let shapes = ShapePair::of(&config, setup, &optimised.best.values).unwrap_or_else(|e| panic!("{e}"));
     let stop_reason = optimised.stop_reason;
-    let gain = MeshIndependence { config: &config, source: &source, stop_reason, shapes: &shapes, memory: 0 };
+    let fresh = FreshMesh::of(&config, &setup.problem);
+    let fresh = fresh.as_ref();
+    let gain = MeshIndependence { config: &config, source: &source, stop_reason, shapes: &shapes, fresh };
     gain.verify(&mut objective, &|| false, &mut Silent);
     let verified = objective.verified_ratio.expect("the shield can be generated anew");
     println!("{name}: F/F0 {:.4}, {:?}", objective.ratio, objective.verification);

@@ -86,6 +86,7 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
         constraints: identity.constraints,
         ftol_rel: 0.0,
         xtol_rel: 0.0,
+        first_step: 0.1,
     };
     let disk = SimulatedDisk::default();
     let directory =

@@ -14,10 +14,10 @@ fn a_run_reports_its_ratio_on_a_fresh_mesh() {
     let (ratio, verified) =
         (number(&result, "/objective/ratio"), number(&result, "/objective/verified_ratio"));
     println!("F/F0 {ratio:.4}, on a fresh mesh {verified:.4}");
-    // Coarse as the mesh is, its error hardly depends on the shape while the lines over the plate stay: measured 0.002.
-    assert!((ratio - verified).abs() <= 0.01, "{ratio} {verified}");
+    // One cell carries each step of the coarse surface, and two on the fresh mesh.
+    assert!((ratio - verified).abs() <= 0.05, "{ratio} {verified}");
     assert_eq!(number(&result, "/objective/verification/ratio"), verified);
-    assert_eq!(number(&result, "/objective/verification/refinement"), 1.25);
+    assert_eq!(number(&result, "/objective/verification/refinement"), 2.0);
     let [initial, best] =
         ["initial", "best"].map(|key| number(&result, &format!("/objective/verification/{key}")));
     assert_eq!(best / initial, verified);
@@ -34,5 +34,5 @@ fn the_check_can_be_left_out_and_a_refinement_of_no_use_is_refused() {
     assert!(result["objective"]["verified_ratio"].is_null());
     assert!(result["objective"].get("verification").is_none());
     on_quick("run", &out, &["--force", "--set", "output.verify_refinement=0.1"])
-        .with(3, &["output.verify_refinement", "0 for no check", "at least 0.5 and at most 4"]);
+        .with(3, &["output.verify_refinement", "0 for no check", "at least 1 and at most 4"]);
 }

@@ -48,7 +48,12 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
             })
             .map_err(|error| file_fault(error, source)),
     }?;
-    Ok(Built { mesh: with_interfaces(built.mesh, &surface_names(config))?, ..built })
+    Ok(Built { mesh: named_interfaces(built.mesh, config)?, ..built })
+}
+
+/// The mesh with a surface for every interface that the configuration names.
+pub(super) fn named_interfaces(mesh: Mesh, config: &Config) -> Result<Mesh, MeshError> {
+    with_interfaces(mesh, &surface_names(config))
 }
 
 /// The unit in which the mesh of a configuration is written: that of its file, and millimetres for a generator.

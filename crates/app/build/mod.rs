@@ -6,6 +6,7 @@
 
 mod curves;
 mod design;
+mod divided_mesh;
 mod elastic_body;
 mod field;
 mod functional;
@@ -19,6 +20,7 @@ mod shape;
 mod share;
 
 pub(crate) use design::triangulation as design_triangulation;
+pub(crate) use divided_mesh::DividedMesh;
 pub use motion::{MotionSetup, set_up_motion};
 pub use outline::{Outline, OutlinedDesign, outline};
 
@@ -139,7 +141,27 @@ fn build_problem(
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
     progress.stage(Stage::Mesh);
-    let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
+    problem_on(mesh::build(config, source)?, config, source, mode, group, progress)
+}
+
+/// Sets up an optimisation on a mesh that is not the configuration's own, but has its names.
+///
+/// # Errors
+/// As [`set_up`].
+pub(crate) fn set_up_on(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Setup, Error> {
+    let built = mesh::Built { mesh, notices: Vec::new() };
+    problem_on(built, config, source, Mode::Optimisation, None, &mut |_| ())
+        .map_err(|error| locate_error::attribute_error(error, config, source))
+}
+
+fn problem_on(
+    mesh::Built { mesh: full_mesh, notices: mut warnings }: mesh::Built,
+    config: &Config,
+    source: &SourceMap,
+    mode: Mode,
+    group: Option<&RankGroup>,
+    progress: &mut dyn Progress,
+) -> Result<Setup, Error> {
     check_names(config, source, &full_mesh, &warnings)?;
     warnings.extend_from_slice(source.notices());
     let audits = audits(config, &full_mesh);

@@ -84,9 +84,9 @@ pub struct ObjectiveResult {
 }
 
 /// The gain of a run computed again on a mesh that the optimiser never saw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verification {
-    /// Refinement of that mesh relative to the run's.
+    /// Parts of every cell of the run's mesh that moves or is observed, along each axis.
     pub refinement: f64,
     /// Its tetrahedra.
     pub tets: usize,
@@ -96,6 +96,9 @@ pub struct Verification {
     pub best: f64,
     /// `best / initial`.
     pub ratio: f64,
+    /// The constraints at the best design there, with their bounds there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub constraints: Vec<ConstraintResult>,
 }
 
 /// One term of an objective.
@@ -270,11 +273,12 @@ pub(crate) mod tests {
                 best_evaluation: 7,
                 verified_ratio: Some(0.5),
                 verification: Some(Verification {
-                    refinement: 1.25,
+                    refinement: 2.0,
                     tets: 147_000,
                     initial: 2.2,
                     best: 1.1,
                     ratio: 0.5,
+                    constraints: Vec::new(),
                 }),
                 terms: vec![TermResult {
                     kind: "loss".to_owned(),

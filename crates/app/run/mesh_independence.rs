@@ -1,22 +1,29 @@
 //! Is the gain of a run the shape's, or the mesh's? Initial and best shape again, on a mesh the optimiser never saw.
 //!
 //! An optimiser sees the discrete objective: the field's, and the error of a mesh that moves along with the design. What it
-//! gains from that error is lost where all nodes are elsewhere. So the run's mesh is generated anew with another refinement,
-//! brought to both shapes, and the ratio of the two values is the *verified ratio*. Variables of a control grid mean the
-//! same on any mesh; where the nodes are the variables, the displacement of the old surface is interpolated on the fresh one
-//! ([`Triangulation::transfer`]). A check that cannot be done is reported, and costs a run nothing else.
+//! gains from that error shrinks where the cells do. So the run's mesh is generated anew with every cell that moves or is
+//! observed divided ([`DividedMesh`]), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
+//! constraints are measured there too. Variables of a control grid mean the same on any mesh; where the nodes are the
+//! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]), and a
+//! thickness, which is a function of the variables, is left out. A check that cannot be done is reported, and costs a run
+//! nothing else.
+//!
+//! What both meshes share shows in neither ratio: the size of the box and its far cells, materials, conditions, elements and
+//! their order, the model of every region.
 //!
 //! Does not live here: whether the gradient is the objective's, which is `verify`.
 
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::{Bound, Quantity};
 use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
-use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
-use crate::build::{Mode, Setup, design_triangulation, memory_limit, set_up};
-use crate::config::{Config, MeshConfig, SourceMap};
+use super::summary;
+use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
 use crate::show::Observer;
@@ -63,6 +70,14 @@ impl ShapePair {
         Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
     }
 
+    /// The variables of both shapes, where another mesh has the same.
+    fn variables(&self) -> [&[f64]; 2] {
+        match self {
+            Self::Variables(pair) => pair.each_ref().map(Vec::as_slice),
+            _ => [&[]; 2],
+        }
+    }
+
     /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
     fn displacements(&self, config: &Config, setup: &Setup) -> Result<[Vec<Point>; 2], Error> {
         let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
@@ -101,8 +116,37 @@ pub struct MeshIndependence<'a> {
     pub stop_reason: StopReason,
     /// Its initial and its best shape.
     pub shapes: &'a ShapePair,
-    /// Bytes that the check needs, about.
-    pub memory: usize,
+    /// The mesh to check on; `None` where there is none.
+    pub fresh: Option<&'a FreshMesh>,
+}
+
+/// The mesh of a check.
+#[derive(Clone, Debug)]
+pub struct FreshMesh {
+    mesh: DividedMesh,
+    /// Parts of a cell along each axis.
+    parts: usize,
+    /// Bytes that the process holds at the peak of the check, about.
+    memory: usize,
+}
+
+impl FreshMesh {
+    /// That of a problem which is set up; `None` where no check is wanted, or no other mesh can be generated.
+    pub fn of(config: &Config, problem: &Problem) -> Option<Self> {
+        let factor = config.output.verify_refinement;
+        if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
+            return None;
+        }
+        let parts = factor.ceil() as usize;
+        let mesh = DividedMesh::of(config, problem, parts)?;
+        let growth = mesh.tet_count()? as f64 / config.mesh.tet_count()?.max(1) as f64;
+        Some(Self { memory: of_other_mesh(problem, growth), mesh, parts })
+    }
+
+    /// Bytes that the process holds at the peak of the check, about.
+    pub fn memory(&self) -> usize {
+        self.memory
+    }
 }
 
 impl MeshIndependence<'_> {
@@ -115,26 +159,24 @@ impl MeshIndependence<'_> {
         interrupted: &dyn Fn() -> bool,
         observer: &mut dyn Observer,
     ) -> Check {
-        let factor = self.config.output.verify_refinement;
-        if factor == 0.0 {
+        if self.config.output.verify_refinement == 0.0 {
             return Check::Finished;
         }
         if *self.shapes == ShapePair::Unchanged {
             objective.verified_ratio = Some(1.0);
             return Check::Finished;
         }
-        let refined = self.config.mesh.refined(factor);
-        if let (Some(_), Some(shortage)) = (&refined, memory_limit::shortage(self.memory)) {
+        if let Some(shortage) = self.fresh.and_then(|fresh| memory_limit::shortage(fresh.memory)) {
             observer
                 .notice(&format!("the best shape is not checked on a fresh mesh, which takes {shortage}"));
             return Check::Finished;
         }
         let cut_short = matches!(self.stop_reason, StopReason::Interrupted | StopReason::MaxTime);
-        let outcome = match refined {
+        let outcome = match self.fresh {
             _ if cut_short || interrupted() => Ok(None),
-            Some(mesh) => {
+            Some(fresh) => {
                 observer.phase("checking the best shape on a fresh mesh");
-                self.compute(mesh, factor, interrupted)
+                self.compute(fresh, interrupted)
             }
             None => {
                 observer.notice(
@@ -146,6 +188,13 @@ impl MeshIndependence<'_> {
         };
         match outcome {
             Ok(Some(verification)) => {
+                for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
+                    let (name, share) = (&constraint.name, constraint.value / constraint.bound - 1.0);
+                    observer.warning(&format!(
+                        "on the fresh mesh the best shape violates the constraint `{name}`: {:+.2} % from its bound",
+                        100.0 * share
+                    ));
+                }
                 objective.verified_ratio = Some(verification.ratio);
                 objective.verification = Some(verification);
             }
@@ -166,54 +215,56 @@ impl MeshIndependence<'_> {
     /// Both values on the fresh mesh; `None` where a signal came first.
     fn compute(
         &self,
-        mesh: MeshConfig,
-        refinement: f64,
+        fresh: &FreshMesh,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
-        let config = fresh_configuration(self.config, mesh);
-        let setup = set_up(&config, self.source, Mode::Optimisation)?;
+        let config = fresh_configuration(self.config);
+        let setup = set_up_on(fresh.mesh.build(&config)?, &config, self.source)?;
         if interrupted() {
             return Ok(None);
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
-        // Constraints decide nothing here.
-        let mut problem = setup.problem.without_constraints();
+        let has_variables = matches!(self.shapes, ShapePair::Variables(_));
+        let mut problem = setup.problem.with_constraints(|constraint| {
+            has_variables || !matches!(constraint.quantity, Quantity::Thickness { .. })
+        });
         let tets = problem.original().topology().tets().len();
-        let mut values = [0.0; 2];
-        let mut memory = SolverCache::default();
-        for (value, displacement) in values.iter_mut().zip(displacements) {
+        let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());
+        let mut cache = SolverCache::default();
+        for (displacement, p) in displacements.into_iter().zip(self.shapes.variables()) {
             if interrupted() {
                 return Ok(None);
             }
-            *value = match objective_at(&mut problem, &mut memory, displacement, interrupted) {
+            let analysis = match analysis_at(&mut problem, &mut cache, displacement, p, interrupted) {
                 Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(None),
-                value => value?,
+                analysis => analysis?,
             };
+            if values.is_empty() {
+                bounds = bounds_at(&problem, &analysis)?;
+            }
+            constraints = summary::constraints(&problem, &analysis, &bounds);
+            values.push(analysis.objective.unwrap_or(f64::NAN));
         }
-        let [initial, best] = values;
+        let (initial, best) = (values[0], values[1]);
         let ratio = best / initial;
         if !ratio.is_finite() {
             let cause = "the objective of the initial design is zero on the fresh mesh";
             return Err(OptimizerError::Optimisation { cause }.into());
         }
-        Ok(Some(Verification { refinement, tets, initial, best, ratio }))
+        let refinement = fresh.parts as f64;
+        Ok(Some(Verification { refinement, tets, initial, best, ratio, constraints }))
     }
 }
 
-/// Bytes that the process holds at the peak of the check, about; `None` where there is no check to do.
-pub fn memory_estimate(config: &Config, problem: &Problem) -> Option<usize> {
-    let factor = config.output.verify_refinement;
-    if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
-        return None;
-    }
-    let fresh = config.mesh.refined(factor)?.tet_count()?;
-    let growth = fresh as f64 / config.mesh.tet_count()?.max(1) as f64;
-    Some(of_other_mesh(problem, growth))
+/// The bounds of the constraints where this is the analysis of the initial shape.
+fn bounds_at(problem: &Problem, initial: &Analysis) -> Result<Vec<Bound>, Error> {
+    let pairs = problem.constraints().iter().zip(&initial.constraints);
+    Ok(pairs.map(|(constraint, measured)| constraint.bound(measured.value)).collect::<Result<_, _>>()?)
 }
 
-/// The configuration with another mesh, and without what belongs to the old one.
-fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
-    let mut fresh = Config { mesh, probes: Vec::new(), ..config.clone() };
+/// The configuration without what belongs to its own mesh.
+fn fresh_configuration(config: &Config) -> Config {
+    let mut fresh = Config { probes: Vec::new(), ..config.clone() };
     if let Some(design) = &mut fresh.design {
         // A list has one value for every node of the old surface.
         design.initial = crate::config::InitialDesign::Uniform(0.0);
@@ -224,24 +275,25 @@ fn fresh_configuration(config: &Config, mesh: MeshConfig) -> Config {
     fresh
 }
 
-/// The objective at a shape, reached from the undeformed mesh.
-fn objective_at(
+/// The analysis of a shape with the variables `p`, reached from the undeformed mesh.
+fn analysis_at(
     problem: &mut Problem,
-    memory: &mut SolverCache,
+    cache: &mut SolverCache,
     displacement: Vec<Point>,
+    p: &[f64],
     interrupted: &dyn Fn() -> bool,
-) -> Result<f64, Error> {
+) -> Result<Analysis, Error> {
     let undeformed = problem.shape().map(|shape| shape.motion().clone());
     problem.continue_to_displacement(displacement.clone(), interrupted)?;
     let moved = match problem.shape() {
         Some(shape) => shape.motion().moved(&displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse(moved, &[], Derivatives::None, memory, &mut NoProgress)?;
+    let analysis = problem.analyse(moved, p, Derivatives::None, cache, &mut NoProgress)?;
     if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
         shape.set_motion(motion);
     }
-    Ok(analysis.objective.unwrap_or(f64::NAN))
+    Ok(analysis)
 }
 
 #[cfg(test)]
@@ -249,7 +301,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::config::BlockMesh;
+    use crate::build::{Mode, set_up};
+    use crate::config::{BlockMesh, MeshConfig};
 
     /// The coarse shield; without its control grid every node is a variable.
     fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {
@@ -301,11 +354,10 @@ mod tests {
             terms: Vec::new(),
         };
         let mut recorded = Recorded::default();
-        MeshIndependence { config, source, stop_reason, shapes, memory: 0 }.verify(
-            &mut objective,
-            &|| interrupted,
-            &mut recorded,
-        );
+        let setup = set_up(config, source, Mode::Optimisation).expect("a sound problem");
+        let fresh = FreshMesh::of(config, &setup.problem).map(|fresh| FreshMesh { memory: 0, ..fresh });
+        let check = MeshIndependence { config, source, stop_reason, shapes, fresh: fresh.as_ref() };
+        check.verify(&mut objective, &|| interrupted, &mut recorded);
         (objective, recorded)
     }
 
@@ -340,8 +392,7 @@ mod tests {
     fn a_smooth_shape_on_nodes_keeps_its_value_on_a_finer_surface() {
         let ratio = |on_nodes| {
             let (mut config, source) = quick(on_nodes);
-            // Over the plate the cells are halved.
-            config.output.verify_refinement = 3.0;
+            config.output.verify_refinement = 2.0;
             let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
             let shapes = ShapePair::of(&config, &setup, &dished(&setup)).expect("a design surface");
             let (objective, recorded) =
@@ -391,16 +442,42 @@ mod tests {
     }
 
     #[test]
-    fn a_check_that_fails_is_a_warning_with_its_cause() {
+    fn every_cell_that_moves_or_is_observed_is_halved_and_no_other() {
+        let (config, source) = quick(false);
+        let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+        let fresh = FreshMesh::of(&config, &setup.problem).expect("a generated mesh");
+        let mesh = fresh.mesh.build(&config).expect("sound parameters");
+        let lines = |mesh: &fluxmorph_geometry::Mesh, axis: usize| {
+            let mut all: Vec<f64> = mesh.points().iter().map(|x| x[axis]).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            all
+        };
+        // Plate, moving air and observation cells of the quarter: 160 × 280 mm, from −60 to 30 mm.
+        for (axis, low, high) in [(0, 0.0, 0.16), (1, 0.0, 0.28), (2, -0.06, 0.03)] {
+            let (old, new) = (lines(&setup.full_mesh, axis), lines(&mesh, axis));
+            let inside = |lines: &[f64]| lines.iter().filter(|&&c| (low..=high).contains(&c)).count();
+            assert_eq!(inside(&new) - 1, 2 * (inside(&old) - 1), "axis {axis}");
+            assert_eq!(new.len() - inside(&new), old.len() - inside(&old), "axis {axis}, far cells");
+        }
+    }
+
+    #[test]
+    fn constraints_are_measured_anew_and_a_violated_one_is_a_warning() {
         let (mut config, source) = quick(false);
-        // 50 times the default, where the generator ends at 20.
-        config.output.verify_refinement = 100.0;
-        let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+        let text = "[[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper_ratio = 1.0\n";
+        let whole = format!("{}\n{text}", source.text());
+        config.constraints = Config::from_str(&whole, "device.toml").expect("sound").0.constraints;
+        let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+        let shapes = ShapePair::of(&config, &setup, &[1e-3; 91]).expect("a design");
         let (objective, recorded) =
             verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
-        assert_eq!(objective.verified_ratio, None);
+        let constraints = objective.verification.expect("it is computed").constraints;
+        // The plate of 120 × 240 × 10 mm, a millimetre thicker everywhere.
+        assert!((constraints[0].bound - 2.88e-4).abs() < 1e-12, "{constraints:?}");
+        assert!((constraints[0].value - 1.1 * 2.88e-4).abs() < 1e-12 && !constraints[0].satisfied);
         assert!(
-            recorded.warnings.len() == 1 && recorded.warnings[0].contains("refinement"),
+            recorded.warnings.len() == 1 && recorded.warnings[0].contains("`volume_plate`: +10.00 %"),
             "{:?}",
             recorded.warnings
         );

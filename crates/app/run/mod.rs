@@ -26,7 +26,7 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::problem::RoundEvent;
 use fluxmorph_optimizer::{Error as OptimizerError, driver};
 use journal::{Identity, Journal};
-use mesh_independence::{Check, MeshIndependence, ShapePair};
+use mesh_independence::{Check, FreshMesh, MeshIndependence, ShapePair};
 use pieces::SharedPieces;
 use prepared::Prepared;
 use recorder::DirectoryRecorder;
@@ -268,11 +268,17 @@ impl Session<'_> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
         check_finite(&result)?;
         result.write(&self.directory)?;
-        let memory = mesh_independence::memory_estimate(self.config, &self.setup.problem).unwrap_or(0);
+        let fresh = FreshMesh::of(self.config, &self.setup.problem);
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
-        let check = MeshIndependence { config, source, stop_reason: result.stop_reason, shapes, memory };
+        let check = MeshIndependence {
+            config,
+            source,
+            stop_reason: result.stop_reason,
+            shapes,
+            fresh: fresh.as_ref(),
+        };
         if let Some(objective) = &mut result.objective
             && check.verify(objective, self.interrupted, observer) == Check::CutShort
         {

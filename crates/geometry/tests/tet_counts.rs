@@ -38,6 +38,7 @@ fn the_count_is_that_of_the_mesh() {
         surfaces: vec![],
         growth: 1.5,
         refinement: 1.0,
+        division: None,
     };
     agrees(p.tet_count().expect("valid"), &boxes(&p).expect("valid"));
 }

@@ -5,5 +5,6 @@ mod coils;
 mod design_surface;
 mod driver;
 mod finite;
+mod first_steps;
 mod geometric;
 mod guards;

@@ -77,6 +77,7 @@ pub(super) fn boxed(prism: &Prism, cells: Cells) -> Mesh {
         surfaces: Vec::new(),
         growth: cells.growth,
         refinement: 1.0,
+        division: None,
     };
     let mesh = boxes(&parameters).expect("boxes within the prism");
     match mesh.topology().region(OUTSIDE) {

@@ -42,6 +42,7 @@ pub(super) fn mesh(refinement: f64) -> Mesh {
         surfaces: Vec::new(),
         growth: 1.7,
         refinement,
+        division: None,
     };
     boxes(&parameters).expect("boxes within the box")
 }

@@ -17,7 +17,7 @@ use crate::config::{
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
-use crate::run::mesh_independence;
+use crate::run::mesh_independence::FreshMesh;
 use crate::run::morph::{self, MotionSummary};
 
 /// What `check` found.
@@ -195,7 +195,7 @@ pub(super) fn summary<'a>(
         probes: &config.probes,
         output_directory: config.output.directory.display().to_string(),
         memory_estimate_bytes: of_evaluation(problem)
-            .max(mesh_independence::memory_estimate(config, problem).unwrap_or(0)),
+            .max(FreshMesh::of(config, problem).map_or(0, |fresh| fresh.memory())),
         warnings,
     })
 }

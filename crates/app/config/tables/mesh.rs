@@ -228,18 +228,6 @@ impl From<MeshConfig> for MeshKeys {
 }
 
 impl MeshConfig {
-    /// The same with a refinement so many times as large; `None` for a mesh without such a parameter.
-    pub fn refined(&self, factor: f64) -> Option<Self> {
-        let mut refined = self.clone();
-        match &mut refined {
-            Self::Shield(shield) => shield.refinement *= factor,
-            Self::Boxes(boxes) => boxes.refinement *= factor,
-            Self::Sphere(sphere) => sphere.refinement *= factor,
-            Self::Block(_) | Self::File { .. } => return None,
-        }
-        Some(refined)
-    }
-
     /// Tetrahedra that a generator makes; `None` for a file, and for parameters that the generator refuses.
     pub fn tet_count(&self) -> Option<u64> {
         let tets = match self {

@@ -9,6 +9,9 @@ use crate::config::value::range::Range;
 /// Most evaluations that a run may be given.
 pub const MOST_EVALUATIONS: usize = 1_000_000;
 
+/// Shares of the range for a first step: no method takes more than half of it.
+const FIRST_STEPS: Range = Range::open(0.0, 0.5);
+
 /// Fractions of a whole.
 const FRACTIONS: Range = Range::half_open(0.0, 1.0);
 
@@ -24,17 +27,20 @@ table! {
     pub struct Optimizer: Default {
         /// Method of NLopt. The default keeps to the bounds, needs no line search and suits many variables. With
         /// `[[constraints]]`: `mma`, `ccsaq` or `slsqp`.
-        algorithm: Algorithm = WORD => Algorithm::Mma;
+        algorithm: Algorithm = WORD => Settings::DEFAULT.algorithm;
         /// Most evaluations of the objective with its gradient.
-        max_evaluations: usize = integer(1, MOST_EVALUATIONS) => 30;
+        max_evaluations: usize = integer(1, MOST_EVALUATIONS) => Settings::DEFAULT.max_evaluations;
         /// No evaluation is started after this time [s]. Default: no limit.
         max_time: Option<f64> = quantity(Duration, POSITIVE);
         /// Stop when the objective changes by less than this fraction between iterations; 0: off. The default is well below the
         /// error of the mesh.
-        ftol_rel: f64 = number(FRACTIONS) => 1e-3;
+        ftol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.ftol_rel;
         /// Stop when all variables change by less than this fraction; 0: off. It is off by default, since the variables of a
         /// design at its bounds get there long before the rest has settled.
-        xtol_rel: f64 = number(FRACTIONS) => 0.0;
+        xtol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.xtol_rel;
+        /// How far a variable may move in the first step of a search, as a share of the range that it may search; less where
+        /// the gradient promises more than half of the objective. The steps after it are the method's own.
+        first_step: f64 = number(FIRST_STEPS) => Settings::DEFAULT.first_step;
         /// Least quality (Eq. 4) of an element that a design may have, and so of the reference mesh that a round starts from. A
         /// design below it is not evaluated: a round ends. Default: a twentieth of the worst quality of the undeformed mesh,
         /// since layered meshes start with a low one.
@@ -69,6 +75,7 @@ impl Optimizer {
             max_time: self.max_time,
             ftol_rel: self.ftol_rel,
             xtol_rel: self.xtol_rel,
+            first_step: self.first_step,
         }
     }
 }

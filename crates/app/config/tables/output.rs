@@ -9,17 +9,18 @@ use crate::config::table::table;
 use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
 
-/// Refinements of the fresh mesh beside 0: coarser than half the cells shows nothing, finer than four times costs more than
-/// the run.
-const REFINEMENTS: Range = Range::closed(0.5, 4.0);
+/// Most parts of a cell of the fresh mesh along each axis: finer ones cost more than the run.
+const MOST_PARTS: f64 = 4.0;
 
 table! {
     /// Where results go, and which.
     ///
-    /// The fresh mesh of `verify_refinement` keeps what the configuration fixes: faces of regions, lines of a `pitch` or a
-    /// `skin`; a factor that is not large enough to halve a cell between two such lines leaves its size. It is brought to the
-    /// shapes in as many rounds as that takes, at least 20 if need be. Variables of a control grid are the same there; without
-    /// a grid the displacement of the design surface is interpolated on its triangles. A run that is interrupted or ends with
+    /// The fresh mesh of `verify_refinement` has every line of the run's, and new ones between them over the box around all that
+    /// moves and all that the objective is taken over; with the generator `sphere` all of it is finer. It shares with the run
+    /// the size of the box, the far cells, materials, conditions, elements and their order, and the model of every region: an
+    /// error of these is in both ratios. It is brought to the shapes in as many rounds as that takes, at least 20 if need be.
+    /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
+    /// its triangles. Constraints are measured anew at both shapes, but for a thickness without a grid. A run that is interrupted or ends with
     /// `max_time` is not checked; a signal during the check ends with 130 or 143 and the `status` `interrupted`, beside the
     /// `stop_reason` of the search, and `fluxmorph resume` makes up for it; a check that fails is a warning, and changes
     /// neither the status nor the rest of the result, which is on the disk before.
@@ -39,11 +40,12 @@ table! {
         mesh: bool = FLAG => true;
         /// Surfaces of the best design that are written as STL files; `[]`: none. Default: the surfaces of `[design]`.
         stl: Vec<String> = NAMES, else Vec::new();
-        /// `run`: after the optimisation the mesh is generated anew with a `refinement` so many times as large, and the initial
-        /// and the best shape are analysed on it. What an optimiser gained from the errors of one mesh is lost on another. 0: no
-        /// check. Mesh lines that the factor is too small to divide stay where they are. With the default the check costs two
-        /// analyses without gradients on about twice the elements. A mesh from a file or of the generator `block` has no check.
-        verify_refinement: f64 = zero_or(REFINEMENTS) => 1.25;
+        /// `run`: after the optimisation the mesh is generated anew with every cell that moves or is observed divided in so many
+        /// parts along each axis (a fraction is rounded up), and the initial and the best shape are analysed on it, their
+        /// constraints too. What an optimiser gained from the errors of one mesh is lost on another. 0: no check. With the
+        /// default the check costs two analyses without gradients on three to five times the elements. A mesh from a file or of
+        /// the generator `block` has no check.
+        verify_refinement: f64 = zero_or(Range::closed(1.0, MOST_PARTS)) => 2.0;
         /// Whether a run ends with `report.html`. Default `true`: it is what one looks at first.
         report: bool = FLAG => true;
     }

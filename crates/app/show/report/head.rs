@@ -88,10 +88,14 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 
 /// The gain on a mesh that was not optimised on.
 fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
-    let (value, remark) = match (objective.verified_ratio, objective.verification, &data.config.mesh) {
+    let (value, remark) = match (objective.verified_ratio, &objective.verification, &data.config.mesh) {
         (Some(ratio), Some(v), _) => {
+            let (parts, tets) = (trim_zeros(v.refinement, 3), group_digits(v.tets));
+            let violated = v.constraints.iter().filter(|constraint| !constraint.satisfied).count();
+            let violated =
+                if violated == 0 { String::new() } else { format!(", {violated} constraints violated") };
             let remark =
-                format!("refined × {}, {} tetrahedra", trim_zeros(v.refinement, 3), group_digits(v.tets));
+                format!("cells over the device in {parts} parts each way, {tets} tetrahedra{violated}");
             (number(ratio, 4), remark)
         }
         (Some(ratio), None, _) => (number(ratio, 4), "the initial shape is the best".to_owned()),

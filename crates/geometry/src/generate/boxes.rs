@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use crate::error::MeshError;
 use crate::generate::grading::equal_parts;
-use crate::generate::grid::{Grid, check_size};
+use crate::generate::grid::{Division, Grid, check_size};
 use crate::generate::sizing::{self, SizeLimit};
 use crate::ids::{ElementId, NodeId, RegionId};
 use crate::mesh::Mesh;
@@ -70,6 +70,8 @@ pub struct BoxesParameters {
     pub growth: f64,
     /// All sizes are divided by it; the growth ratio becomes its root, so that the far field is refined alike.
     pub refinement: f64,
+    /// Cells that are divided beyond that.
+    pub division: Option<Division>,
 }
 
 /// The mesh of a box of boxes.
@@ -131,7 +133,7 @@ fn grid(parameters: &BoxesParameters) -> Result<Grid, MeshError> {
     };
     let lines = [axis_lines(0)?, axis_lines(1)?, axis_lines(2)?];
     check_size("boxes", [0, 1, 2].map(|d| lines[d].len() - 1))?;
-    Grid::new("boxes", lines)
+    Grid::new("boxes", lines)?.divided("boxes", parameters.division.as_ref())
 }
 
 /// Lengths below this are rounding of decimal lengths [m].
@@ -296,6 +298,7 @@ mod tests {
             surfaces: vec![],
             growth: 2.0,
             refinement: 1.0,
+            division: None,
         }
     }
 

@@ -4,6 +4,7 @@
 //! axes. All cells are cut alike, so the diagonals of a face shared by two cells coincide and the mesh conforms.
 //! Surfaces are found by line numbers, never by comparing coordinates.
 
+use super::grading;
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId, RegionId};
 use crate::tet4::Point;
@@ -27,6 +28,28 @@ const OUTER_FACES: [(&str, usize, bool); 6] = [
 
 /// Paths along the axes from the lowest to the highest corner; the first three are even permutations.
 const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+
+/// A box in which the cells of a grid are divided along every axis: each new cell lies in one old one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Division {
+    /// Lower and upper corner [m]; an interval between two lines is divided where its middle lies within.
+    pub inside: [Point; 2],
+    /// Parts of an interval, at least one.
+    pub parts: usize,
+}
+
+impl Division {
+    fn of(&self, axis: usize, lines: &[f64]) -> Vec<f64> {
+        let [low, high] = self.inside.map(|corner| corner[axis]);
+        let mut divided: Vec<f64> = lines.first().copied().into_iter().collect();
+        for pair in lines.windows(2) {
+            let middle = 0.5 * (pair[0] + pair[1]);
+            let parts = if (low..=high).contains(&middle) { self.parts.max(1) } else { 1 };
+            divided.extend(&grading::equal_parts([pair[0], pair[1]], parts)[1..]);
+        }
+        divided
+    }
+}
 
 /// Three ascending sets of lines [m]; nodes are their crossings, `z` fastest.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +81,16 @@ impl Grid {
         let cells = [0, 1, 2].map(|d| lines[d].len() - 1);
         check_size(parameter, cells)?;
         Ok(Self { lines })
+    }
+
+    /// The same with a part of its cells divided.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn divided(self, parameter: &'static str, division: Option<&Division>) -> Result<Self, MeshError> {
+        let Some(division) = division else { return Ok(self) };
+        let [x, y, z] = self.lines;
+        Self::new(parameter, [division.of(0, &x), division.of(1, &y), division.of(2, &z)])
     }
 
     /// Lines along one axis [m], ascending.

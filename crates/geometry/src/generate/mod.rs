@@ -17,7 +17,7 @@ pub mod sphere;
 
 pub use block::{BlockParameters, block};
 pub use boxes::{AxisSize, BoxRegion, BoxesParameters, SurfacePatch, boxes};
-pub use grid::Grid;
+pub use grid::{Division, Grid};
 pub use shield::{ObservationBox, ShieldParameters, shield};
 pub use sizing::SizeLimit;
 pub use sphere::{SphereParameters, sphere};

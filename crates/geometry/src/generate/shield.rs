@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use crate::error::MeshError;
 use crate::generate::grading::{self, Fine, Growth, Skin};
-use crate::generate::grid::Grid;
+use crate::generate::grid::{Division, Grid};
 use crate::generate::shield_checks;
 use crate::ids::RegionId;
 use crate::mesh::Mesh;
@@ -71,6 +71,8 @@ pub struct ShieldParameters {
     /// All sizes are divided by it, and the layers of a skin into as many (rounded); the growth ratio becomes its
     /// root, so that the far field is refined alike. Between 0.25 and 20.
     pub refinement: f64,
+    /// Cells that are divided beyond that.
+    pub division: Option<Division>,
 }
 
 impl Default for ShieldParameters {
@@ -93,6 +95,7 @@ impl Default for ShieldParameters {
             side_air: 0.008,
             growth: 1.6,
             refinement: 1.0,
+            division: None,
         }
     }
 }
@@ -140,7 +143,8 @@ impl ShieldParameters {
 fn grid(parameters: &ShieldParameters) -> Result<Grid, MeshError> {
     shield_checks::check(parameters)?;
     let [x, y] = [horizontal_lines(parameters, 0)?, horizontal_lines(parameters, 1)?];
-    Grid::new("shield.refinement", [x, y, vertical_lines(parameters)?])
+    let grid = Grid::new("shield.refinement", [x, y, vertical_lines(parameters)?])?;
+    grid.divided("shield.refinement", parameters.division.as_ref())
 }
 
 fn region_at(p: &ShieldParameters, [x, y, z]: Point) -> RegionId {

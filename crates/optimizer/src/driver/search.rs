@@ -120,6 +120,7 @@ impl<'a> Search<'a> {
             constraints: run.constraint_count(),
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
+            first_step: self.settings.first_step,
         };
         let before = (run.evaluations(), run.incumbent_values());
         let outcome = minimise(&minimisation, &run.centre(), |p| run.evaluate(p));

@@ -12,11 +12,11 @@ use std::cell::RefCell;
 
 use ::nlopt::{FailState, SuccessState, Target};
 
+use super::first_step::Start;
 use super::{PanicGuard, STOP_VALUE};
 use crate::error::Error;
 
-/// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres. The
-/// methods that are not invariant under scaling were measured there.
+/// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres.
 const SCALED_SPAN: f64 = 25.0;
 
 /// Largest magnitude of a number that NLopt is shown: its methods square and multiply what is of order one at the start.
@@ -96,6 +96,8 @@ pub struct Minimisation {
     pub ftol_rel: f64,
     /// Relative change of the variables below which the method stops; 0 is off.
     pub xtol_rel: f64,
+    /// Largest change of a variable in the first step, as a share of the range between its bounds.
+    pub first_step: f64,
 }
 
 /// Why NLopt ended by itself.
@@ -169,16 +171,6 @@ impl Algorithm {
             Self::Var2 => ::nlopt::Algorithm::LdVar2,
         }
     }
-
-    /// Factor on the objective (about 1 at the start): the conservative approximations of MMA and CCSAQ are made for
-    /// values of order one; the quasi-Newton methods take their first step from the gradient's size and would stop at
-    /// once.
-    fn objective_scale(self) -> f64 {
-        match self {
-            Self::Mma | Self::Ccsaq => 1.0,
-            Self::Slsqp | Self::Lbfgs | Self::Tnewton | Self::Var2 => 1000.0,
-        }
-    }
 }
 
 /// Minimises from `start`: `evaluate` gives objective and constraints of a design, and is asked once for each.
@@ -200,6 +192,7 @@ pub fn minimise<E: From<Error>>(
         evaluate,
         settings,
         scaling: &scaling,
+        factor: None,
         start: (start, scaling.scale(start)),
         last: None,
         asked: 0,
@@ -257,12 +250,10 @@ fn outcome<E>(ended: Result<(SuccessState, f64), (FailState, f64)>) -> Outcome<E
     }
 }
 
-/// Units in which NLopt sees variables and objective.
+/// Units in which NLopt sees the variables.
 struct Scaling {
     /// Length of a scaled unit of every variable.
     unit: Vec<f64>,
-    /// On the objective.
-    factor: f64,
 }
 
 impl Scaling {
@@ -276,14 +267,23 @@ impl Scaling {
             && lower.iter().zip(upper).all(|(low, high)| low <= high && (high - low).is_finite());
         // A variable between equal bounds keeps its value in any unit.
         let unit_of = |span: f64| if span > 0.0 { span / SCALED_SPAN } else { 1.0 };
-        are_sound.then(|| Self {
-            unit: lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect(),
-            factor: settings.algorithm.objective_scale(),
-        })
+        are_sound
+            .then(|| Self { unit: lower.iter().zip(upper).map(|(low, high)| unit_of(high - low)).collect() })
     }
 
     fn scale(&self, values: &[f64]) -> Vec<f64> {
         values.iter().zip(&self.unit).map(|(v, unit)| v / unit).collect()
+    }
+
+    /// The factor on the objective that makes the first step from a scaled design as long as asked for.
+    fn first_factor(&self, settings: &Minimisation, x: &[f64], sample: &Sample) -> f64 {
+        let mut gradient = vec![0.0; x.len()];
+        self.fill(&mut gradient, 1.0, &sample.gradient);
+        let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| self.scale(bounds));
+        let against = |k: usize| if gradient[k] > 0.0 { x[k] - lower[k] } else { upper[k] - x[k] };
+        let room: Vec<f64> = (0..x.len()).map(against).collect();
+        let start = Start { value: sample.value, gradient: &gradient, room: &room, span: SCALED_SPAN };
+        start.objective_factor(settings.algorithm, settings.first_step)
     }
 
     /// Derivatives by the scaled variables.
@@ -310,6 +310,8 @@ struct Bridge<'a, F, E> {
     evaluate: F,
     settings: &'a Minimisation,
     scaling: &'a Scaling,
+    /// On the objective; known with the first answer.
+    factor: Option<f64>,
     /// The start, in metres and as NLopt sees it.
     start: (&'a [f64], Vec<f64>),
     /// The design asked for last, as NLopt sees it, and its answer.
@@ -323,12 +325,15 @@ struct Bridge<'a, F, E> {
 impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
     /// The objective and its gradient at a design of NLopt's; below the stop value once the closure has been interrupted.
     fn objective(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> f64 {
-        let scaling = self.scaling;
+        let Self { scaling, settings, factor, .. } = *self;
         let Some(sample) = self.at(x) else { return 2.0 * STOP_VALUE };
+        let factor = factor.unwrap_or_else(|| scaling.first_factor(settings, x, sample));
+        let value = factor * sample.value;
         if let Some(gradient) = gradient {
-            scaling.fill(gradient, scaling.factor, &sample.gradient);
+            scaling.fill(gradient, factor, &sample.gradient);
         }
-        scaling.factor * sample.value
+        self.factor = Some(factor);
+        value
     }
 
     /// The constraints and their gradients.

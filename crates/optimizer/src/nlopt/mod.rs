@@ -2,6 +2,7 @@
 //! that do not; both see scaled variables, and neither lets a panic cross the C boundary.
 
 mod derivative_free;
+mod first_step;
 mod gradient;
 
 use std::any::Any;

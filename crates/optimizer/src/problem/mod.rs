@@ -80,10 +80,11 @@ impl Problem {
         Self { share, ..self }
     }
 
-    /// The same without constraints.
+    /// The same with some of its constraints.
     #[must_use]
-    pub fn without_constraints(self) -> Self {
-        Self { constraints: Vec::new(), ..self }
+    pub fn with_constraints(mut self, keep: impl FnMut(&Constraint) -> bool) -> Self {
+        self.constraints.retain(keep);
+        self
     }
 
     /// The same with other states.

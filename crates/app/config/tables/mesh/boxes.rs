@@ -127,6 +127,7 @@ impl BoxesMesh {
             surfaces: self.surfaces.iter().map(patch).collect(),
             growth: self.growth,
             refinement: self.refinement,
+            division: None,
         }
     }
 

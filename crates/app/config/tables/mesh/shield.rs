@@ -95,6 +95,7 @@ impl ShieldMesh {
             side_air: self.side_air,
             growth: self.growth,
             refinement: self.refinement,
+            division: None,
         }
     }
 

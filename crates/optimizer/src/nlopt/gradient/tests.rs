@@ -25,6 +25,7 @@ fn settings(algorithm: Algorithm) -> Minimisation {
         constraints: 0,
         ftol_rel: 1e-8,
         xtol_rel: 0.0,
+        first_step: 0.1,
     }
 }
 
@@ -71,6 +72,70 @@ fn every_algorithm_finds_a_bounded_quadratic_minimum() {
             let exact = if k % 3 == 0 { 0.020 } else { 0.004 };
             assert!((p - exact).abs() < 1e-4, "{algorithm:?}: variable {k} is {p}");
         }
+    }
+}
+
+/// The first two designs that a method asks for.
+fn first_two(settings: &Minimisation, start: &[f64], of: impl Fn(&[f64]) -> Sample) -> [Vec<f64>; 2] {
+    let mut designs = Vec::new();
+    let outcome = minimise(settings, start, |p| {
+        designs.push(p.to_vec());
+        if designs.len() == 2 { Err(Halt::Enough) } else { Ok(of(p)) }
+    });
+    assert!(matches!(outcome, Outcome::Interrupted(Halt::Enough)), "{outcome:?}");
+    designs.try_into().expect("two were kept")
+}
+
+#[test]
+fn the_first_step_is_as_long_as_asked_for_whatever_the_scale_of_the_objective() {
+    let largest = |[start, next]: [Vec<f64>; 2]| {
+        start.iter().zip(&next).map(|(a, b)| (b - a).abs() / 0.025).fold(0.0, f64::max)
+    };
+    for algorithm in Algorithm::ALL {
+        for first_step in [0.01, 0.1, 0.4] {
+            // A gradient that promises nearly nothing of the value: the length alone decides.
+            for slope in [1e-9, 1e-3, 1e-1] {
+                let settings = Minimisation { first_step, ..settings(algorithm) };
+                let found = largest(first_two(&settings, &[0.008; 8], |p| Sample {
+                    value: 1.0 - slope * p[3] + 0.5 * slope * p[5],
+                    gradient: (0..8).map(|k| [0.0, -slope, 0.0, 0.5 * slope][k % 4]).collect(),
+                    ..Sample::default()
+                }));
+                // The bisection ends at 24 decades over 2⁶⁰.
+                assert!((found - first_step).abs() < 1e-9, "{algorithm:?} {slope}: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_first_step_that_promises_too_much_is_shorter() {
+    // The squared deviation of a mean that every variable shifts: it vanishes after 0.2 % of the range.
+    let value = |p: &[f64]| 1.0 - p.iter().sum::<f64>() / (8.0 * 5e-5);
+    let squared = |p: &[f64]| Sample {
+        value: value(p).powi(2),
+        gradient: vec![-2.0 * value(p) / (8.0 * 5e-5); 8],
+        ..Sample::default()
+    };
+    for algorithm in Algorithm::ALL {
+        let settings = Minimisation { first_step: 0.4, ..settings(algorithm) };
+        let [_, next] = first_two(&settings, &[0.0; 8], squared);
+        // Half of F promised: a quarter of the way to zero, where F is (3/4)².
+        assert!((squared(&next).value - 0.5625).abs() < 1e-6, "{algorithm:?}: {}", squared(&next).value);
+    }
+}
+
+#[test]
+fn variables_on_their_bounds_do_not_shorten_the_first_step_of_the_others() {
+    for algorithm in Algorithm::ALL {
+        // The steepest variable is at its upper bound already.
+        let start: Vec<f64> = (0..8).map(|k| if k == 0 { 0.020 } else { 0.0 }).collect();
+        let [_, next] = first_two(&settings(algorithm), &start, |_| Sample {
+            value: 1.0,
+            gradient: (0..8).map(|k| if k == 0 { -1e3 } else { -1e-2 }).collect(),
+            ..Sample::default()
+        });
+        assert!((next[4] - 0.1 * 0.025).abs() < 1e-9 && next[0] == 0.020, "{algorithm:?}: {next:?}");
     }
 }
 
@@ -259,11 +324,12 @@ fn a_variable_between_equal_bounds_keeps_its_value() {
 fn a_design_of_the_method_that_is_no_number_is_never_evaluated() {
     for bad in [f64::NAN, f64::INFINITY] {
         let settings = settings(Algorithm::Mma);
-        let scaling = Scaling { unit: vec![0.001; 8], factor: 1.0 };
+        let scaling = Scaling { unit: vec![0.001; 8] };
         let mut bridge = Bridge {
             evaluate: |_: &[f64]| -> Result<Sample, Halt> { panic!("it is to be refused before") },
             settings: &settings,
             scaling: &scaling,
+            factor: None,
             start: (&[0.0; 8], vec![0.0; 8]),
             last: None,
             asked: 0,
