@@ -237,7 +237,7 @@ fn objective_at(
         Some(shape) => shape.motion().moved(&displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse(moved, &[], Derivatives::None, memory, &mut NoProgress)?;
+    let analysis = problem.analyse(moved, Derivatives::None, memory, &mut NoProgress)?;
     if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
         shape.set_motion(motion);
     }
