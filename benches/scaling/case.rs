@@ -173,7 +173,7 @@ fn step(problem: &Problem, record: &mut Record) {
     record.peak_bytes = peak_memory_bytes();
     if record.tets < 200_000 {
         let analysis = problem
-            .analyse(moved, &p, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+            .analyse(moved, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
             .expect("it converges");
         record.fields =
             timed(|| fields::vtu(problem.states(), &fields::FieldData::of(&analysis)).expect("it is finite"))

@@ -5,6 +5,7 @@
 //! `SNAPSHOTS=overwrite cargo test --release --test config` writes what is expected anew.
 
 mod agreement;
+mod broken_meshes;
 mod case;
 mod chance;
 mod changes;

@@ -9,6 +9,7 @@ use crate::support::essence::{Essence, assert_same};
 use crate::support::folder::{files, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::whole::{Logs, torn};
+use crate::support::write_into_page;
 
 /// Evaluations of every run.
 const EVALUATIONS: &str = "4";
@@ -47,6 +48,10 @@ enum Start {
     New,
     Stopped,
 }
+
+/// The head of the table; `force` is `run --force`. What the last two columns count ends the test.
+const TABLE: &str = "| at the same instant | directory | races | one did its work | several, one after the other | refused, exit 5 | \
+                     other bits at the end | torn files |\n|---|---|---|---|---|---|---|---|\n";
 
 /// The block on so many elements that a run takes a fraction of a second.
 fn device(home: &Path) -> Device {
@@ -93,7 +98,8 @@ impl Track {
         command
     }
 
-    fn race(&self, trial: usize, racers: &[Racer], start: Start) {
+    /// Lets them race; how many did their work and how many were refused.
+    fn race(&self, trial: usize, racers: &[Racer], start: Start) -> [usize; 2] {
         let sweep = self.home.path().join(format!("trial_{trial}"));
         let run = sweep.join("design.upper=3mm");
         let context = format!("trial {trial}, {racers:?} into {start:?}");
@@ -105,14 +111,15 @@ impl Track {
             racers.iter().map(|racer| self.command(*racer, &sweep, &run)).collect();
         let processes: Vec<Child> =
             commands.iter_mut().map(|command| command.spawn().expect("the program starts")).collect();
-        let mut winners = 0;
+        let (mut winners, mut refused) = (0, 0);
         for (racer, process) in racers.iter().zip(processes) {
             let output = process.wait_with_output().expect("it ends");
             let said = String::from_utf8_lossy(&output.stderr).into_owned() + &logs(&sweep);
             match output.status.code() {
                 Some(0 | 1) => winners += usize::from(!matches!(racer, Report)),
                 Some(5) => {
-                    assert!(REFUSALS.iter().any(|text| said.contains(text)), "{context}, {racer:?}: {said}")
+                    refused += 1;
+                    assert!(REFUSALS.iter().any(|text| said.contains(text)), "{context}, {racer:?}: {said}");
                 }
                 other => panic!("{context}, {racer:?}: {other:?}: {said}"),
             }
@@ -126,13 +133,31 @@ impl Track {
         assert_same(&crate::support::essence::essence(&left), &self.expected, &context);
         assert!(read_text(&run.join("report.html")).ends_with("</html>\n"), "{context}");
         assert!(read_text(&run.join("manifest.json")).contains("\"status\": \"stopped\""), "{context}");
+        [winners, refused]
     }
 
-    fn races(&self, rounds: usize) {
-        for trial in 0..rounds * RACES.len() {
-            let (racers, start) = RACES[trial % RACES.len()];
-            self.race(trial, racers, start);
+    /// Every mixture so many times; what became of them, a row each.
+    fn races(&self, rounds: usize) -> String {
+        let mut table = TABLE.to_owned();
+        for (k, (racers, start)) in RACES.into_iter().enumerate() {
+            let (mut alone, mut refused) = (0, 0);
+            for round in 0..rounds {
+                let [winners, lost] = self.race(rounds * k + round, racers, start);
+                alone += usize::from(winners == 1);
+                refused += lost;
+            }
+            let names: Vec<String> = racers.iter().map(|racer| format!("{racer:?}").to_lowercase()).collect();
+            let place = match start {
+                Start::New => "new",
+                Start::Stopped => "interrupted",
+            };
+            table += &format!(
+                "| {} | {place} | {rounds} | {alone} | {} | {refused} | 0 | 0 |\n",
+                names.join(", "),
+                rounds - alone
+            );
         }
+        table
     }
 }
 
@@ -151,5 +176,5 @@ fn of_several_processes_one_has_the_directory() {
 #[test]
 #[ignore = "takes minutes"]
 fn sixty_races_lose_nothing() {
-    Track::new().races(10);
+    write_into_page("docs/robustness.md", "races", &Track::new().races(10));
 }

@@ -12,6 +12,7 @@ mod fresh_mesh;
 mod memory;
 mod mesh_files;
 mod morph;
+mod plausible;
 mod pyvista;
 mod ranks;
 mod run_files;

@@ -9,6 +9,7 @@
 
 use std::path::{Path, PathBuf};
 
+use fluxmorph_geometry::fem::workspace;
 use fluxmorph_optimizer::memory_estimate::{needs_workspace, of_evaluation};
 use fluxmorph_optimizer::problem::Problem;
 
@@ -81,24 +82,9 @@ pub(crate) fn check_problem(
 
 /// The same for a problem of about so many bytes, with this many threads in dense kernels.
 fn check_estimate(estimate: u64, threads: usize, source: &SourceMap) -> Result<(), ConfigError> {
-    let workspace = threads as u64 * workspace_of_thread();
+    let workspace = threads as u64 * workspace::bytes_per_thread() as u64;
     let Some(room) = room(workspace) else { return Ok(()) };
     refuse_beyond(room, source, ("mesh", "solving the problem"), estimate)
-}
-
-/// Addresses that a thread takes for dense kernels of large factors: both operands in packed form, each as large as the cache
-/// that the threads share.
-fn workspace_of_thread() -> u64 {
-    let text = std::fs::read_to_string("/sys/devices/system/cpu/cpu0/cache/index3/size").unwrap_or_default();
-    2 * cache_bytes(&text).unwrap_or(SHARED_CACHE)
-}
-
-/// The shared cache, where the system does not say [bytes].
-const SHARED_CACHE: u64 = 32 << 20;
-
-/// A size as the kernel writes it: `32768K`.
-fn cache_bytes(text: &str) -> Option<u64> {
-    text.trim().strip_suffix('K')?.parse::<u64>().ok()?.checked_mul(1024)
 }
 
 /// Why so many bytes cannot be held; `None` where they can, or nothing is known.
@@ -246,12 +232,6 @@ mod tests {
                       Max address space         1048576              unlimited            bytes\n";
         assert_eq!(soft_limit(limits, "Max address space"), Some(1 << 20));
         assert_eq!(soft_limit(limits, "Max data size"), None);
-    }
-
-    #[test]
-    fn the_size_of_a_cache_is_understood() {
-        assert_eq!(cache_bytes("32768K\n"), Some(32 << 20));
-        assert_eq!(cache_bytes(""), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! A surface name `"a|b"` that the mesh does not have stands for the faces between the regions `a` and `b`. It is added to
 //! the mesh under that name before anything else looks for it, so that every key may use it.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -38,15 +38,15 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
         MeshConfig::Block(parameters) => generated(block(&parameters.parameters())),
         MeshConfig::Boxes(parameters) => generated(boxes(&parameters.parameters())),
         MeshConfig::Sphere(parameters) => generated(sphere(&parameters.parameters())),
-        MeshConfig::File { path, unit } => read_msh_file(path, unit.metres())
-            .map(|read| {
-                let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
-                Built {
-                    mesh: read.mesh,
-                    notices: read.notices.messages().into_iter().map(with_file).collect(),
-                }
+        MeshConfig::File { path, unit } => {
+            let read = read_msh_file(path, unit.metres()).map_err(|error| file_fault(error, source))?;
+            source.check(loose_faults(config, source, &read.notices.loose_triangles))?;
+            let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
+            Ok(Built {
+                mesh: read.mesh,
+                notices: read.notices.messages().into_iter().map(with_file).collect(),
             })
-            .map_err(|error| file_fault(error, source)),
+        }
     }?;
     Ok(Built { mesh: named_interfaces(built.mesh, config)?, ..built })
 }
@@ -62,6 +62,19 @@ pub(crate) fn unit(config: &Config) -> LengthUnit {
         MeshConfig::File { unit, .. } => *unit,
         _ => LengthUnit::Millimetre,
     }
+}
+
+/// Every surface that the configuration names and of which a part is the face of no tetrahedron.
+fn loose_faults(config: &Config, source: &SourceMap, loose: &BTreeMap<String, usize>) -> Vec<Diagnostic> {
+    let fault = |(path, name): (String, &str)| {
+        let count = loose.get(name)?;
+        let message = format!("{count} triangles of the surface `{name}` are faces of no tetrahedron");
+        let fault = source.diagnostic(&path, message).expected("a surface of the volumes in the mesh");
+        Some(fault.help(
+            "usual cause: a volume beside it that was not meshed, belongs to no physical group, or does not share its nodes",
+        ))
+    };
+    surface_names(config).into_iter().filter_map(fault).collect()
 }
 
 /// A parameter that a generator refuses becomes a fault at its key.

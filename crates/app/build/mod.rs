@@ -2,7 +2,7 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `plausible` what cannot be meant, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `plausible` what cannot be meant, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod curves;
 mod design;
@@ -18,26 +18,29 @@ mod outline;
 mod plausible;
 mod shape;
 mod share;
+mod skin;
+mod soundness;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
 pub use motion::{MotionSetup, set_up_motion};
 pub use outline::{Outline, OutlinedDesign, outline};
+pub use skin::Audited;
+pub(crate) use skin::result_warnings;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
+use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
-use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 use fluxmorph_solver::{FieldModel, Material};
 
 use self::curves::Curves;
 pub(crate) use self::functional::force;
 use self::locate_error::DiagnosticSink;
-use crate::config::{
-    self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, RegionModel, SourceMap,
-};
+use self::skin::audits;
+use crate::config::{self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, SourceMap};
 use crate::error::Error;
 
 /// A problem, and what the user should know of it.
@@ -51,39 +54,10 @@ pub struct Setup {
     pub warnings: Vec<String>,
     /// The mesh as read or generated, with all its regions.
     pub full_mesh: Mesh,
-}
-
-/// The audit of one conductor and how it is modelled.
-#[derive(Debug)]
-pub struct Audited {
-    /// What was found.
-    pub audit: SkinAudit,
-    /// Meshed, or replaced by its impedance surface.
-    pub model: RegionModel,
-}
-
-impl Audited {
-    /// The warning for the user, if there is one.
-    pub fn warning(&self) -> Option<String> {
-        let (coarse, thin) = (self.audit.volume_warning(), self.audit.impedance_warning());
-        let depths = self.audit.thickness_in_skin_depths;
-        match self.model {
-            // Neither model must send to the other where that one has an objection too.
-            RegionModel::Volume if thin.is_some() => coarse.map(|text| {
-                let what = text.split(". Refine the skin").next().unwrap_or_default();
-                format!(
-                    "{what}. Refine the skin: at {depths:.1} skin depths on average the region is too thin for an impedance \
-                     surface"
-                )
-            }),
-            RegionModel::Volume => coarse,
-            RegionModel::Impedance if coarse.is_some() => thin.map(|text| {
-                format!("{text} with thinner elements at its surface: these are too thick for the skin depth")
-            }),
-            RegionModel::Impedance => thin,
-            RegionModel::Perfect => None,
-        }
-    }
+    /// Outer faces of it without a condition.
+    pub open_patches: Vec<OpenPatch>,
+    /// The region that a positive design thickens.
+    pub designed_body: Option<String>,
 }
 
 /// Which parts of the configuration a command needs.
@@ -164,13 +138,24 @@ fn problem_on(
 ) -> Result<Setup, Error> {
     check_names(config, source, &full_mesh, &warnings)?;
     warnings.extend_from_slice(source.notices());
+    source.check(soundness::contact_faults(config, source, &full_mesh))?;
+    let motion_alone = mode == Mode::Inspection && config.morph.is_some();
+    let mut open_patches = Vec::new();
+    if !motion_alone {
+        let outside =
+            soundness::outside(config, source, &full_mesh).map_err(|faults| source.error(faults))?;
+        warnings.extend(outside.warnings);
+        warnings.extend(soundness::unit_warning(config, &full_mesh));
+        warnings.extend(soundness::swap_warning(config, &full_mesh));
+        open_patches = outside.open;
+    }
+    warnings.extend(soundness::layer_warnings(config, &full_mesh));
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probe_faults(config, source, &full_mesh, &mesh);
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
     let mut sink = DiagnosticSink::new(config, source, faults);
-    let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     if conductors.is_empty() && !motion_alone {
         sink.take(check_conditions(&config.boundaries, source))?;
     }
@@ -215,6 +200,7 @@ fn problem_on(
         );
     }
     let objective = functional::objective(config, &mesh, &states)?;
+    let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
     let (mut shape, mut constraints) = (None, Vec::new());
     if let (Some(inputs), Some(body)) = (&design, body) {
         let observed = functional::fixed_elements(config, &mesh, &states)?;
@@ -228,7 +214,8 @@ fn problem_on(
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
     let problem = Problem::new(mesh, states, objective, constraints, shape).shared_out(share);
-    Ok(Setup { problem, audits, warnings, full_mesh })
+    warnings.extend(skin::bound_warnings(config, &audits, &problem, designed_body.as_deref()));
+    Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body })
 }
 
 /// Refuses names that the mesh does not have; what was left out of a mesh file is often why.
@@ -277,23 +264,8 @@ pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Erro
     Ok(design::surface(config, source, design, &mesh)?.variable_count())
 }
 
-/// Skin-depth audits of all conductors at all frequencies, on the mesh with all regions.
-fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
-    let of = |(name, region): (&String, &config::Region)| {
-        let id = mesh.topology().region(name).ok()?;
-        let material = material(config, name);
-        let at = |&frequency: &f64| {
-            let audit = skin_audit(mesh, id, &material, frequency, field::order(config))?;
-            Some(Audited { audit, model: region.model })
-        };
-        Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
-    };
-    let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
-    config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
-}
-
 /// The material of a region; air where the configuration says nothing.
-fn material(config: &Config, region: &str) -> Material {
+pub(crate) fn material(config: &Config, region: &str) -> Material {
     let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
     entry.map_or(Material::AIR, |m| Material {
         relative_permeability: m.relative_permeability,

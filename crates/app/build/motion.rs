@@ -10,7 +10,7 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
 use super::elastic_body::{guidance, remesh_setup};
-use super::{field, mesh, millimetres, name_faults};
+use super::{field, mesh, millimetres, name_faults, soundness};
 use crate::config::{
     Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
 };
@@ -47,6 +47,8 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
     warnings.extend_from_slice(source.notices());
     source.check(name_faults(config, source, full_mesh.topology()))?;
+    source.check(soundness::contact_faults(config, source, &full_mesh))?;
+    warnings.extend(soundness::layer_warnings(config, &full_mesh));
     let (mesh, _) = field::without_replaced_regions(config, &full_mesh)?;
 
     let mut faults = Vec::new();

@@ -11,7 +11,8 @@ use fluxmorph_remesh::KinematicConstraint;
 
 use super::elastic_body::{regions_at, remesh_setup};
 use super::shape::thickened_region;
-use super::{Audited, audits, design, field, mesh, name_faults};
+use super::skin::{Audited, audits};
+use super::{design, field, mesh, name_faults};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 
@@ -39,7 +40,7 @@ pub struct OutlinedDesign {
     pub triangles: Vec<[NodeId; 3]>,
     /// The region that a positive design thickens; else those with an entry of their own at the surface; else none.
     pub bodies: Vec<RegionId>,
-    /// WallThickness of the designed body, where it has one.
+    /// Thickness of the designed body, where it has one and its opposite face is held.
     pub thickness: Option<WallThickness>,
     /// Elements of `mesh` that may move, ascending.
     pub moving: Vec<ElementId>,
@@ -63,7 +64,7 @@ pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
 }
 
 /// Nodes keep their places, bit by bit, where others are taken out.
-fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
+pub(super) fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
     let key = |point: [f64; 3]| point.map(f64::to_bits);
     if full_mesh.points().len() == mesh.points().len() {
         return mesh.topology().nodes().map(Some).collect();
@@ -84,7 +85,13 @@ fn outline_design(
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
     let body = thickened_region(full_mesh, &surface, config);
-    let thickness = body.and_then(|region| WallThickness::measure(full_mesh, region, &surface));
+    let free = config.remesh.iter().flat_map(|remesh| &remesh.free);
+    let free: BTreeSet<NodeId> =
+        free.filter_map(|name| topology.surface(name).ok()).flatten().flatten().copied().collect();
+    let is_held = |node: NodeId| !free.contains(&node) && surface.nodes().binary_search(&node).is_err();
+    let thickness = body
+        .and_then(|region| WallThickness::measure(full_mesh, region, &surface))
+        .filter(|thickness| thickness.opposite_nodes().all(is_held));
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     let bodies = match body {
         Some(region) => vec![region],
@@ -129,8 +136,8 @@ mod tests {
             assert_eq!(design.moving, setup.problem.moving_elements());
             let plate = outline.full_mesh.topology().region("plate").expect("a plate");
             assert_eq!(design.bodies, [plate]);
-            let flat = vec![0.0; design.surface.nodes().len()];
-            let (low, high) = design.thickness.as_ref().expect("a plate has one").range(&flat);
+            let thickness = design.thickness.as_ref().expect("a plate has one");
+            let (low, high) = thickness.range(&design.surface, &outline.full_mesh);
             assert!((low - 0.01).abs() < 1e-12 && (high - 0.01).abs() < 1e-12, "{low} {high}");
         }
     }

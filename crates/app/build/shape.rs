@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::{Ownership, Role};
-use fluxmorph_geometry::tet4::{centroid, dot, sub};
+use fluxmorph_geometry::tet4::{add, centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
@@ -12,6 +12,7 @@ use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits}
 use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{guidance, regions_at, remesh_setup};
+use super::outline::same_nodes;
 use super::{millimetres, plausible};
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
 use crate::error::Error;
@@ -39,6 +40,14 @@ pub(super) struct Body {
     /// On the mesh that is left.
     surface: DesignSurface,
     motion: Motion,
+}
+
+impl Body {
+    /// The name of the region that a positive design thickens.
+    pub(super) fn thickened_region(&self, config: &Config, full_mesh: &Mesh) -> Option<String> {
+        let region = thickened_region(full_mesh, &self.full_surface, config)?;
+        Some(full_mesh.topology().region_names()[region.index()].clone())
+    }
 }
 
 /// Makes the design surface and the elastic map.
@@ -91,7 +100,8 @@ pub(super) fn shape(
         faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
     }
     let thickness = thickened_region(full_mesh, &full_surface, config)
-        .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface));
+        .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface))
+        .and_then(|thickness| thickness.renumbered(&same_nodes(full_mesh, mesh)));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
         let fault = source.diagnostic("design.initial", format!("design.initial has not {n} values"));
@@ -108,7 +118,7 @@ pub(super) fn shape(
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
     if let Some(thickness) = &thickness {
-        faults.extend(vanishing_faults(source, design, &surface, thickness));
+        faults.extend(vanishing_faults(source, design, mesh, &surface, thickness));
     }
     source.check(faults)?;
     let limits = StepLimits {
@@ -149,14 +159,20 @@ pub(super) fn thickened_region(mesh: &Mesh, surface: &DesignSurface, config: &Co
 fn vanishing_faults(
     source: &SourceMap,
     design: &Design,
+    mesh: &Mesh,
     surface: &DesignSurface,
     thickness: &WallThickness,
 ) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     for (key, bound) in [("design.lower", design.lower), ("design.upper", design.upper)] {
-        let displacements = surface.normal_displacements(&vec![bound; surface.variable_count()]);
-        let left = |(i, thickness): (usize, f64)| (thickness + displacements[i], thickness);
-        let thinnest = thickness.at_nodes().map(left).min_by(|a, b| a.0.total_cmp(&b.0));
+        let displacement = surface.displacement(&vec![bound; surface.variable_count()]);
+        let moved = |node: NodeId| match surface.nodes().binary_search(&node) {
+            Ok(i) => add(mesh.point(node), displacement[i]),
+            Err(_) => mesh.point(node),
+        };
+        let left = thickness.walls(surface, moved).map(|(_, wall)| wall.thickness);
+        let initial = thickness.at_nodes().map(|(_, thickness)| thickness);
+        let thinnest = left.zip(initial).min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((least, thickness)) = thinnest.filter(|(least, _)| *least <= 0.0) else { continue };
         let message = format!(
             "`{key}` is {:.3} mm, and the body is {:.3} mm thick there: nothing would be left of it",

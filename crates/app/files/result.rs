@@ -57,6 +57,9 @@ pub struct RunResult {
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
     pub timings_s: BTreeMap<String, f64>,
+    /// What the field of this design says against the model it was computed with; empty where it says nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Most memory held [bytes].
     pub peak_memory_bytes: u64,
 }
@@ -330,6 +333,7 @@ pub(crate) mod tests {
                 iterations: 4,
             },
             timings_s: [("total".to_owned(), 12.0)].into(),
+            warnings: Vec::new(),
             peak_memory_bytes: 1 << 20,
         }
     }

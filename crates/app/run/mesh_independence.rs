@@ -289,7 +289,7 @@ fn analysis_at(
         Some(shape) => shape.motion().moved(&displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse(moved, p, Derivatives::None, cache, &mut NoProgress)?;
+    let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
     if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
         shape.set_motion(motion);
     }

@@ -12,6 +12,7 @@ pub mod morph;
 mod pieces;
 mod prepared;
 mod recorder;
+mod reservations;
 mod resume;
 mod solve;
 mod summary;

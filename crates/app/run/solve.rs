@@ -46,7 +46,7 @@ pub fn solve(
         session.continuation.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
-        let analysis = problem.analyse(moved, p, Derivatives::First, cache, stages)?;
+        let analysis = problem.analyse(moved, Derivatives::First, cache, stages)?;
         let design = values.as_deref().map(|values| (values, rounds.as_slice()));
         session.write_analysis(design, &analysis, observer)
     })?;

@@ -10,6 +10,7 @@ use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timi
 use fluxmorph_solver::{RigidMotion, SolverError, recovery, saturation};
 
 use super::Session;
+use super::reservations::reservations;
 use crate::build::force;
 use crate::config;
 use crate::error::Error;
@@ -46,6 +47,8 @@ impl Session<'_> {
             rounds: rounds.to_vec(),
         });
         let topology = mesh.topology();
+        let warnings = reservations(self.config, &self.setup, analysis);
+        warnings.iter().for_each(|warning| observer.warning(warning));
         Ok(RunResult {
             schema_version: 1,
             command: self.command.to_owned(),
@@ -72,6 +75,7 @@ impl Session<'_> {
             states: if states.len() > 1 { states } else { Vec::new() },
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
+            warnings,
             peak_memory_bytes: peak_memory_bytes(),
         })
     }

@@ -51,6 +51,14 @@ pub enum MeshError {
         /// The three nodes, sorted.
         face: [NodeId; 3],
     },
+    /// Two tetrahedra lie on the same side of their common face.
+    #[error(
+        "the elements {} and {} lie on the same side of their common face: the mesh is folded there", elements[0], elements[1]
+    )]
+    Folded {
+        /// The two.
+        elements: [ElementId; 2],
+    },
     /// A region name that the mesh does not have.
     #[error("there is no region `{name}`; the mesh has: {known}")]
     UnknownRegion {

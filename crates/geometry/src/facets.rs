@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId, RegionId};
 use crate::tet4::FACES;
-use crate::topology::Facet;
+use crate::topology::{Facet, same_turn};
 
 /// One face in the bucket of its smallest node.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,7 +110,10 @@ fn facets_of(
         match group {
             [face] => found.push((face.code, Facet { nodes, inside, outside: None })),
             [face, other] => {
-                let outside = ElementId(other.code / 4);
+                let (seen_from_outside, outside) = oriented(other.code);
+                if same_turn(nodes, seen_from_outside) {
+                    return Err(MeshError::Folded { elements: [inside, outside] });
+                }
                 if region_of[inside.index()] != region_of[outside.index()] {
                     found.push((face.code, Facet { nodes, inside, outside: Some(outside) }));
                 }

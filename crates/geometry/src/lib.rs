@@ -7,6 +7,7 @@
 //! share, as the paper's appendix suggests.
 
 pub mod box_tree;
+pub mod depth;
 #[cfg(test)]
 mod determinism;
 pub mod disjoint_sets;
@@ -22,6 +23,7 @@ pub mod mesh;
 pub mod parallel;
 pub mod quality;
 pub mod refine;
+pub mod soundness;
 pub mod tet4;
 pub mod topology;
 

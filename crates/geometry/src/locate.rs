@@ -20,14 +20,24 @@ const BOX_MARGIN: f64 = 1e-8;
 pub type Located = (ElementId, [f64; 4]);
 
 /// For every point [m] the element that holds it, the first of several; `None` outside the mesh.
-#[expect(clippy::disallowed_methods, reason = "lists joined in order are one list, wherever they are cut")]
 pub fn locate(mesh: &Mesh, points: &[Point]) -> Vec<Option<Located>> {
     let mut found: Vec<Option<Located>> = vec![None; points.len()];
+    for (i, located) in holders(mesh, points) {
+        if found[i].is_none_or(|(e, _)| located.0 < e) {
+            found[i] = Some(located);
+        }
+    }
+    found
+}
+
+/// Every element that holds one of the points [m], with the number of the point; by ascending element.
+#[expect(clippy::disallowed_methods, reason = "lists joined in order are one list, wherever they are cut")]
+pub fn holders(mesh: &Mesh, points: &[Point]) -> Vec<(usize, Located)> {
     if points.is_empty() {
-        return found;
+        return Vec::new();
     }
     let tree = BoxTree::of_points(points);
-    let inside: Vec<(usize, Located)> = (0..mesh.topology().tets().len())
+    (0..mesh.topology().tets().len())
         .into_par_iter()
         .map(ElementId::new)
         .with_min_len(1024)
@@ -51,13 +61,7 @@ pub fn locate(mesh: &Mesh, points: &[Point]) -> Vec<Option<Located>> {
             inside
         })
         .flatten()
-        .collect();
-    for (i, located) in inside {
-        if found[i].is_none_or(|(e, _)| located.0 < e) {
-            found[i] = Some(located);
-        }
-    }
-    found
+        .collect()
 }
 
 #[cfg(test)]

@@ -19,6 +19,11 @@ pub fn face_key(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
     nodes
 }
 
+/// Whether two orders of the same three nodes have the same normal.
+pub(crate) fn same_turn(a: [NodeId; 3], b: [NodeId; 3]) -> bool {
+    (0..3).any(|shift| (0..3).all(|k| a[k] == b[(k + shift) % 3]))
+}
+
 /// A triangle between two regions or at the outside of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facet {
@@ -61,10 +66,11 @@ impl Topology {
     /// A topology of `node_count` nodes.
     ///
     /// `region_of` has one entry per tet and indexes `region_names`. The node order of a tet decides the sign of its
-    /// volume; it is checked where there are coordinates, in [`crate::Mesh::new`].
+    /// volume; it is checked where there are coordinates, in [`crate::Mesh::new`]. With volumes of one sign, two tets with
+    /// a common face lie on its two sides exactly where they see it turned the other way round: that is checked here.
     ///
     /// # Errors
-    /// [`MeshError::DanglingNode`] and [`MeshError::OverfullFace`].
+    /// [`MeshError::DanglingNode`], [`MeshError::CrowdedNode`], [`MeshError::OverfullFace`] and [`MeshError::Folded`].
     ///
     /// # Panics
     /// If `region_of` and `tets` differ in length or a region id has no name: both are the caller's to keep.

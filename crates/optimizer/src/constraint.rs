@@ -64,19 +64,14 @@ impl Constraint {
     ///
     /// # Errors
     /// [`RemeshError::NotConverged`].
-    pub fn of_shape(
-        &self,
-        p: &[f64],
-        mesh: &Mesh,
-        shape: &Shape,
-    ) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
+    pub fn of_shape(&self, mesh: &Mesh, shape: &Shape) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
         Ok(match &self.quantity {
             Quantity::Field(_) => None,
             Quantity::Volume(body) => Some(body.evaluate(mesh, shape)?),
             Quantity::Thickness { measure, bound } => {
                 // Beyond a minimum is below it, beyond a maximum above.
                 let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
-                let (beyond, gradient) = measure.evaluate(shape, p);
+                let (beyond, gradient) = measure.evaluate(shape, mesh)?;
                 Some((bound + sign * beyond, gradient.iter().map(|g| sign * g).collect()))
             }
         })

@@ -6,6 +6,7 @@
 //!
 //! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
 
+use fluxmorph_geometry::fem::workspace::LARGE_FACTOR;
 use fluxmorph_solver::linear::{Method, Reuse, SystemAnalysis, TWO_LEVELS_FROM};
 use fluxmorph_solver::{FieldModel, Order};
 
@@ -107,9 +108,6 @@ fn is_factor(method: Method) -> bool {
 pub fn of_evaluation(problem: &Problem) -> usize {
     PROCESS + Evaluation::of(problem).bytes()
 }
-
-/// Least bytes of a factor in which products are so large that the dense kernels take a workspace of their own.
-const LARGE_FACTOR: usize = 4 << 20;
 
 /// Whether a factor of the problem is so large that every thread asks for the workspace of the dense kernels: addresses, of
 /// which it uses a small part. Limits on addresses count them, the memory of the machine does not.

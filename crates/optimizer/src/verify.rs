@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-9;
 const LEAST_SLOPE: f64 = 1e-3;
 
 /// Steps for the bound on a thickness, a smooth maximum over many places: it bends within hundredths of a millimetre, and
-/// is computed without a solver, so that small steps cost no digits.
+/// is computed without a field, so that small steps cost no digits.
 const FINE: [f64; 2] = [8e-5, 4e-7];
 
 /// Steps of the certificate, and what it asks for.
@@ -159,7 +159,7 @@ pub fn certify(
             (Quantity::Field(_), _) | (_, None) => value(p, k + 1),
             (_, Some(shape)) => {
                 let mesh = problem.moved(p)?.mesh;
-                Ok(constraint.of_shape(p, &mesh, shape)?.map_or(f64::NAN, |(value, _)| value))
+                Ok(constraint.of_shape(&mesh, shape)?.map_or(f64::NAN, |(value, _)| value))
             }
         };
         let gradient = measured.gradient.as_ref().expect("the gradient was asked for");

@@ -52,7 +52,7 @@ fn node_gradient_holds(problem: &Problem) {
     let at = problem.moved(&wavy(problem)).unwrap_or_else(|e| panic!("{e}"));
     let mesh = at.mesh.clone();
     let analyse = |moved: Moved, derivatives: Derivatives| {
-        problem.analyse(moved, &wavy(problem), derivatives, &mut SolverCache::default(), &mut NoProgress)
+        problem.analyse(moved, derivatives, &mut SolverCache::default(), &mut NoProgress)
     };
     let base = analyse(at.clone(), Derivatives::First).unwrap_or_else(|e| panic!("{e}"));
     let objective = base.objective.expect("an objective");

@@ -81,41 +81,88 @@ fn the_gradient_holds_in_both_models_and_both_agree() {
     assert!((values[0] - values[1]).abs() < 1e-12 * values[0], "{values:?}");
 }
 
+fn bound_of(setup: &Setup, limit: ThicknessLimit) -> ThicknessBound {
+    ThicknessBound::new(setup.problem.shape().expect("a shape"), limit).expect("a thickness")
+}
+
+/// A bound and its gradient at a design.
+fn evaluate(setup: &Setup, bound: &ThicknessBound, p: &[f64]) -> (f64, Vec<f64>) {
+    let mesh = setup.problem.moved(p).expect("inside the bounds").mesh;
+    bound.evaluate(setup.problem.shape().expect("a shape"), &mesh).expect("a direct solve")
+}
+
+/// Least and greatest thickness of a design.
+fn range(setup: &Setup, p: &[f64]) -> (f64, f64) {
+    let shape = setup.problem.shape().expect("a shape");
+    let mesh = setup.problem.moved(p).expect("inside the bounds").mesh;
+    shape.thickness().expect("a plate has one").range(shape.surface(), &mesh)
+}
+
 #[test]
 fn the_bound_is_conservative_by_no_more_than_its_margin() {
     let setup = shield(&[]);
-    let shape = setup.problem.shape().expect("a shape");
     let p = wavy(&setup.problem);
-    let (least, most) =
-        shape.thickness().expect("a plate has one").range(&shape.surface().normal_displacements(&p));
-    for (bound, excess, limit) in [
+    let (least, most) = range(&setup, &p);
+    for (limit, excess, value) in [
         (ThicknessLimit::Minimum(0.012), 0.012 - least, 0.012),
         (ThicknessLimit::Maximum(0.014), most - 0.014, 0.014),
     ] {
-        let (value, _) = ThicknessBound::new(shape, bound).expect("a thickness").evaluate(shape, &p);
-        assert!(excess <= value && value <= excess + MARGIN * limit, "{bound:?}: {excess} {value}");
+        let (found, _) = evaluate(&setup, &bound_of(&setup, limit), &p);
+        assert!(excess <= found && found <= excess + MARGIN * value, "{limit:?}: {excess} {found}");
     }
 }
 
 #[test]
 fn a_uniform_plate_meets_its_limit_by_the_margin() {
     let setup = shield(&[]);
-    let shape = setup.problem.shape().expect("a shape");
-    let bound = ThicknessBound::new(shape, ThicknessLimit::Minimum(0.008)).expect("a thickness");
-    let (value, gradient) = bound.evaluate(shape, &vec![0.0; shape.surface().variable_count()]);
+    let bound = bound_of(&setup, ThicknessLimit::Minimum(0.008));
+    let (value, gradient) = evaluate(&setup, &bound, &vec![0.0; variables(&setup.problem)]);
     // 8 mm − 10 mm, and all nodes count alike: the whole margin of 0.08 mm.
     assert!((value + 0.002 - 0.00008).abs() < 1e-12, "{value}");
     let sum: f64 = gradient.iter().sum();
     assert!((sum + 1.0).abs() < 1e-12, "a uniform motion changes all alike: {sum}");
 }
 
+/// The upper face of the plate follows the elastic body.
+const FREE: [&str; 3] = [MESHED[0], MESHED[1], "remesh.free=[\"plate_top\"]"];
+
 #[test]
-fn the_gradient_holds() {
-    let setup = shield(&[]);
-    let shape = setup.problem.shape().expect("a shape");
-    for bound in [ThicknessLimit::Minimum(0.012), ThicknessLimit::Maximum(0.014)] {
-        let bound = ThicknessBound::new(shape, bound).expect("a thickness");
-        // Well below 1/ρ, about 0.03 mm, where the function is smooth.
-        taylor(|p| bound.evaluate(shape, p), &wavy(&setup.problem), 2e-6);
+fn the_gradient_of_a_thickness_holds_where_the_opposite_face_is_held_and_where_it_moves() {
+    for overrides in [&[][..], &FREE] {
+        let setup = shield(overrides);
+        for limit in [ThicknessLimit::Minimum(0.012), ThicknessLimit::Maximum(0.014)] {
+            let bound = bound_of(&setup, limit);
+            // Well below 1/ρ, about 0.03 mm, where the function is smooth.
+            taylor(|p| evaluate(&setup, &bound, p), &wavy(&setup.problem), 2e-6);
+        }
     }
+}
+
+#[test]
+fn a_thickness_counts_the_motion_of_the_opposite_face() {
+    let [held, free] = [&MESHED[..], &FREE].map(|overrides| {
+        let setup = shield(overrides);
+        let p = wavy(&setup.problem);
+        let mesh = setup.problem.moved(&p).expect("inside the bounds").mesh;
+        // Along z, straight from the coordinates: from every node of the lower face to the upper one above it.
+        let height = |name: &str| -> Vec<[f64; 3]> {
+            let surface = mesh.topology().surface(name).expect("a face of the plate");
+            let nodes: std::collections::BTreeSet<_> = surface.iter().flatten().copied().collect();
+            nodes.into_iter().map(|n| mesh.point(n)).collect()
+        };
+        let (bottom, top) = (height("plate_bottom"), height("plate_top"));
+        let across = |p: &[f64; 3]| {
+            let beside = |q: &&[f64; 3]| (q[0] - p[0]).hypot(q[1] - p[1]);
+            let above = top.iter().min_by(|a, b| beside(a).total_cmp(&beside(b))).expect("a node");
+            above[2] - p[2]
+        };
+        let least = bottom.iter().map(across).fold(f64::INFINITY, f64::min);
+        (range(&setup, &p).0, least)
+    });
+    println!("held {held:?}, free {free:?}");
+    // Held, the nodes of both faces lie above each other.
+    assert!((held.0 - held.1).abs() < 1e-12, "{held:?}");
+    // Free, nodes slip sideways by a share of a millimetre, on a face that slopes by a tenth.
+    assert!((free.0 - free.1).abs() < 1e-4, "{free:?}");
+    assert!((free.0 - held.0).abs() > 1e-3, "the upper face follows the lower one: {free:?} {held:?}");
 }

@@ -2,7 +2,9 @@
 //!
 //! Does not live here: what is wrong (`build`), and the audit of skin depths (`fluxmorph_solver::audit`).
 
-use fluxmorph_geometry::tet4::{norm, sub};
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::quality::qualities;
+use fluxmorph_geometry::tet4::{EDGES, FACES, Point, area_vector, norm, sub, volume};
 
 use crate::build::Setup;
 use crate::config::{Config, ElementOrder, MeshConfig};
@@ -25,10 +27,10 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
                 .to_owned(),
         );
     }
-    let worst = setup.problem.quality(setup.problem.original()).worst;
-    if is_file && worst < POOR {
+    let worst = if is_file { worst_without_layers(setup.problem.original()) } else { 1.0 };
+    if worst < POOR {
         all.push(format!(
-            "the worst element has a quality of {worst:.4}; regenerate a mesh file whose worst quality is below {POOR}"
+            "the worst element that belongs to no thin layer has a quality of {worst:.4}; regenerate a mesh file whose worst quality is below {POOR}"
         ));
     }
     if let Some(design) = &config.design {
@@ -46,6 +48,22 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
         }
     }
     all
+}
+
+/// The worst quality of the elements that are not flat because a layer is thin, as layers are that follow a skin depth.
+fn worst_without_layers(mesh: &Mesh) -> f64 {
+    let poor = mesh.topology().elements().zip(qualities(mesh)).filter(|(_, quality)| *quality < POOR);
+    let slivers = poor.filter(|(e, _)| !is_layered(mesh.vertices(*e)));
+    slivers.map(|(_, quality)| quality).fold(1.0, f64::min)
+}
+
+/// Whether a flat element is as flat as its shortest edge is short: one edge stands on a layer, where those of a sliver lie in it.
+fn is_layered(vertices: [Point; 4]) -> bool {
+    let largest =
+        FACES.map(|face| norm(area_vector(face.map(|v| vertices[v])))).into_iter().fold(0.0, f64::max);
+    let shortest =
+        EDGES.map(|[a, b]| norm(sub(vertices[a], vertices[b]))).into_iter().fold(f64::INFINITY, f64::min);
+    shortest <= 2.0 * 3.0 * volume(vertices) / largest
 }
 
 #[cfg(test)]
@@ -68,6 +86,14 @@ mod tests {
         assert_eq!(of("shield_quick.toml", &[]), Vec::<String>::new());
         let advice = of("shield_quick.toml", &["design.upper=10", "remesh.rounds=50"]);
         assert!(advice.len() == 1 && advice[0].contains("design.upper is 10 m"), "{advice:?}");
+    }
+
+    #[test]
+    fn a_thin_layer_is_no_sliver() {
+        let layer = [[0.0; 3], [1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 0.01]];
+        assert!(is_layered(layer) && is_layered([layer[3], [1.0, 0.0, 0.01], [0.3, 1.0, 0.01], layer[1]]));
+        let sliver = [[0.0; 3], [1.0, 0.0, 0.01], [1.0, 1.0, 0.0], [0.0, 1.0, 0.01]];
+        assert!(!is_layered(sliver));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! Serialised as it is by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
 
+use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_optimizer::memory_estimate::of_evaluation;
@@ -41,6 +42,8 @@ pub(super) struct Summary<'a> {
     pub(super) bounding_box_m: [[f64; 3]; 2],
     pub(super) regions: Vec<RegionSummary>,
     pub(super) surfaces: Vec<SurfaceSummary>,
+    /// Sides of the mesh without condition, on which the field is left normal.
+    pub(super) open_sides: Vec<OpenSideSummary>,
     pub(super) quality: QualitySummary,
     pub(super) skin: Vec<SkinSummary>,
     pub(super) motions: Vec<MotionSummary>,
@@ -94,6 +97,17 @@ pub(super) struct SurfaceSummary {
     pub(super) name: String,
     pub(super) triangles: usize,
     pub(super) area_m2: f64,
+}
+
+/// Outer faces without condition.
+#[derive(Debug, Serialize)]
+pub(super) struct OpenSideSummary {
+    /// The region behind them.
+    pub(super) region: String,
+    pub(super) triangles: usize,
+    pub(super) area_m2: f64,
+    /// The middle of the largest triangle.
+    pub(super) at_m: [f64; 3],
 }
 
 /// Quality of the elements that may move, or of all.
@@ -180,6 +194,7 @@ pub(super) fn summary<'a>(
         bounding_box_m: mesh.bounding_box(),
         regions: regions(config, mesh),
         surfaces: surfaces(mesh)?,
+        open_sides: open_sides(&setup),
         quality: quality(&setup),
         skin,
         motions,
@@ -251,6 +266,16 @@ fn surfaces(mesh: &Mesh) -> Result<Vec<SurfaceSummary>, Error> {
         })
     };
     topology.surface_names().map(of).collect()
+}
+
+fn open_sides(setup: &Setup) -> Vec<OpenSideSummary> {
+    let side = |patch: &OpenPatch| OpenSideSummary {
+        region: setup.full_mesh.topology().region_names()[patch.region.index()].clone(),
+        triangles: patch.faces.len(),
+        area_m2: patch.area,
+        at_m: patch.place,
+    };
+    setup.open_patches.iter().map(side).collect()
 }
 
 fn quality(setup: &Setup) -> QualitySummary {

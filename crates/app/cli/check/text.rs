@@ -21,6 +21,7 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
     row("output", summary.output_directory.clone());
     text += &region_table(summary).text();
     text += &surface_table(summary).text();
+    text += &open_table(summary).text();
     text += &coil_table(summary).text();
     text += &skin_table(summary).text();
     text += &motion_table(summary).text();
@@ -173,6 +174,24 @@ fn surface_table(summary: &Summary<'_>) -> Table<3> {
     let mut table = Table::new(columns);
     for s in &summary.surfaces {
         table.row([s.name.clone(), s.triangles.to_string(), format_number(s.area_m2 * 1e4)]);
+    }
+    table
+}
+
+/// Most sides without condition that are listed: those of a box, and as many again.
+const MOST_SIDES: usize = 12;
+
+fn open_table(summary: &Summary<'_>) -> Table<4> {
+    use Align::{Left, Right};
+    let mut table = Table::new([
+        ("no condition, field normal", Left),
+        ("triangles", Right),
+        ("area cm²", Right),
+        ("at mm", Left),
+    ]);
+    for side in summary.open_sides.iter().take(MOST_SIDES) {
+        let area = format_number(side.area_m2 * 1e4);
+        table.row([side.region.clone(), side.triangles.to_string(), area, millimetres(side.at_m)]);
     }
     table
 }

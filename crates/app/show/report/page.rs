@@ -76,7 +76,10 @@ fn convergence(data: &RunData) -> Markup {
 
 fn results(data: &RunData) -> Markup {
     match &data.result {
-        Some(result) => tables::outcome(data, result),
+        Some(result) => html! {
+            @for warning in &result.warnings { p class="warning" { (warning) } }
+            (tables::outcome(data, result))
+        },
         None => missing("the results", "the run has not come to its end, so there is no result.json"),
     }
 }

@@ -228,7 +228,7 @@ pub(super) fn skin(outline: &Outline) -> Markup {
     let warnings: Vec<String> = outline.audits.iter().filter_map(|a| a.warning()).collect();
     html! {
         (table(&head, &rows, None))
-        @if warnings.is_empty() { (note("The skin-depth audit found nothing to warn about.")) }
+        @if warnings.is_empty() { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
         @for warning in warnings { p class="warning" { (warning) } }
     }
 }

@@ -11,6 +11,7 @@ use super::run::Run;
 use super::search::{Refusal, Stop};
 use super::{Evaluation, Record, StopReason, Watching, column, reference_hash};
 use crate::error::Error;
+use crate::geometric::WallThickness;
 use crate::nlopt::Sample;
 use crate::problem::{Analysis, Derivatives, Measured, Stage};
 
@@ -52,7 +53,7 @@ impl Run<'_> {
         let remesh = clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
-        let mut analysis = problem.analyse(moved, p, Derivatives::First, cache, progress)?;
+        let mut analysis = problem.analyse(moved, Derivatives::First, cache, progress)?;
         analysis.timings.remesh += remesh;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
@@ -159,8 +160,8 @@ impl Run<'_> {
     /// The record of a design, but for how it compares with the best.
     fn record(&self, p: &[f64], initial: &Initial, analysis: &Analysis) -> Record {
         let shape = self.shape();
-        let displacements = || shape.surface().normal_displacements(p);
-        let thickness = shape.thickness().map(|thickness| thickness.range(&displacements()));
+        let range = |thickness: &WallThickness| thickness.range(shape.surface(), &analysis.mesh);
+        let thickness = shape.thickness().map(range);
         let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
         let gradient = analysis.gradient.clone().expect("a gradient was asked for");

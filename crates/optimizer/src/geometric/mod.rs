@@ -9,7 +9,7 @@ mod wall_thickness;
 
 pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit};
 pub use volume::Volume;
-pub use wall_thickness::WallThickness;
+pub use wall_thickness::{Wall, WallThickness};
 
 use fluxmorph_geometry::MeshError;
 

@@ -1,7 +1,6 @@
 //! Least and greatest thickness along the design's direction, as one smooth constraint.
 //!
-//! The thickness at every design node is linear in the variables, `t_i = t0_i + h_i(p)`, so a limit on all of them is as
-//! many linear constraints as the surface has nodes. MMA and SLSQP carry dense arrays of that number times the number of
+//! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense arrays of that number times the number of
 //! variables and solve a dual problem in it; only where the body is as thick everywhere does it come down to bounds on
 //! the variables. So the limits are gathered in the Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser,
 //! IFAC Proceedings 12 (1979) 113–117): of `g_i = t_min − t_i`, or `t_i − t_max`,
@@ -11,7 +10,11 @@
 //! It is smooth and never below the largest `g_i`: what satisfies it satisfies every limit. `ρ` is chosen so that at most
 //! one per cent of the limit is given away.
 
+use fluxmorph_geometry::Mesh;
+use fluxmorph_remesh::RemeshError;
+
 use super::GeometricError;
+use super::wall_thickness::{Wall, WallThickness};
 use crate::problem::Shape;
 
 /// What the smooth bound gives away at most, as a share of the limit: below what a workshop holds, and still smooth over
@@ -51,30 +54,49 @@ impl ThicknessBound {
         self.bound
     }
 
-    /// How far the limit is exceeded [m], at most 0 where it is satisfied, and the derivative with respect to every
-    /// variable, shape `(n_variables)`.
+    /// How far the limit is exceeded on a moved mesh [m], at most 0 where it is satisfied, and the derivative with respect to
+    /// every variable, shape `(n_variables)`: one elastic solve where the opposite face may move, else none.
+    ///
+    /// # Errors
+    /// [`RemeshError::NotConverged`].
     ///
     /// # Panics
     /// If the shape is not the one that the bound was made for.
-    pub fn evaluate(&self, shape: &Shape, p: &[f64]) -> (f64, Vec<f64>) {
+    pub fn evaluate(&self, shape: &Shape, mesh: &Mesh) -> Result<(f64, Vec<f64>), RemeshError> {
         let thickness = shape.thickness().expect("a bound is made for a shape with a thickness");
-        let normal_displacements = shape.surface().normal_displacements(p);
         let (sign, limit) = match self.bound {
             ThicknessLimit::Minimum(limit) => (-1.0, limit),
             ThicknessLimit::Maximum(limit) => (1.0, limit),
         };
-        let excess: Vec<(usize, f64)> = thickness
-            .at_nodes()
-            .map(|(node, t)| (node, sign * (t + normal_displacements[node] - limit)))
+        let excess: Vec<(Wall, f64)> = thickness
+            .walls(shape.surface(), |n| mesh.point(n))
+            .map(|(_, wall)| (wall, sign * (wall.thickness - limit)))
             .collect();
         let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
         // Relative to the greatest: no exponential overflows.
         let terms: Vec<f64> = excess.iter().map(|&(_, g)| (self.sharpness * (g - greatest)).exp()).collect();
         let sum: f64 = terms.iter().sum();
-        let mut shares = vec![0.0; normal_displacements.len()];
-        for (&(node, _), term) in excess.iter().zip(&terms) {
-            shares[node] = sign * term / sum;
+        let mut nodal = vec![[0.0; 3]; mesh.points().len()];
+        for ((wall, _), term) in excess.iter().zip(&terms) {
+            for (node, derivative) in wall.derivatives {
+                for (total, d) in nodal[node.index()].iter_mut().zip(derivative) {
+                    *total += sign * term / sum * d;
+                }
+            }
         }
-        (greatest + sum.ln() / self.sharpness, shape.surface().normal_displacement_gradient(&shares))
+        let at_design = if opposite_moves(shape, thickness) {
+            shape.motion().map().gradient(&nodal)?
+        } else {
+            shape.surface().nodes().iter().map(|n| nodal[n.index()]).collect()
+        };
+        Ok((greatest + sum.ln() / self.sharpness, shape.surface().gradient(&at_design)))
     }
+}
+
+/// Whether a node opposite is a design node, or one that the elastic map decides.
+fn opposite_moves(shape: &Shape, thickness: &WallThickness) -> bool {
+    let (map, designed) = (shape.motion().map(), shape.surface().nodes());
+    thickness
+        .opposite_nodes()
+        .any(|n| designed.binary_search(&n).is_ok() || (0..3).any(|component| map.is_unknown(n, component)))
 }

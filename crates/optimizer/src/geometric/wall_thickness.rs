@@ -1,8 +1,12 @@
 //! Wall thickness of the designed body behind every design node, measured along the node's direction of motion.
 //!
-//! From each node of the design surface a ray runs against its direction to the body's opposite face. That face is held
-//! (docs/theory.md), so the thickness of a design is the initial one plus the node's height: exactly where one direction
-//! moves all nodes, and along normals in the same sense, each along its own. A node without direction has no thickness.
+//! From each node `x` of the design surface a ray runs against its direction `d` to the body's opposite face. On the
+//! undeformed mesh it meets a triangle with corners `y_k` and normal `n`, at the weights `b_k`. On a moved mesh the thickness
+//! is the distance to the plane of that triangle, wherever it has moved,
+//!
+//! `t = n·(x − y_0) / (n·d)`, `∂t/∂x = n / (n·d)`, `∂t/∂y_k = −b_k n / (n·d)`:
+//!
+//! the initial one plus the node's height where that face is held. A node without direction has no thickness.
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
@@ -17,11 +21,29 @@ const RIM_TOLERANCE: f64 = 1e-6;
 /// round side lean by less, and an opposite face as steep as that makes no body whose thickness means anything.
 const GRAZING: f64 = 0.1;
 
-/// Initial thickness [m] behind every design node.
+/// What lies opposite of a design node on the undeformed mesh.
+#[derive(Clone, Copy, Debug)]
+struct Opposite {
+    /// Distance [m].
+    distance: f64,
+    /// The triangle there.
+    nodes: [NodeId; 3],
+}
+
+/// The wall behind one design node.
+#[derive(Clone, Copy, Debug)]
+pub struct Wall {
+    /// Its thickness [m].
+    pub thickness: f64,
+    /// Derivatives with respect to the positions of the design node and of the three nodes opposite.
+    pub derivatives: [(NodeId, Point); 4],
+}
+
+/// The opposite face behind every design node.
 #[derive(Clone, Debug)]
 pub struct WallThickness {
     /// `None` where the node has no direction.
-    initial: Vec<Option<f64>>,
+    opposite: Vec<Option<Opposite>>,
 }
 
 impl WallThickness {
@@ -29,15 +51,14 @@ impl WallThickness {
     pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
         let topology = mesh.topology();
         let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
-        let triangles: Vec<[Point; 3]> = topology
+        let (designed, others): (Vec<[NodeId; 3]>, Vec<[NodeId; 3]>) = topology
             .facets()
             .iter()
             .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
-            .filter(|f| !f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
-            .map(|f| f.nodes.map(|n| mesh.point(n)))
-            .collect();
-        let faces = BoxTree::new(triangles.iter().map(reach).collect());
-        let initial = surface
+            .map(|f| f.nodes)
+            .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
+        let (others, designed) = (Faces::new(mesh, others), Faces::new(mesh, designed));
+        let opposite = surface
             .nodes()
             .iter()
             .zip(surface.directions())
@@ -46,30 +67,97 @@ impl WallThickness {
                     return Some(None);
                 }
                 let (origin, back) = (mesh.point(node), direction.map(|d| -d));
-                let hits: Vec<usize> = faces.hits(origin, back).into_iter().collect();
-                // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
-                let across = |i: &usize| !runs_along(back, &triangles[*i]);
-                let nearest = |of: &mut dyn Iterator<Item = usize>| {
-                    of.filter_map(|i| distance(origin, back, &triangles[i])).min_by(f64::total_cmp)
-                };
-                let opposite = nearest(&mut hits.iter().copied().filter(across));
-                opposite.or_else(|| nearest(&mut hits.iter().copied())).map(Some)
+                // Of a body with two designed faces, the other one.
+                others.nearest(origin, back).or_else(|| designed.nearest(origin, back)).map(Some)
             })
             .collect::<Option<Vec<_>>>()?;
-        initial.iter().any(Option::is_some).then_some(())?;
-        Some(Self { initial })
+        opposite.iter().any(Option::is_some).then_some(())?;
+        Some(Self { opposite })
+    }
+
+    /// The same on a mesh in which every node has another number; `None` where it lacks one of them.
+    pub fn renumbered(&self, new_of: &[Option<NodeId>]) -> Option<Self> {
+        let renumber = |opposite: &Option<Opposite>| match opposite {
+            None => Some(None),
+            Some(own) => {
+                let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
+                Some(Some(Opposite { nodes: [a?, b?, c?], ..*own }))
+            }
+        };
+        Some(Self { opposite: self.opposite.iter().map(renumber).collect::<Option<_>>()? })
     }
 
     /// Initial thickness [m] at every design node that has one, with the node's place in the design surface.
     pub fn at_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.initial.iter().enumerate().filter_map(|(i, t)| Some((i, (*t)?)))
+        self.opposite.iter().enumerate().filter_map(|(i, opposite)| Some((i, (*opposite)?.distance)))
     }
 
-    /// Least and greatest thickness [m] for the normal_displacements of the design nodes [m].
-    pub fn range(&self, normal_displacements: &[f64]) -> (f64, f64) {
-        self.at_nodes()
-            .map(|(i, t)| t + normal_displacements[i])
+    /// Nodes of all triangles opposite, some repeatedly.
+    pub fn opposite_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+        self.opposite.iter().flatten().flat_map(|opposite| opposite.nodes)
+    }
+
+    /// The wall behind every design node that has one, with the node's place in the design surface, where every node of the
+    /// mesh is at `place` [m].
+    pub fn walls<'a>(
+        &'a self,
+        surface: &'a DesignSurface,
+        place: impl Fn(NodeId) -> Point + 'a,
+    ) -> impl Iterator<Item = (usize, Wall)> + 'a {
+        self.opposite.iter().enumerate().filter_map(move |(i, opposite)| {
+            let nodes = (*opposite)?.nodes;
+            Some((i, wall((surface.nodes()[i], surface.directions()[i]), nodes, &place)))
+        })
+    }
+
+    /// Least and greatest thickness [m] on a moved mesh.
+    pub fn range(&self, surface: &DesignSurface, mesh: &Mesh) -> (f64, f64) {
+        self.walls(surface, |n| mesh.point(n))
+            .map(|(_, wall)| wall.thickness)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
+    }
+}
+
+/// The wall between a design node with its direction and a triangle.
+fn wall((node, direction): (NodeId, Point), opposite: [NodeId; 3], place: &impl Fn(NodeId) -> Point) -> Wall {
+    let (x, corners) = (place(node), opposite.map(place));
+    let normal = area_vector(corners);
+    let slope = dot(normal, direction);
+    let thickness = dot(normal, sub(x, corners[0])) / slope;
+    let foot: Point = std::array::from_fn(|d| x[d] - thickness * direction[d]);
+    let weights = barycentric(&corners, foot);
+    let derivative = |weight: f64| normal.map(|c| weight * c / slope);
+    let [a, b, c] = opposite;
+    let derivatives = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
+    Wall { thickness, derivatives: derivatives.map(|(n, weight)| (n, derivative(weight))) }
+}
+
+/// Faces of a body, found by rays.
+struct Faces {
+    nodes: Vec<[NodeId; 3]>,
+    corners: Vec<[Point; 3]>,
+    tree: BoxTree,
+}
+
+impl Faces {
+    fn new(mesh: &Mesh, nodes: Vec<[NodeId; 3]>) -> Self {
+        let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
+        let tree = BoxTree::new(corners.iter().map(reach).collect());
+        Self { nodes, corners, tree }
+    }
+
+    /// The nearest face that a ray meets; one that it runs along, if there is no other.
+    fn nearest(&self, origin: Point, direction: Point) -> Option<Opposite> {
+        let hits = self.tree.hits(origin, direction);
+        // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
+        let across = |i: &usize| !runs_along(direction, &self.corners[*i]);
+        let nearest = |of: &mut dyn Iterator<Item = usize>| {
+            let met = of.filter_map(|i| Some((distance(origin, direction, &self.corners[i])?, i)));
+            met.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let found = nearest(&mut hits.iter().copied().filter(across));
+        let (distance, i) = found.or_else(|| nearest(&mut hits.iter().copied()))?;
+        Some(Opposite { distance, nodes: self.nodes[i] })
     }
 }
 
@@ -95,13 +183,17 @@ fn distance(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<f6
     }
     let t = dot(normal, sub(triangle[0], origin)) / slope;
     let hit: Point = std::array::from_fn(|d| origin[d] + t * direction[d]);
-    // Barycentric coordinates by sub-areas.
-    let inside = (0..3).all(|k| {
-        let edge = sub(triangle[(k + 2) % 3], triangle[(k + 1) % 3]);
-        let share = 0.5 * dot(cross(edge, sub(hit, triangle[(k + 1) % 3])), normal) / (area * area);
-        share >= -RIM_TOLERANCE
-    });
+    let inside = barycentric(triangle, hit).into_iter().all(|share| share >= -RIM_TOLERANCE);
     (inside && t > RIM_TOLERANCE * area.sqrt()).then_some(t)
+}
+
+/// Barycentric coordinates of a point in the plane of a triangle, by sub-areas.
+fn barycentric(triangle: &[Point; 3], point: Point) -> Point {
+    let normal = area_vector(*triangle);
+    std::array::from_fn(|k| {
+        let edge = sub(triangle[(k + 2) % 3], triangle[(k + 1) % 3]);
+        0.5 * dot(cross(edge, sub(point, triangle[(k + 1) % 3])), normal) / dot(normal, normal)
+    })
 }
 
 #[cfg(test)]
@@ -120,7 +212,34 @@ mod tests {
                 .expect("every node is a variable");
         let plate = mesh.topology().region("plate").expect("the shield has it");
         let thickness = WallThickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
-        let (low, high) = thickness.range(&vec![0.001; surface.nodes().len()]);
-        assert!((low - 0.011).abs() < 1e-12 && (high - 0.011).abs() < 1e-12, "{low} {high}");
+        assert!(thickness.at_nodes().all(|(_, t)| (t - 0.010).abs() < 1e-12));
+        let held = |n: NodeId| {
+            let [x, y, z] = mesh.point(n);
+            let moves = surface.nodes().binary_search(&n).is_ok();
+            [x, y, if moves { z - 0.001 } else { z }]
+        };
+        let thick: Vec<f64> = thickness.walls(&surface, held).map(|(_, wall)| wall.thickness).collect();
+        assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
+    }
+
+    #[test]
+    fn a_wall_has_its_derivative_in_all_four_nodes() {
+        let places = [[0.2, 0.1, 1.1], [-0.4, -0.3, 0.1], [1.2, -0.1, 0.2], [0.1, 1.3, -0.1]];
+        let direction = [0.1, -0.2, 0.97];
+        let [node, opposite @ ..] = [0, 1, 2, 3].map(NodeId);
+        let at = |places: &[Point; 4]| wall((node, direction), opposite, &|n| places[n.index()]);
+        for (k, (own, derivative)) in at(&places).derivatives.into_iter().enumerate() {
+            assert_eq!(own, NodeId::new(k));
+            for d in 0..3 {
+                let shifted = |h: f64| {
+                    let mut moved = places;
+                    moved[k][d] += h;
+                    at(&moved).thickness
+                };
+                // Lengths of one: truncation 1e-8, rounding 1e-16 over 1e-4.
+                let difference = (shifted(1e-4) - shifted(-1e-4)) / 2e-4;
+                assert!((derivative[d] - difference).abs() < 1e-7, "{k} {d}: {} {difference}", derivative[d]);
+            }
+        }
     }
 }

@@ -59,19 +59,18 @@ impl Problem {
         progress.stage(Stage::Moving);
         let moved = self.moved(p)?;
         let remesh = clock.elapsed().as_secs_f64();
-        let mut analysis = self.analyse(moved, p, derivatives, cache, progress)?;
+        let mut analysis = self.analyse(moved, derivatives, cache, progress)?;
         analysis.timings.remesh += remesh;
         Ok(analysis)
     }
 
-    /// The second part of [`Problem::evaluate`]: on the mesh of the variables `p`, for callers that check that mesh first.
+    /// The second part of [`Problem::evaluate`]: on the mesh of the variables, for callers that check that mesh first.
     ///
     /// # Errors
     /// As [`Problem::evaluate`].
     pub fn analyse(
         &self,
         moved: Moved,
-        p: &[f64],
         derivatives: Derivatives,
         cache: &mut SolverCache,
         progress: &mut dyn Progress,
@@ -88,7 +87,7 @@ impl Problem {
         let gradient = differentiated
             .map(|shape| shape.pull_back("the objective", &sums.objective.nodal))
             .transpose()?;
-        let constraints = self.measure_constraints(p, &mesh, shape, &sums)?;
+        let constraints = self.measure_constraints(&mesh, shape, &sums)?;
         timings.remesh += clock.lap();
         let Sums { objective, solutions, events, .. } = sums;
         let quality = self.quality(&mesh);
@@ -156,17 +155,16 @@ impl Problem {
         })
     }
 
-    /// All constraints in their order, from the sums over the states, the mesh and the variables.
+    /// All constraints in their order, from the sums over the states and the mesh.
     fn measure_constraints(
         &self,
-        p: &[f64],
         mesh: &Mesh,
         differentiated: Option<&Shape>,
         sums: &Sums<'_>,
     ) -> Result<Vec<Measured>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let of = |(k, constraint): (usize, &Constraint)| {
-            if let Some((value, gradient)) = constraint.of_shape(p, mesh, shape)? {
+            if let Some((value, gradient)) = constraint.of_shape(mesh, shape)? {
                 return Ok(Measured { value, gradient: differentiated.map(|_| gradient) });
             }
             let position = sums.fields.iter().position(|(number, _)| *number == k);

@@ -188,7 +188,7 @@ impl Problem {
             // Of the undeformed mesh's motion, as a run has it, and not of the round around `p`.
             let (p, cache) = (shape.initial(), &mut SolverCache::default());
             let moved = shape.from_undeformed(p)?;
-            initial = self.analyse(moved, p, Derivatives::None, cache, &mut NoProgress)?;
+            initial = self.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
             &initial.constraints
         } else {
             &analysis.constraints

@@ -16,6 +16,7 @@ use super::panels::Update;
 use super::scalar::PanelScalar;
 use super::schedule::{Branch, Task, for_each_in_parallel, indices_in_parallel};
 use crate::error::MeshError;
+use crate::fem::workspace;
 
 /// Rows of a tile. Every tile reads the columns' rows of an update again, each from another page of memory: tiles of half the
 /// size cost up to a fifth of the time, larger ones leave too few of them to work on at the same time.
@@ -54,6 +55,8 @@ pub(super) fn factor<T: PanelScalar>(
     entry: &Entry<'_, T>,
 ) -> Result<Ldlt<T>, MeshError> {
     let count = analysis.panels.len();
+    workspace::check(analysis.factor_entries() * size_of::<T>())
+        .map_err(|cause| MeshError::Factorisation { unknowns: analysis.size(), cause })?;
     let factorisation = Factorisation {
         analysis,
         entry,

@@ -228,12 +228,20 @@ fn surfaces(
     Ok(surfaces)
 }
 
-/// Finds the elements of an overfull face in the file; repeated elements are the better explanation.
+/// Finds the elements that overlap in the file; repeated elements are the better explanation.
 fn overlap(contents: &Contents<'_>, renumbered: &[u32], error: &MeshError) -> MshError {
-    let MeshError::OverfullFace { face } = error else { return refused(contents, error) };
-    if let Some(repeated) = repetition(contents) {
+    let overlaps = matches!(error, MeshError::OverfullFace { .. } | MeshError::Folded { .. });
+    if let Some(repeated) = repetition(contents).filter(|_| overlaps) {
         return repeated;
     }
+    if let MeshError::Folded { elements } = error {
+        let [other, tet] = elements.map(|e| contents.tetrahedra[e.index()]);
+        let regions = Box::new([tet, other].map(|tet| contents.names.of(3, tet.group)));
+        let centroid = tet4::centroid(tet.nodes.map(|n| contents.nodes.points()[n as usize]));
+        let fault = MshFault::Folded { other: other.tag, regions, centroid };
+        return contents.cursor.fault_at(tet.place, Subject::Element(tet.tag), fault);
+    }
+    let MeshError::OverfullFace { face } = error else { return refused(contents, error) };
     let old = face.map(|node| renumbered.iter().position(|&n| n == node.0).unwrap_or(0) as u32);
     let has_face = |tet: &&super::reader::Tetrahedron| old.iter().all(|n| tet.nodes.contains(n));
     let mut around: Vec<_> = contents.tetrahedra.iter().filter(has_face).collect();

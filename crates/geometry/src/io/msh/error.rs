@@ -259,6 +259,20 @@ pub enum MshFault {
         /// Tags of the nodes of the face.
         face: [u64; 3],
     },
+    /// Two tetrahedra lie on the same side of a common face.
+    #[error(
+        "it lies on the same side of a common face as element {other}, in `{}` and `{}`, at {centroid:?} m: the mesh is folded, \
+         as where a node was moved through a face, extruded layers cross, or a volume was meshed twice; mesh the geometry again",
+        regions[0], regions[1]
+    )]
+    Folded {
+        /// The tag of the other.
+        other: u64,
+        /// Regions of both.
+        regions: Box<[String; 2]>,
+        /// Centroid of the tetrahedron [m].
+        centroid: [f64; 3],
+    },
     /// A physical volume holds other shapes than tetrahedra.
     #[error(
         "a {shape} stands in the physical volume `{group}`: only tetrahedra of first and second order are read; mesh the volume with them"

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BinaryHeap, HashMap};
 use crate::error::MeshError;
 use crate::ids::NodeId;
 use crate::mesh::Mesh;
+use crate::topology::same_turn;
 
 /// Triangles that lie in the same surfaces.
 pub(super) struct Shell {
@@ -70,11 +71,6 @@ fn common_order(count: usize, chains: &[Vec<usize>]) -> Vec<usize> {
     // What still waits is part of a contradiction, or behind one.
     order.extend((0..count).filter(|&i| waits_for[i] > 0));
     order
-}
-
-/// Whether two orders of the same three nodes have the same normal.
-fn same_turn(a: [NodeId; 3], b: [NodeId; 3]) -> bool {
-    (0..3).any(|shift| (0..3).all(|k| a[k] == b[(k + shift) % 3]))
 }
 
 #[cfg(test)]

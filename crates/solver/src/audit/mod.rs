@@ -2,10 +2,15 @@
 //!
 //! A linear element thicker than the skin depth cannot follow the decay `e^{−x/δ}`: with one element through a plate of
 //! 11 skin depths the field behind it was measured three times too large, with the wrong sign of the thickness effect
-//! (docs/verification.md). The audit looks at the first layer of elements under every conductor face.
+//! (docs/verification.md). The audit looks at the first layer of elements under every conductor face, and at all others down
+//! to three depths (`layers`).
+
+mod layers;
+
+pub use layers::CoarseLayers;
 
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
-use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use crate::material::Material;
 use crate::space::Order;
@@ -30,6 +35,8 @@ pub struct SkinAudit {
     pub least_elements_per_skin_depth: f64,
     /// Share of the surface whose first layer is thicker than `δ`.
     pub coarse_share: f64,
+    /// Elements further down that are too coarse, where there are any.
+    pub coarse_layers: Option<CoarseLayers>,
     /// Mean thickness `2 V/S` over the skin depth.
     pub thickness_in_skin_depths: f64,
 }
@@ -37,18 +44,29 @@ pub struct SkinAudit {
 impl SkinAudit {
     /// What to tell the user of a conductor whose volume is meshed.
     pub fn volume_warning(&self) -> Option<String> {
-        (self.coarse_share > TOLERATED_SHARE).then(|| {
-            format!(
-                "region `{}`: the first element layer is too thick for the skin depth ({:.3} mm) on {:.0} % of the \
+        let (delta, depths) = (self.skin_depth * 1e3, self.thickness_in_skin_depths);
+        let instead =
+            format!("use model = \"impedance\" (the region is {depths:.1} skin depths thick on average)");
+        if self.coarse_share > TOLERATED_SHARE {
+            return Some(format!(
+                "region `{}`: the first element layer is too thick for the skin depth ({delta:.3} mm) on {:.0} % of the \
                  surface (median {:.2} elements per skin depth): the field behind it will be wrong. Refine the skin, \
-                 or use model = \"impedance\" (the region is {:.1} skin depths thick on average)",
+                 or {instead}",
                 self.region,
-                self.skin_depth * 1e3,
                 self.coarse_share * 100.0,
                 self.median_elements_per_skin_depth,
-                self.thickness_in_skin_depths
-            )
-        })
+            ));
+        }
+        let layers = self.coarse_layers.filter(|layers| layers.share > TOLERATED_SHARE)?;
+        Some(format!(
+            "region `{}`: below the first layer the elements are too thick for the skin depth ({delta:.3} mm) on {:.0} % of the \
+             surface: one that begins {:.1} skin depths deep is {:.1} thick, and losses will be wrong. Refine the skin down to \
+             three skin depths, or {instead}",
+            self.region,
+            layers.share.min(1.0) * 100.0,
+            layers.from,
+            layers.thickness,
+        ))
     }
 
     /// What to tell the user of a conductor that an impedance surface replaces.
@@ -61,6 +79,19 @@ impl SkinAudit {
                 self.thickness_in_skin_depths,
                 self.skin_depth * 1e3,
                 IMPEDANCE_THICKNESS
+            )
+        })
+    }
+
+    /// What to tell the user of a design of which so much [m] is left where an impedance surface stands for it.
+    pub fn wall_warning(&self, thickness: f64) -> Option<String> {
+        let depths = thickness / self.skin_depth;
+        (depths < IMPEDANCE_THICKNESS).then(|| {
+            format!(
+                "region `{}` is {:.3} mm thick at its thinnest place, {depths:.1} skin depths; an impedance surface assumes \
+                 {IMPEDANCE_THICKNESS} or more",
+                self.region,
+                thickness * 1e3
             )
         })
     }
@@ -78,11 +109,11 @@ pub fn skin_audit(
 ) -> Option<SkinAudit> {
     let skin_depth = material.skin_depth(2.0 * std::f64::consts::PI * frequency)?;
     let topology = mesh.topology();
-    let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
+    let region_at = |e: ElementId| topology.region_of()[e.index()];
     let volume_sum: f64 = topology.elements_of(region).into_iter().map(|e| volume(mesh.vertices(e))).sum();
 
     // (elements per skin depth, area) of every face towards another region; symmetry planes are no faces.
-    let mut layers = Vec::new();
+    let (mut layers, mut faces) = (Vec::new(), Vec::new());
     for facet in topology.facets() {
         let Some(outside) = facet.outside else { continue };
         let element = match (region_at(facet.inside) == region, region_at(outside) == region) {
@@ -93,6 +124,7 @@ pub fn skin_audit(
         let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
         let height = 3.0 * volume(mesh.vertices(element)) / area;
         layers.push((order.degree() as f64 * skin_depth / height, area));
+        faces.push(facet.nodes);
     }
     let surface: f64 = layers.iter().map(|l| l.1).sum();
     layers.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -112,6 +144,7 @@ pub fn skin_audit(
         median_elements_per_skin_depth: median,
         least_elements_per_skin_depth: least,
         coarse_share: coarse / surface,
+        coarse_layers: layers::coarse_layers(mesh, region, &faces, skin_depth, order),
         thickness_in_skin_depths: 2.0 * volume_sum / surface / skin_depth,
     })
 }

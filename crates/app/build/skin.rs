@@ -1,0 +1,140 @@
+//! Skin-depth audits of the conductors: of the mesh as it is, at the bounds of the design, and of a design that was found.
+
+use fluxmorph_geometry::tet4::{Point, add};
+use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_optimizer::problem::{Problem, Shape};
+use fluxmorph_solver::audit::{SkinAudit, skin_audit};
+
+use super::{field, material};
+use crate::config::{self, Config, Limit, RegionModel};
+
+/// The audit of one conductor and how it is modelled.
+#[derive(Debug)]
+pub struct Audited {
+    /// What was found.
+    pub audit: SkinAudit,
+    /// Meshed, or replaced by its impedance surface.
+    pub model: RegionModel,
+}
+
+impl Audited {
+    /// The warning for the user, if there is one.
+    pub fn warning(&self) -> Option<String> {
+        let (coarse, thin) = (self.audit.volume_warning(), self.audit.impedance_warning());
+        let depths = self.audit.thickness_in_skin_depths;
+        match self.model {
+            // Neither model must send to the other where that one has an objection too.
+            RegionModel::Volume if thin.is_some() => coarse.map(|text| {
+                let what = text.split(". Refine the skin").next().unwrap_or_default();
+                format!(
+                    "{what}. Refine the skin: at {depths:.1} skin depths on average the region is too thin for an impedance \
+                     surface"
+                )
+            }),
+            RegionModel::Volume => coarse,
+            RegionModel::Impedance if coarse.is_some() => thin.map(|text| {
+                format!("{text} with thinner elements at its surface: these are too thick for the skin depth")
+            }),
+            RegionModel::Impedance => thin,
+            RegionModel::Perfect => None,
+        }
+    }
+}
+
+/// Audits of all conductors that a mesh holds, at all frequencies.
+pub(super) fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
+    let of = |(name, region): (&String, &config::Region)| {
+        let id = mesh.topology().region(name).ok()?;
+        let material = material(config, name);
+        let at = |&frequency: &f64| {
+            let audit = skin_audit(mesh, id, &material, frequency, field::order(config))?;
+            Some(Audited { audit, model: region.model })
+        };
+        Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
+    };
+    let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
+    config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
+}
+
+/// What the audits, without objection to the mesh as it is, have against the designs at the bounds.
+pub(super) fn bound_warnings(
+    config: &Config,
+    audits: &[Audited],
+    problem: &Problem,
+    body: Option<&str>,
+) -> Vec<String> {
+    let Some(shape) = problem.shape() else { return Vec::new() };
+    let mut warnings = Vec::new();
+    for (key, p) in [("design.lower", shape.lower()), ("design.upper", shape.upper())] {
+        let sound = audits.iter().filter(|audited| audited.warning().is_none());
+        let thinnest = thinnest(config, problem.original(), shape, p);
+        let walls = sound.filter(|own| Some(own.audit.region.as_str()) == body);
+        let thin = walls.filter_map(|own| wall_warning(own, thinnest?));
+        warnings.extend(thin.map(|text| {
+            format!(
+                "at {key} {text}. Take a bound nearer to zero, or a constraint of kind = \"thickness\" with a minimum"
+            )
+        }));
+        // Where the mesh does not come to a bound in one step, the audit of the result is the next one.
+        let Ok(moved) = problem.moved(p) else { continue };
+        warnings.extend(new_objections(config, audits, &moved.mesh).map(|text| format!("at {key}: {text}")));
+    }
+    warnings
+}
+
+/// What the audits have against the mesh and the least thickness [m] of a design, but for what they had against the mesh at
+/// the start.
+pub(crate) fn result_warnings(
+    config: &Config,
+    audits: &[Audited],
+    mesh: &Mesh,
+    thinnest: Option<(&str, f64)>,
+) -> Vec<String> {
+    let wall = |own: &Audited| {
+        let (_, thickness) = thinnest.filter(|(region, _)| *region == own.audit.region)?;
+        wall_warning(own, thickness)
+    };
+    let sound = audits.iter().filter(|audited| audited.warning().is_none());
+    sound.filter_map(wall).chain(new_objections(config, audits, mesh)).collect()
+}
+
+/// Objections to meshed conductors of a moved mesh to which there was none at the start.
+fn new_objections<'a>(
+    config: &'a Config,
+    audits: &'a [Audited],
+    mesh: &'a Mesh,
+) -> impl Iterator<Item = String> + 'a {
+    let meshed = |own: &&Audited| own.model == RegionModel::Volume && own.warning().is_none();
+    let is_new = move |now: &Audited| {
+        let same = |then: &&Audited| {
+            (&then.audit.region, then.audit.skin_depth) == (&now.audit.region, now.audit.skin_depth)
+        };
+        audits.iter().filter(meshed).any(|then| same(&then))
+    };
+    self::audits(config, mesh).into_iter().filter(is_new).filter_map(|now| now.warning())
+}
+
+/// What an impedance surface of a wall of this thickness [m] assumes in vain.
+fn wall_warning(audited: &Audited, thickness: f64) -> Option<String> {
+    (audited.model == RegionModel::Impedance).then(|| audited.audit.wall_warning(thickness)).flatten()
+}
+
+/// The least thickness [m] of the designed body for the variables `p`, with its opposite face as it was, or the least that a
+/// constraint allows.
+fn thinnest(config: &Config, mesh: &Mesh, shape: &Shape, p: &[f64]) -> Option<f64> {
+    let surface = shape.surface();
+    let displacement = shape.displacement(p);
+    let place = |node: NodeId| -> Point {
+        match surface.nodes().binary_search(&node) {
+            Ok(i) => add(mesh.point(node), displacement[i]),
+            Err(_) => mesh.point(node),
+        }
+    };
+    let walls = shape.thickness()?.walls(surface, place).map(|(_, wall)| wall.thickness);
+    let least = walls.fold(f64::INFINITY, f64::min);
+    let minimum = |constraint: &config::Constraint| match constraint.limit {
+        Limit::Thickness { minimum, .. } => minimum,
+        _ => None,
+    };
+    Some(config.constraints.iter().filter_map(minimum).fold(least, f64::max))
+}

@@ -1,0 +1,228 @@
+//! What is wrong with a mesh although every element of it is sound: in words, with region, place and the usual cause.
+//!
+//! What `fluxmorph_geometry::soundness` finds is refused here, or told, at the key that it comes from.
+
+use std::collections::{BTreeSet, HashSet};
+
+use fluxmorph_geometry::soundness::{
+    Contact, Hull, Leaning, Meeting, OpenPatch, Situation, contacts, leaning_layers, open_patches,
+    separate_parts,
+};
+use fluxmorph_geometry::tet4::{self, centroid, norm, sub};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
+
+use super::{material, millimetres};
+use crate::config::{Boundaries, Config, Diagnostic, MeshConfig, SourceMap};
+
+/// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
+const USUAL: [f64; 2] = [1e-3, 30.0];
+
+/// Share of a mesh that is air in devices with air around them.
+const MOSTLY: f64 = 0.75;
+
+/// Most places of one kind that are listed.
+const MOST_LISTED: usize = 6;
+
+/// What to do with volumes that share no nodes.
+const FRAGMENTS: &str = "usual cause: the volumes were not cut with each other before they were meshed (in Gmsh `BooleanFragments` or \
+                         `Coherence`), or files were put together and doubled nodes not merged (`Coherence Mesh`)";
+
+/// What is known of a mesh's outside.
+#[derive(Debug, Default)]
+pub(super) struct Outside {
+    /// Outer faces without condition, where that may be meant.
+    pub(super) open: Vec<OpenPatch>,
+    /// What is rarely meant.
+    pub(super) warnings: Vec<String>,
+}
+
+/// Parts of a mesh file that overlap, or touch without common nodes.
+pub(super) fn contact_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
+    if !matches!(config.mesh, MeshConfig::File { .. }) {
+        return Vec::new();
+    }
+    let hull = Hull::new(mesh);
+    let found = contacts(&hull, &with_condition(config, &hull));
+    found.iter().take(MOST_LISTED).map(|contact| contact_fault(source, mesh, contact)).collect()
+}
+
+/// Holes, walls and parts that no condition of a field problem reaches, and the sides where none is given.
+///
+/// # Errors
+/// Those of which it cannot be said that they are meant: holes, and faces of no named surface.
+pub(super) fn outside(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<Outside, Vec<Diagnostic>> {
+    let hull = Hull::new(mesh);
+    let patches = open_patches(&hull, &with_condition(config, &hull));
+    let named = named_faces(mesh.topology());
+    let is_named =
+        |patch: &OpenPatch| patch.faces.iter().all(|&f| named.contains(&face_key(hull.faces()[f].nodes)));
+    let (mut outside, mut faults) = (Outside::default(), parts_fault(source, mesh));
+    for patch in patches {
+        let text = patch_text(mesh.topology(), &patch);
+        match patch.situation {
+            Situation::Side => outside.open.push(patch),
+            Situation::Inward | Situation::BesideCondition if is_named(&patch) => {
+                outside.warnings.push(format!("{text}: the field is left normal to it, as in flux_normal"));
+                outside.open.push(patch);
+            }
+            _ => faults.push(patch_fault(source, &patch, text)),
+        }
+    }
+    faults.truncate(MOST_LISTED);
+    if faults.is_empty() { Ok(outside) } else { Err(faults) }
+}
+
+/// Layers under the design surfaces of a mesh file that lean.
+pub(super) fn layer_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let is_file = matches!(config.mesh, MeshConfig::File { .. });
+    let surfaces = config.design.iter().flat_map(|design| &design.surface).filter(|_| is_file);
+    surfaces.filter_map(|surface| layer_warning(mesh, surface)).collect()
+}
+
+fn layer_warning(mesh: &Mesh, surface: &str) -> Option<String> {
+    let Leaning { share, lean, height, place } =
+        leaning_layers(mesh, mesh.topology().surface(surface).ok()?)?;
+    Some(format!(
+        "the layers of elements beside `{surface}` lean on {:.0} % of it: at {} by {:.3} mm over a height of {:.3} mm. A design \
+         that moves this surface shears them; mesh both ends of an extrusion alike, node above node",
+        100.0 * share,
+        millimetres(place),
+        lean * 1e3,
+        height * 1e3
+    ))
+}
+
+/// A mesh file of an unusual size.
+pub(super) fn unit_warning(config: &Config, mesh: &Mesh) -> Option<String> {
+    let MeshConfig::File { unit, .. } = &config.mesh else { return None };
+    let [low, high] = mesh.bounding_box();
+    let size = norm(sub(high, low));
+    let [least, most] = USUAL;
+    (size < least || size > most).then(|| {
+        format!(
+            "the mesh is {size:.4e} m from corner to corner: check mesh.unit, which is \"{}\"",
+            unit.name()
+        )
+    })
+}
+
+/// Iron or a conductor where air is expected.
+pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
+    let MeshConfig::File { .. } = &config.mesh else { return None };
+    let topology = mesh.topology();
+    let mut volumes = vec![0.0; topology.region_names().len()];
+    for element in topology.elements() {
+        volumes[topology.region_of()[element.index()].index()] += tet4::volume(mesh.vertices(element));
+    }
+    let whole: f64 = volumes.iter().sum();
+    let (name, volume) =
+        topology.region_names().iter().zip(volumes).max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let own = material(config, name);
+    let is_matter = own.relative_permeability != 1.0 || own.conductivity > 0.0;
+    (is_matter && volume > MOSTLY * whole).then(|| {
+        format!(
+            "the region `{name}`, which is iron or conducts, fills {:.0} % of the mesh: are the groups of two regions swapped?",
+            100.0 * volume / whole
+        )
+    })
+}
+
+/// For every face of a hull whether [boundaries] names a surface that it belongs to.
+fn with_condition(config: &Config, hull: &Hull<'_>) -> Vec<bool> {
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
+    let applied = uniform_field.iter().flat_map(|field| &field.surfaces);
+    let faces: HashSet<[NodeId; 3]> = flux_parallel
+        .iter()
+        .chain(flux_normal)
+        .chain(applied)
+        .filter_map(|name| hull.mesh().topology().surface(name).ok())
+        .flatten()
+        .map(|nodes| face_key(*nodes))
+        .collect();
+    hull.faces().iter().map(|facet| faces.contains(&face_key(facet.nodes))).collect()
+}
+
+fn named_faces(topology: &Topology) -> HashSet<[NodeId; 3]> {
+    let surfaces = topology.surface_names().filter_map(|name| topology.surface(name).ok());
+    surfaces.flatten().map(|nodes| face_key(*nodes)).collect()
+}
+
+fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnostic {
+    let name = |region: RegionId| mesh.topology().region_names()[region.index()].clone();
+    let [a, b] = contact.regions.map(name);
+    let who = match (contact.meeting, a == b) {
+        (Meeting::Touching, true) => {
+            format!("the region `{a}` is cut: its two sides touch without common nodes")
+        }
+        (Meeting::Touching, false) => format!("the regions `{a}` and `{b}` touch without common nodes"),
+        (Meeting::Overlapping, true) => format!("the region `{a}` overlaps itself"),
+        (Meeting::Overlapping, false) => format!("the regions `{a}` and `{b}` overlap"),
+    };
+    let how_much = match contact {
+        Contact { faces: 0, nodes, doubled, .. } => format!("{nodes} nodes, {doubled} of them doubled"),
+        Contact { faces, area, .. } => format!("{faces} faces of {:.4} cm²", area * 1e4),
+    };
+    let message = format!("{who}, at {} and elsewhere: {how_much}", millimetres(contact.place));
+    source
+        .diagnostic("mesh.file", message)
+        .expected("regions that share the nodes between them: nothing passes from one to the other else")
+        .help(FRAGMENTS)
+}
+
+fn parts_fault(source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
+    let parts = separate_parts(mesh);
+    if parts.len() < 2 {
+        return Vec::new();
+    }
+    let names: BTreeSet<String> = parts
+        .iter()
+        .take(MOST_LISTED)
+        .map(|part| {
+            let names = part.regions.iter().map(|region| &*mesh.topology().region_names()[region.index()]);
+            let names = names.collect::<Vec<_>>().join("`, `");
+            format!("`{names}` at {}", millimetres(centroid(mesh.vertices(part.first))))
+        })
+        .collect();
+    let list = names.into_iter().collect::<Vec<_>>().join("; ");
+    let message = format!("the mesh falls into {} parts that share no node: {list}", parts.len());
+    vec![
+        source
+            .diagnostic("mesh", message)
+            .expected("one mesh, air between the bodies included")
+            .help(FRAGMENTS),
+    ]
+}
+
+/// What a patch is, where and how large.
+fn patch_text(topology: &Topology, patch: &OpenPatch) -> String {
+    let region = &topology.region_names()[patch.region.index()];
+    let what = match patch.situation {
+        Situation::Side => "an outer side",
+        Situation::Inward => "a wall that stands into the mesh",
+        Situation::BesideCondition => "a part of a side whose rest has a condition",
+        Situation::Hole => "the wall of a hole",
+    };
+    format!(
+        "{what} has no condition in [boundaries]: {} faces of `{region}`, {:.4} cm², at {}",
+        patch.faces.len(),
+        patch.area * 1e4,
+        millimetres(patch.place)
+    )
+}
+
+fn patch_fault(source: &SourceMap, patch: &OpenPatch, text: String) -> Diagnostic {
+    let (expected, help) = match patch.situation {
+        Situation::Hole => (
+            "a mesh without holes, or a condition on their walls",
+            "usual cause: a volume that was not meshed or belongs to no physical group, or elements that were lost; for a body \
+             left out on purpose, put its wall into a physical surface and name it in flux_parallel or flux_normal",
+        ),
+        _ => (
+            "the whole side in the surface that has the condition, or its rest in another",
+            "usual cause: triangles that are missing from the physical surface, or a volume that is missing from the mesh; where \
+             it is meant, put these faces into a physical surface, and name it in flux_parallel or flux_normal",
+        ),
+    };
+    source.diagnostic("boundaries", text).expected(expected).help(help)
+}

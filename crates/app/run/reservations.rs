@@ -1,0 +1,95 @@
+//! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins
+//! that the mesh or the impedance surface of that design does not carry.
+//!
+//! `check` cannot know any of it. It is said at the end of a run or an analysis, and kept in `result.json`.
+
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::ElementId;
+use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_solver::{FieldModel, FieldSolution};
+
+use crate::build::{Setup, material, millimetres, result_warnings};
+use crate::config::Config;
+
+/// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
+/// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.
+const SATURATION: f64 = 2.0;
+
+/// Share of a region's volume that must lie beyond it: elements at re-entrant corners have a field that grows with refinement.
+const TOLERATED_SHARE: f64 = 1e-3;
+
+/// Iron that is driven beyond saturation.
+struct Saturated {
+    /// Highest flux density [T] and the middle of its element [m].
+    highest: (f64, Point),
+    /// Volume beyond saturation [m³].
+    beyond: f64,
+    /// Volume of the region [m³].
+    whole: f64,
+}
+
+/// All that is to be said of the design of an analysis.
+pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<String> {
+    let problem = &setup.problem;
+    let mut all = saturation(config, problem, analysis);
+    let least = problem.shape().and_then(|shape| {
+        let thickness = shape.thickness()?.range(shape.surface(), &analysis.mesh).0;
+        Some((setup.designed_body.as_deref()?, thickness))
+    });
+    all.extend(result_warnings(config, &setup.audits, &analysis.mesh, least));
+    all
+}
+
+fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<String> {
+    let states = problem.states().iter().zip(&analysis.solutions).zip(config.analysis.frequencies());
+    states
+        .flat_map(|((model, solution), frequency)| {
+            let beyond = saturated(config, model, solution, analysis);
+            beyond.into_iter().map(move |(region, found)| {
+                let (highest, place) = found.highest;
+                format!(
+                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz, at {}, and {:.1} % of it \
+                     are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
+                     that of a material that does not exist. Lower the ampere-turns, or give the iron more section",
+                    millimetres(place),
+                    100.0 * found.beyond / found.whole
+                )
+            })
+        })
+        .collect()
+}
+
+/// Meshed iron beyond saturation, by region.
+fn saturated(
+    config: &Config,
+    model: &FieldModel,
+    solution: &FieldSolution,
+    analysis: &Analysis,
+) -> BTreeMap<String, Saturated> {
+    let mesh = &analysis.mesh;
+    let topology = mesh.topology();
+    // The polarisation is B (1 − 1/µ): what the region adds to the field of air.
+    let share = |name: &String| 1.0 - 1.0 / material(config, name).relative_permeability;
+    let shares: Vec<f64> = topology.region_names().iter().map(share).collect();
+    let share_at = |e: &ElementId| shares[topology.region_of()[e.index()].index()];
+    let iron: Vec<ElementId> = topology.elements().filter(|e| share_at(e) > 0.0).collect();
+    let mut found: BTreeMap<String, Saturated> = BTreeMap::new();
+    for (&e, b) in iron.iter().zip(solution.flux_densities_of(model, mesh, &iron)) {
+        let magnitude = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let own = found.entry(topology.region_name_at(e).to_owned()).or_insert(Saturated {
+            highest: (0.0, [0.0; 3]),
+            beyond: 0.0,
+            whole: 0.0,
+        });
+        let size = volume(mesh.vertices(e));
+        own.whole += size;
+        own.beyond += if share_at(&e) * magnitude > SATURATION { size } else { 0.0 };
+        if magnitude > own.highest.0 {
+            own.highest = (magnitude, centroid(mesh.vertices(e)));
+        }
+    }
+    found.retain(|_, own| own.beyond > TOLERATED_SHARE * own.whole);
+    found
+}

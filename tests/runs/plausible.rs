@@ -1,0 +1,110 @@
+//! What can be computed and cannot be meant: said by `check` where it can be known, and at the end of a run where it cannot.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::folder::{RunFolder, list, number, read_text};
+use crate::support::program::{command, finish, folder};
+use crate::support::shield::quick;
+
+/// The quick shield with its plate meshed.
+const MESHED: [&str; 2] = ["regions.plate.model=volume", "remesh.region=[\"plate\", \"remesh\"]"];
+
+fn set<'a>(overrides: &[&'a str]) -> Vec<&'a str> {
+    overrides.iter().flat_map(|one| ["--set", *one]).collect()
+}
+
+/// The warnings of `check`.
+fn check(overrides: &[&str]) -> String {
+    let json = finish(command(&[&"check", &quick(), &"--json"]).args(set(overrides))).exits_with(0).json();
+    texts(&json["warnings"])
+}
+
+fn texts(warnings: &Value) -> String {
+    let list = warnings.as_array().map(Vec::as_slice).unwrap_or_default();
+    list.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("\n")
+}
+
+/// The warnings in the result of `solve`, which standard error holds too.
+fn solve(out: &Path, overrides: &[&str]) -> String {
+    let arguments = ["--out", out.to_str().expect("UTF-8"), "--force"];
+    let said =
+        finish(command(&[&"solve", &quick()]).args(arguments).args(set(overrides))).exits_with(0).stderr;
+    let warnings = texts(&RunFolder(out.to_owned()).result()["warnings"]);
+    for line in warnings.lines() {
+        assert!(said.contains(line), "{line}\nis missing in\n{said}");
+    }
+    warnings
+}
+
+#[test]
+fn steel_beyond_saturation_is_named_with_its_place() {
+    let home = folder();
+    let out = home.path().join("out");
+    let found = solve(&out, &MESHED);
+    for part in ["iron beyond saturation: |B| in `plate` reaches", "T at 60 Hz, at (", "beyond 2 T"] {
+        assert!(found.contains(part), "no `{part}` in: {found}");
+    }
+    // Copper has no polarisation, whatever its field.
+    let copper = [&MESHED[..], &["materials.steel.relative_permeability=1"]].concat();
+    assert!(!solve(&out, &copper).contains("saturation"));
+}
+
+#[test]
+fn skins_are_audited_in_depth_at_the_bounds_and_of_the_result() {
+    let thin = ["mesh.shield.skin=[\"0.4 mm\"]", "mesh.shield.side_skin=[\"0.5 mm\"]"];
+    let found = check(&[&MESHED[..], &thin].concat());
+    assert!(found.contains("below the first layer the elements are too thick"), "{found}");
+    assert_eq!(check(&[]), "", "5 mm are 5.8 skin depths");
+    let bound = "design.lower=-9 mm";
+    let found = check(&[bound]);
+    for part in
+        ["at design.lower region `plate` is 1.000 mm thick", "1.2 skin depths", "kind = \"thickness\""]
+    {
+        assert!(found.contains(part), "no `{part}` in: {found}");
+    }
+    let home = folder();
+    let found = solve(&home.path().join("out"), &[bound, "design.initial=-0.008"]);
+    assert!(found.contains("region `plate` is 2.000 mm thick at its thinnest place"), "{found}");
+}
+
+#[test]
+fn advice_does_not_go_in_a_circle() {
+    // The plate of 10 mm is 3.6 skin depths thick.
+    let slow = "analysis.frequency=6.7";
+    let meshed = check(&[&MESHED[..], &[slow]].concat());
+    assert!(meshed.contains("too thin for an impedance surface"), "{meshed}");
+    assert!(!meshed.contains("model = \"impedance\""), "{meshed}");
+    let surface = check(&[slow]);
+    assert!(
+        surface.contains("an impedance surface assumes") && surface.contains("thinner elements"),
+        "{surface}"
+    );
+}
+
+#[test]
+fn two_windings_at_one_place_are_warned_of() {
+    let home = folder();
+    let text = read_text(&quick());
+    let start = text.find("[[coils]]").expect("a coil");
+    let coil = &text[start..text.find("[boundaries]").expect("boundaries")];
+    let twice = text.replace(coil, &format!("{coil}{}", coil.replace("name = \"coil\"", "name = \"twin\"")));
+    let config = home.path().join("twice.toml");
+    std::fs::write(&config, twice).expect("written");
+    let json = finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json();
+    let found = texts(&json["warnings"]);
+    assert!(found.contains("`coil` and `twin` are the same winding at the same place"), "{found}");
+}
+
+#[test]
+fn sides_without_condition_are_listed_with_their_areas() {
+    let sides = "boundaries.flux_parallel=[\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_max\"]";
+    let arguments = ["--json", "--set", sides];
+    let json = finish(command(&[&"check", &quick()]).args(arguments)).exits_with(0).json();
+    let [side] = list(&json, "/open_sides") else { panic!("{}", json["open_sides"]) };
+    // The lower side, 600 x 720 mm.
+    assert!((number(side, "/area_m2") - 0.6 * 0.72).abs() < 1e-12, "{side}");
+    let text = finish(command(&[&"check", &quick()]).args(["--set", sides])).exits_with(0).stdout;
+    assert!(text.contains("no condition, field normal") && text.contains("4320.0000"), "{text}");
+}
