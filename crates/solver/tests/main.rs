@@ -1,10 +1,12 @@
 //! Tests of the crate from outside: sources, grounding, and the ladder of linear solvers under injected failures.
 
+mod applied;
 mod coil_regions;
 mod edge;
 mod grounding;
 mod guards;
 mod prisms;
+mod sheet;
 mod sources;
 mod two_level;
 
