@@ -144,6 +144,7 @@ fn build_problem(
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probe_faults(config, source, &full_mesh, &mesh);
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
+    faults.extend(plausible::element_faults(config, source, &full_mesh, &audits));
     let mut sink = DiagnosticSink::new(config, source, faults);
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     if conductors.is_empty() && !motion_alone {
