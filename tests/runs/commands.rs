@@ -200,13 +200,23 @@ fn a_thicker_plate_shields_better_in_both_models() {
 }
 
 #[test]
-fn nodal_elements_beside_iron_are_warned_of_with_the_cure() {
+fn nodal_elements_beside_iron_are_refused_or_warned_of_with_the_cure() {
     let pole = repository("configs/pole.toml");
-    let nodal = |order: &str| {
+    let iron = |elements: &str, order: u8, permeability: u32| {
+        let elements = format!("analysis.elements={elements}");
         let order = format!("analysis.order={order}");
-        fluxmorph(&[&"check", &pole, &"--set", &"analysis.elements=nodal", &"--set", &order])
+        let iron = format!("materials.iron.relative_permeability={permeability}");
+        fluxmorph(&[&"check", &pole, &"--set", &elements, &"--set", &order, &"--set", &iron])
     };
-    nodal("1").with(0, &["region `iron`", "wrong by factors", "analysis.elements = \"edge\""]);
-    nodal("2").with(0, &["region `iron`", "most of its flux", "analysis.elements = \"edge\""]);
-    assert!(!fluxmorph(&[&"check", &pole]).with(0, &[]).stderr.contains("nodal elements"));
+    let doubtful = ["region `iron`", "analysis.elements = \"edge\""];
+    iron("nodal", 1, 8).with(0, &[&doubtful[..], &["wrong by factors"]].concat());
+    iron("nodal", 2, 1000).with(0, &[&doubtful[..], &["most of its flux"]].concat());
+    for (order, permeability) in [(1, 12), (2, 2000)] {
+        let says = ["lose more than a tenth of the flux beside iron", "(`iron`)", "elements = \"edge\""];
+        iron("nodal", order, permeability).with(2, &says);
+    }
+    iron("edge", 1, 2000).with(0, &["region `iron`", "analysis.order = 2"]);
+    for order in [1, 2] {
+        assert!(!iron("edge", order, 1000).with(0, &[]).stderr.contains("warning: region `iron`"));
+    }
 }

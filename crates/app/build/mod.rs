@@ -155,6 +155,7 @@ fn problem_on(
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probe_faults(config, source, &full_mesh, &mesh);
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
+    faults.extend(plausible::element_faults(config, source, &full_mesh, &audits));
     let mut sink = DiagnosticSink::new(config, source, faults);
     if conductors.is_empty() && !motion_alone {
         sink.take(check_conditions(&config.boundaries, source))?;

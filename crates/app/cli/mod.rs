@@ -32,7 +32,7 @@ use crate::exit_code::ExitCode;
 use crate::files::DesignFileError;
 use crate::printable::printable;
 use crate::run::launcher;
-use crate::show::{Bar, Console, Quiet, RunObserver};
+use crate::show::{Bar, Console, Quiet, Results, RunObserver};
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -107,7 +107,8 @@ fn message(error: &Error) -> String {
 /// Who shows the progress.
 fn observer(args: &WorkArgs) -> Box<dyn RunObserver> {
     match args.progress() {
-        Progress::None => Box::new(Quiet::stderr()),
+        Progress::None if args.quiet => Box::new(Quiet::stderr()),
+        Progress::None => Box::new(Results::stderr()),
         Progress::Plain => Box::new(Console::stderr()),
         Progress::Auto | Progress::Bar => match Bar::stderr() {
             Some(bar) => Box::new(bar),

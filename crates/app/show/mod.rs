@@ -1,6 +1,6 @@
 //! Who watches a run: the driver reports what happens, an observer shows it.
 //!
-//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone. The first two
+//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone or with the results. The first two
 //! have the same `lines`: the rows (`table`) and the end (`summary`, with the flux density at the probes from `probes`).
 
 mod bar;
@@ -23,7 +23,7 @@ pub use fluxmorph_optimizer::driver::{Evaluation, Observer, Silent, column};
 
 pub use bar::{Bar, clear};
 pub use console::Console;
-pub use quiet::Quiet;
+pub use quiet::{Quiet, Results};
 pub use styles::Styles;
 
 /// What is known when a run starts.

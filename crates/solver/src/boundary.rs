@@ -1,9 +1,17 @@
 //! Conditions on named surfaces, and the potential of an applied field.
 
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, norm, sub};
-use fluxmorph_geometry::{Mesh, MeshError};
+use std::collections::HashMap;
 
+use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::{Mesh, MeshError, NodeId};
+
+use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
+use crate::surface::{Conductor, SurfaceLaw};
+
+/// Share of an applied field's largest circulation along an edge that may be left where another condition says
+/// otherwise: rounding.
+pub(crate) const CONFLICT: f64 = 1e-6;
 
 /// A condition on a named surface, plane or curved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,4 +66,60 @@ pub(crate) fn centre(
         }
     }
     Ok(centre)
+}
+
+/// Refuses applied fields that contradict each other where their surfaces meet, or a perfect conductor that touches one: along
+/// an edge `A` has one circulation, and on a perfect conductor none.
+///
+/// # Errors
+/// [`SolverError::TwoFields`], [`SolverError::FieldOnConductor`].
+pub(crate) fn check_applied(
+    mesh: &Mesh,
+    boundaries: &[(String, Boundary)],
+    conductors: &[Conductor],
+) -> Result<(), SolverError> {
+    let mut applied: HashMap<[NodeId; 2], (f64, &str)> = HashMap::new();
+    let (mut largest, mut apart) = (0.0_f64, Vec::new());
+    for (surface, boundary) in boundaries {
+        let Boundary::UniformField(field) = boundary else { continue };
+        let centre = centre(mesh, boundaries, field)?;
+        for edge in mesh.topology().surface(surface)?.iter().flat_map(edges) {
+            let [from, to] = edge.map(|n| mesh.point(n));
+            let circulation = dot(field.vector_potential(centre, middle(mesh, edge)), sub(to, from));
+            largest = largest.max(circulation.abs());
+            let (first, other) = *applied.entry(edge).or_insert((circulation, surface));
+            if other != surface {
+                apart.push((edge, (first - circulation).abs(), [other, surface.as_str()]));
+            }
+        }
+    }
+    let least = CONFLICT * largest;
+    if let Some((edge, _, surfaces)) = apart.into_iter().find(|(_, difference, _)| *difference > least) {
+        let surfaces = surfaces.map(str::to_owned);
+        return Err(SolverError::TwoFields { surfaces, place: middle(mesh, edge) });
+    }
+    for conductor in conductors.iter().filter(|conductor| conductor.law == SurfaceLaw::Perfect) {
+        for edge in conductor.surface.iter().flat_map(edges) {
+            if let Some((_, surface)) =
+                applied.get(&edge).filter(|(circulation, _)| circulation.abs() > least)
+            {
+                return Err(SolverError::FieldOnConductor {
+                    conductor: conductor.name.clone(),
+                    surface: (*surface).to_owned(),
+                    place: middle(mesh, edge),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The edges of a triangle, each with ascending nodes.
+fn edges(&[a, b, c]: &[NodeId; 3]) -> [[NodeId; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[m, n]| [m.min(n), m.max(n)])
+}
+
+fn middle(mesh: &Mesh, [a, b]: [NodeId; 2]) -> Point {
+    let (x, y) = (mesh.point(a), mesh.point(b));
+    std::array::from_fn(|d| 0.5 * (x[d] + y[d]))
 }

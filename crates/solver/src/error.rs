@@ -47,6 +47,32 @@ pub enum SolverError {
         /// A node at which both are asked [m].
         place: [f64; 3],
     },
+    /// Two applied fields that contradict each other.
+    #[error(
+        "the surfaces `{}` and `{}` meet at ({:.3}, {:.3}, {:.3}) mm with different applied fields: one field is there. Apply \
+         one field to both, or leave one of them flux-parallel",
+        surfaces[0], surfaces[1], place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    TwoFields {
+        /// Names of the surfaces.
+        surfaces: [String; 2],
+        /// The middle of an edge that they share [m].
+        place: [f64; 3],
+    },
+    /// A perfect conductor on a surface with an applied field.
+    #[error(
+        "the perfect conductor `{conductor}` touches the surface `{surface}` of the applied field at ({:.3}, {:.3}, {:.3}) mm: \
+         no flux enters it, but the applied field does. Keep the conductor away from that surface",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    FieldOnConductor {
+        /// Name of the conductor.
+        conductor: String,
+        /// Name of the surface.
+        surface: String,
+        /// The middle of an edge that they share [m].
+        place: [f64; 3],
+    },
     /// An analytic coil that meets no element.
     #[error("no current flows: {cause}")]
     NoSource {

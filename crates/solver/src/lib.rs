@@ -20,6 +20,7 @@ pub mod family;
 mod fixed_directions;
 pub mod functional;
 mod gauge;
+mod harmonic;
 pub mod linear;
 mod load;
 mod local_entities;

@@ -13,8 +13,8 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
-use crate::boundary::Boundary;
-use crate::coil::{Coil, Condition, ConditionedSurface, planes};
+use crate::boundary::{self, Boundary};
+use crate::coil::{Coil, Condition, ConditionedSurface, continuity, planes};
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
@@ -149,6 +149,9 @@ impl FieldModel {
             .collect();
         let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
         check_sources(mesh, &setup)?;
+        let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
+        let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
+        continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
         let shared = Arc::new(SharedParts { fine, sources, analysis: analysis.map(Arc::new) });
         Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
     }
@@ -185,6 +188,7 @@ impl FieldModel {
     /// Checks a set-up; `ω` [rad/s] and the weak form.
     fn weak_form(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(f64, WeakForm), SolverError> {
         check(mesh, setup)?;
+        boundary::check_applied(mesh, &setup.boundaries, &setup.conductors)?;
         let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
         let numbers = (angular_frequency, setup.penalty);
         let form = WeakForm::new(

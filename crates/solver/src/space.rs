@@ -156,6 +156,16 @@ impl Space {
         }
     }
 
+    /// The triangles of all elements by their edges, as [`crate::harmonic`] takes them; of edge elements only.
+    pub(crate) fn edge_triangles(&self) -> Vec<[usize; 3]> {
+        const OF_TET: [[usize; 3]; 4] = [[0, 1, 3], [0, 2, 4], [1, 2, 5], [3, 4, 5]];
+        let of = |e: usize| {
+            let carriers = self.carriers_of(ElementId::new(e));
+            OF_TET.map(|edges| edges.map(|k| carriers[k].index()))
+        };
+        (0..self.element_count()).flat_map(of).collect()
+    }
+
     /// Carriers of all elements.
     pub(crate) fn carriers(&self) -> &Carriers {
         &self.tets

@@ -123,10 +123,12 @@ impl Surfaces {
         let mut surfaces = Self::default();
         let mut beside = HashSet::new();
         if family == ElementFamily::Nodal {
-            let parallel = flux_parallel(mesh, boundaries)?;
+            let parallel = faces_with(mesh, boundaries, |b| *b == Boundary::FluxParallel)?;
             let replaced = conductors.iter().flat_map(|conductor| &conductor.surface);
             let replaced: HashSet<_> = replaced.map(|&triangle| face_key(triangle)).collect();
-            let found = beside_reentrant_edges(mesh, &parallel.union(&replaced).copied().collect());
+            let applied = faces_with(mesh, boundaries, |b| matches!(b, Boundary::UniformField(_)))?;
+            let listed = parallel.union(&replaced).copied().collect();
+            let found = beside_reentrant_edges(mesh, &listed, &applied);
             beside.extend(found.iter().map(|&triangle| face_key(triangle)));
             let walls: Vec<_> = found.into_iter().filter(|&t| !replaced.contains(&face_key(t))).collect();
             surfaces = Self::interfaces(mesh, coefficients, boundaries, &walls)?;
@@ -188,13 +190,14 @@ impl Surfaces {
     }
 }
 
-/// Triangles of flux-parallel surfaces, by their ascending nodes.
-fn flux_parallel(
+/// Triangles of the surfaces with some condition, by their ascending nodes.
+fn faces_with(
     mesh: &Mesh,
     boundaries: &[(String, Boundary)],
+    is_meant: impl Fn(&Boundary) -> bool,
 ) -> Result<HashSet<[NodeId; 3]>, SolverError> {
     let mut faces = HashSet::new();
-    for (name, _) in boundaries.iter().filter(|(_, boundary)| *boundary == Boundary::FluxParallel) {
+    for (name, _) in boundaries.iter().filter(|(_, boundary)| is_meant(boundary)) {
         faces.extend(mesh.topology().surface(name)?.iter().map(|&triangle| face_key(triangle)));
     }
     Ok(faces)

@@ -10,9 +10,10 @@
 //! * *uniform field*: the tangential components of `A` are those of the applied field, `ψ = 0`;
 //! * `ψ` is defined up to a constant on every connected conductor: where no surface fixes it, one node is grounded.
 //!
-//! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors (`gauge`),
-//! and the gradients' coefficients in and on conductors; on flux-parallel surfaces and where a field is applied, all that is
-//! tangential is known, as on perfect conductors. Flux-normal is natural.
+//! Of edge elements the circulations of `A` along the edges are unknown but on a tree outside conductors (`gauge`) and on
+//! one edge more for every tunnel (`harmonic`), and the gradients' coefficients in and on conductors; on flux-parallel
+//! surfaces and where a field is applied, all that is tangential is known, as on perfect conductors. Flux-normal is
+//! natural.
 //!
 //! On planes along the axes the unknowns of nodal elements are components of `A`; at the nodes of other conditioned surfaces they are
 //! components in the node's local frame (`fixed_directions`), and [`Unknowns::gather`] and
@@ -26,18 +27,16 @@ use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
-use crate::boundary::{self, Boundary};
+use crate::boundary::{self, Boundary, CONFLICT};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
 use crate::error::SolverError;
 use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
 use crate::gauge;
+use crate::harmonic::{self, HarmonicField};
 use crate::space::{ElementFamily, Space};
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
-
-/// Share of an applied field's largest potential that may be left where another condition says zero: rounding.
-const CONFLICT: f64 = 1e-6;
 
 /// Equation numbers of the A–ψ system.
 #[derive(Clone, Debug)]
@@ -50,6 +49,8 @@ pub struct Unknowns {
     frames: BTreeMap<CarrierId, Frame>,
     /// Fixed components that are not zero [T m], along the node's directions.
     prescribed: BTreeMap<CarrierId, Point>,
+    /// Of edge elements, the curl-free fields of the mesh's tunnels, on the edges that are left.
+    harmonic: Vec<HarmonicField>,
     /// Bit `d`: the node lies on a conditioned plane at right angles to the axis `d`.
     planes: BTreeMap<NodeId, u8>,
 }
@@ -68,6 +69,24 @@ pub struct Conductors {
 }
 
 impl Conductors {
+    /// The vertices between which current may pass: on surfaces with a fixed tangential `A`, and in and on conductors.
+    pub(crate) fn joined(
+        &self,
+        mesh: &Mesh,
+        boundaries: &[(String, Boundary)],
+    ) -> Result<DisjointSets, SolverError> {
+        let topology = mesh.topology();
+        let mut joined = DisjointSets::new(topology.node_count());
+        self.elements.iter().for_each(|&e| joined.join(topology.tet(e).map(NodeId::index)));
+        let fixed = boundaries.iter().filter(|(_, boundary)| *boundary != Boundary::FluxNormal);
+        for (surface, _) in fixed {
+            topology.surface(surface)?.iter().for_each(|nodes| joined.join(nodes.map(NodeId::index)));
+        }
+        let own = self.surface.iter().chain(&self.grounded);
+        own.for_each(|nodes| joined.join(nodes.map(NodeId::index)));
+        Ok(joined)
+    }
+
     /// Calls back with the carriers of every element and surface triangle with ψ.
     pub(crate) fn each(&self, space: &Space, mut with: impl FnMut(&[CarrierId])) {
         self.elements.iter().for_each(|&e| with(space.carriers_of(e)));
@@ -158,7 +177,7 @@ impl Unknowns {
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
         let planes = planes(mesh, boundaries)?;
-        Ok(Self { dofs, grounded, frames, prescribed, planes })
+        Ok(Self { dofs, grounded, frames, prescribed, planes, harmonic: Vec::new() })
     }
 
     fn of_edges(
@@ -197,7 +216,10 @@ impl Unknowns {
         perfect.for_each(|carrier| known[carrier.index()] = true);
         let mut conducts = vec![false; count];
         conductors.each(space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
-        let branches = gauge::tree(mesh.topology().node_count(), edges, |e| known[e] || conducts[e]);
+        let is_kept = |e: usize| known[e] || conducts[e];
+        let mut branches = gauge::tree(mesh.topology().node_count(), edges, is_kept);
+        let harmonic = harmonic::fields(edges.len(), &space.edge_triangles(), |e| is_kept(e) || branches[e]);
+        harmonic.iter().for_each(|field| branches[field.edge] = true);
         let dofs = DofMap::new(count, |carrier, c| {
             let i = carrier.index();
             if known[i] {
@@ -210,7 +232,7 @@ impl Unknowns {
             is_rotational || conducts[i] && is_gradient(space.order(), i < edges.len(), c)
         });
         let planes = planes(mesh, boundaries)?;
-        Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes })
+        Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes, harmonic })
     }
 
     /// The coefficients of a carrier, of a node `A_x, A_y, A_z` and `ψ`, out of a vector of unknowns; zero where a component is fixed.
@@ -240,6 +262,11 @@ impl Unknowns {
         let local = self.prescribed.get(&carrier)?;
         let axes = self.frame(carrier).map_or(Frame::COORDINATES.axes, |frame| frame.axes);
         Some(std::array::from_fn(|d| (0..3).map(|k| axes[k][d] * local[k]).sum()))
+    }
+
+    /// Of edge elements, the curl-free fields that are no gradients: a sound load does no work on them.
+    pub(crate) fn harmonic_fields(&self) -> &[HarmonicField] {
+        &self.harmonic
     }
 
     /// Carriers with a prescribed part of `A`, ascending.

@@ -1,13 +1,15 @@
 //! Edge elements from outside: the gauge changes no field, and every conductor has its gradients.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
-use fluxmorph_geometry::generate::{ShieldParameters, shield};
-use fluxmorph_geometry::{Mesh, NodeId, Topology};
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
+use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order};
 
-use super::OUTSIDE;
+use super::{OUTSIDE, flux_parallel};
 
 const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
 
@@ -63,6 +65,14 @@ fn model(mesh: &Mesh, order: Order, frequency: f64) -> FieldModel {
     FieldModel::new(mesh, setup).expect("a sound problem")
 }
 
+/// The largest difference of two fields, of the largest of the first.
+fn largest_deviation(one: &[[c64; 3]], two: &[[c64; 3]]) -> f64 {
+    let size = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>();
+    let largest = one.iter().map(size).fold(0.0, f64::max).sqrt();
+    let difference = |(a, b): (&[c64; 3], &[c64; 3])| size(&std::array::from_fn(|d| a[d] - b[d])).sqrt();
+    one.iter().zip(two).map(difference).fold(0.0, f64::max) / largest
+}
+
 /// `B` in every element and the losses are those of another tree; to 1e-9 of the largest.
 #[test]
 fn the_tree_changes_no_field() {
@@ -75,19 +85,67 @@ fn the_tree_changes_no_field() {
                 let (solution, _) = model.solve(mesh).expect("it is solved");
                 (solution.flux_densities(&model, mesh), solution.losses(&model, mesh))
             });
-            let size =
-                |b: &[_; 3]| b.iter().map(|c: &fluxmorph_geometry::fem::c64| c.norm_sqr()).sum::<f64>();
-            let largest = one.0.iter().map(size).fold(0.0, f64::max).sqrt();
-            let deviation = one.0.iter().zip(&two.0).map(|(a, b)| {
-                let difference = std::array::from_fn(|d| a[d] - b[d]);
-                size(&difference).sqrt()
-            });
-            let deviation = deviation.fold(0.0, f64::max) / largest;
+            let deviation = largest_deviation(&one.0, &two.0);
             assert!(deviation < 1e-9, "{order:?}, {frequency} Hz: {deviation:e}");
             for ((_, a), (_, b)) in one.1.iter().zip(&two.1) {
                 assert!((a / b - 1.0).abs() < 1e-9, "{order:?}: {a} and {b}");
             }
         }
+    }
+}
+
+/// A bar of magnet beside a tunnel through the mesh; `walls` are flux-parallel, all else is natural.
+fn beside_a_tunnel(mesh: &Mesh, order: Order, walls: &[&str]) -> FieldModel {
+    let setup = FieldModelSetup {
+        order,
+        materials: vec![Material::AIR; mesh.topology().region_names().len()],
+        remanence: vec![[0.0; 3], [0.2, 0.5, 1.0]],
+        boundaries: flux_parallel(walls),
+        ..FieldModelSetup::default()
+    };
+    FieldModel::new(mesh, setup).expect("a sound problem")
+}
+
+/// The tree leaves out an edge for each vertex but one of every part; each tunnel with free walls takes one more, and walls
+/// that are apart count as one vertex each. Otherwise the matrix is singular, and what is solved depends on rounding.
+#[test]
+fn a_tunnel_and_walls_that_are_apart_leave_one_field() {
+    let line = |n: i32| (0..=n).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(4), line(3), line(2)]).expect("a grid");
+    let cell = |x: [f64; 3]| [(x[0] * 100.0) as usize, (x[1] * 100.0) as usize];
+    let region = |x| {
+        RegionId(match cell(x) {
+            [1, 1] => 2,
+            [2, 1] => 1,
+            _ => 0,
+        })
+    };
+    let topology = grid.topology(&["air", "magnet", "hole"], region).expect("three regions");
+    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let (mesh, _) = mesh.without_region(RegionId(2)).expect("what is left");
+    let other = renumbered(&mesh);
+    for (walls, tunnels) in [(&[][..], 1), (&["x_min", "x_max"], 1), (&["z_min", "z_max"], 0)] {
+        for order in [Order::Linear, Order::Quadratic] {
+            let [one, two] = [&mesh, &other].map(|mesh| {
+                let model = beside_a_tunnel(mesh, order, walls);
+                let (solution, _) = model.solve(mesh).expect("it is solved");
+                solution.flux_densities(&model, mesh)
+            });
+            let deviation = largest_deviation(&one, &two);
+            assert!(deviation < 1e-9, "{walls:?}, {order:?}: {deviation:e}");
+        }
+        let model = beside_a_tunnel(&mesh, Order::Linear, walls);
+        let on_wall: Vec<HashSet<NodeId>> = walls
+            .iter()
+            .map(|name| mesh.topology().surface(name).expect("a side").iter().flatten().copied().collect())
+            .collect();
+        let free = |edge: &&[NodeId; 2]| {
+            let middle_is_on = |nodes: &HashSet<NodeId>| edge.iter().all(|n| nodes.contains(n));
+            !on_wall.iter().any(middle_is_on)
+        };
+        let edges = model.space().edges().iter().filter(free).count();
+        let sets = mesh.topology().node_count() - on_wall.iter().map(|nodes| nodes.len() - 1).sum::<usize>();
+        assert_eq!(model.unknown_count(), edges - (sets - 1) - tunnels, "{walls:?}");
     }
 }
 

@@ -1,11 +1,13 @@
 //! Tests of the crate from outside: sources, grounding, and the ladder of linear solvers under injected failures.
 
+mod applied;
 mod coil_regions;
 mod edge;
 mod grounding;
 mod guards;
 mod prisms;
 mod saturation;
+mod sheet;
 mod sources;
 mod two_level;
 

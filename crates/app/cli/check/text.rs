@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::summary::{FieldProblem, Summary};
 use super::table::{Align, Table};
-use crate::config::{CoilShape, Constraint, DesignDirection, Goal, Limit, RemeshExtent, UpperBound};
+use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, UpperBound};
 use crate::files::shell_word;
 
 /// Names stand in a column of this width: the longest is `design variables`.
@@ -207,12 +207,11 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
             |width: f64, height: f64| format!("section {} x {} mm", millimetre(width), millimetre(height));
         let shape = match &coil.shape {
             CoilShape::Racetrack(c) => {
-                format!(
-                    "racetrack, {}, {}, {}",
-                    window(c.half_window),
-                    section(c.width, c.height),
-                    at(c.center)
-                )
+                let name = match c.corner {
+                    Corner::Sharp(_) => "rectangular",
+                    Corner::Round(_) => "racetrack",
+                };
+                format!("{name}, {}, {}, {}", window(c.half_window), section(c.width, c.height), at(c.center))
             }
             CoilShape::Circular(c) => {
                 let radius = millimetre(c.radius);

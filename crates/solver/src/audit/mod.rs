@@ -22,6 +22,10 @@ const TOLERATED_SHARE: f64 = 0.05;
 /// Mean thickness in skin depths below which an impedance surface is doubtful: fields of the two faces meet.
 const IMPEDANCE_THICKNESS: f64 = 4.0;
 
+/// Elements per skin depth above which a factor of edge elements is lost in rounding: of a plate a double-precision one takes 3
+/// iterations at 1e4, and has no digit left at 1e5 (docs/verification.md, 2.8).
+const WEAKEST: f64 = 2e4;
+
 /// What the audit found of one conductor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkinAudit {
@@ -69,12 +73,18 @@ impl SkinAudit {
         ))
     }
 
+    /// Whether eddy currents are so weak under edge elements that no factor carries them: in a conductor the potential of
+    /// these is held by `(h/δ)²` of the reluctivity's terms alone.
+    pub fn is_too_weak_for_edges(&self) -> bool {
+        self.median_elements_per_skin_depth > WEAKEST
+    }
+
     /// What to tell the user of a conductor that an impedance surface replaces.
     pub fn impedance_warning(&self) -> Option<String> {
         (self.thickness_in_skin_depths < IMPEDANCE_THICKNESS).then(|| {
             format!(
-                "region `{}`: on average {:.1} skin depths ({:.3} mm) thick; an impedance surface assumes {} or more. \
-                 Use model = \"volume\"",
+                "region `{}`: on average {:.1} skin depths ({:.3} mm) thick; an impedance surface assumes {} or more, and \
+                 lets nothing through to the other side. Use model = \"volume\"",
                 self.region,
                 self.thickness_in_skin_depths,
                 self.skin_depth * 1e3,

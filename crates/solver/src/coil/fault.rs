@@ -77,6 +77,24 @@ pub enum RegionFault {
         /// The node they share [m].
         place: Point,
     },
+    /// Terminals that the current has no way between, outside the region.
+    #[error(
+        "its terminals lie on walls that nothing connects: the current would gather at ({:.3}, {:.3}, {:.3}) mm. Cut the \
+         winding at flux-parallel surfaces that touch each other, directly or along other flux-parallel surfaces or conductors, \
+         or let the coil close on itself around an axis",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    Unconnected {
+        /// A node of one of the walls [m].
+        place: Point,
+    },
+    /// A ring round a tunnel of the mesh.
+    #[error(
+        "its current flows round a tunnel of the mesh whose walls have no condition, and H would have to turn round it \
+         where it is zero. Mesh the tunnel too, or give the mesh's outer surfaces or the tunnel's walls the condition \
+         flux_parallel"
+    )]
+    RoundTunnel,
     /// A part of the region that carries nothing.
     #[error(
         "it has {parts} separate parts, and the terminal `{terminal}` does not touch the one at \

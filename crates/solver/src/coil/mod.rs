@@ -4,9 +4,11 @@
 //! mesh follows the coil. Lives here: the coil's place ([`frame`]), its shape and `T` ([`racetrack`]), the integral of
 //! `T` over a tetrahedron that the coil's edges cut ([`moment`], [`cut`]), the current of a coil that is a region of the
 //! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), all of it summed over coils
-//! ([`terms`]), and where a coil may meet the outside of the mesh ([`planes`]). `T` and `J` are fixed in space: elements
+//! ([`terms`]), where a coil may meet the outside of the mesh ([`planes`]), and whether the current of a region goes on there
+//! (`continuity`). `T` and `J` are fixed in space: elements
 //! that meet them must not move.
 
+pub(crate) mod continuity;
 pub mod cut;
 pub mod divergence;
 pub mod fault;

@@ -29,6 +29,10 @@ use crate::error::{NonConvergence, SolverError};
 /// Iterations after which the speed of an iteration can be judged.
 const TRIAL: usize = 3;
 
+/// Iterations that a complete factor in single precision is given, tenfold, where one in double precision could follow: that
+/// costs as much as some 60 of them.
+const LEAST_SINGLE: usize = 6;
+
 /// Solutions of a design of which nothing is known: state and adjoint.
 const USUAL_SOLUTIONS: usize = 2;
 
@@ -223,7 +227,11 @@ impl LocalSystem {
         let Some(preconditioner) = self.preconditioner.as_ref() else { return Attempt::Ended(f64::INFINITY) };
         let settings = &self.analysis.settings;
         let method = self.method();
-        let most = settings.max_iterations.unwrap_or(10 * self.analysis.typical_iterations(method).max(30));
+        let most = settings.max_iterations.unwrap_or_else(|| {
+            let typical = self.analysis.typical_iterations(method);
+            let single = method == Method::DirectSingle && next(&self.analysis, method).is_some();
+            10 * if single { typical.max(LEAST_SINGLE) } else { typical.max(30) }
+        });
         let target = settings.tolerance * scale;
         let (mut done, mut residual) = (0, f64::INFINITY);
         let (mut least, mut is_slow) = (f64::INFINITY, false);

@@ -108,6 +108,42 @@ mod tests {
         }
     }
 
+    /// Their Gram matrix has full rank: no coefficient is left undetermined in a conductor.
+    #[test]
+    fn the_functions_are_independent() {
+        use super::super::super::differences::SKEW;
+        use crate::element::quadrature;
+        use fluxmorph_geometry::tet4::{Tet4, dot};
+        let tet = Tet4::new(SKEW);
+        for order in [Order::Linear, Order::Quadratic] {
+            let all = functions(order, &EDGES, &ASCENDING_FACES);
+            let value = |f: &Function, lambda: &[f64; 4]| -> [f64; 3] {
+                std::array::from_fn(|d| (0..4).map(|n| f.along[n].value(lambda) * tet.gradients[n][d]).sum())
+            };
+            let product = |a: &Function, b: &Function| -> f64 {
+                let at = |(lambda, share): &quadrature::Node| share * dot(value(a, lambda), value(b, lambda));
+                quadrature::degree_5().iter().map(at).sum()
+            };
+            let norms: Vec<f64> = all.iter().map(|f| product(f, f).sqrt()).collect();
+            let mut gram: Vec<Vec<f64>> = all
+                .iter()
+                .zip(&norms)
+                .map(|(a, s)| all.iter().zip(&norms).map(|(b, t)| product(a, b) / (s * t)).collect())
+                .collect();
+            // The pivots of its elimination are the squares of what each function adds to those before; rounding is 1e-15.
+            for k in 0..gram.len() {
+                assert!(gram[k][k] > 1e-6, "{order:?}: function {k} is a sum of others, {:e}", gram[k][k]);
+                for i in k + 1..gram.len() {
+                    let factor = gram[i][k] / gram[k][k];
+                    let (above, below) = gram.split_at_mut(i);
+                    for (x, y) in below[0].iter_mut().zip(&above[k]) {
+                        *x -= factor * y;
+                    }
+                }
+            }
+        }
+    }
+
     /// Tangential components on a face are those of the functions of that face alone: what makes the fields conform.
     #[test]
     fn on_a_face_only_its_own_functions_have_tangential_components() {

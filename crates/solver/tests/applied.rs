@@ -1,0 +1,108 @@
+//! A uniform applied field on all of the outside, on a part of it, and where it contradicts something.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError,
+    SurfaceLaw, UniformField,
+};
+
+use crate::OUTSIDE;
+
+/// A cube of 3³ cells whose sides lean: no face but z_min and z_max is at right angles to an axis. The cell in the
+/// corner x_min, y_min, in the middle of z, is a region of its own.
+fn leaning() -> Mesh {
+    let line = || (0..=3).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
+    let corner = |[x, y, z]: [f64; 3]| x < 0.01 && y < 0.01 && (0.01..0.02).contains(&z);
+    let topology =
+        grid.topology(&["air", "corner"], |x| RegionId(u32::from(corner(x)))).expect("two regions");
+    let lean = |[x, y, z]: [f64; 3]| [x + 0.3 * y + 0.1 * z, y - 0.2 * x + 0.2 * z, z];
+    Mesh::new(Arc::new(topology), grid.points().into_iter().map(lean).collect()).expect("a mesh")
+}
+
+fn uniform(flux_density: [f64; 3]) -> Boundary {
+    Boundary::UniformField(UniformField { flux_density, centre: None })
+}
+
+fn setup(order: Order, names: &[&str], boundary: Boundary) -> FieldModelSetup {
+    FieldModelSetup {
+        order,
+        materials: vec![Material::AIR; 2],
+        boundaries: names.iter().map(|&name| (name.to_owned(), boundary)).collect(),
+        ..FieldModelSetup::default()
+    }
+}
+
+/// The largest difference to a uniform field, of that field.
+fn error(mesh: &Mesh, setup: FieldModelSetup, exact: [f64; 3]) -> f64 {
+    let model = FieldModel::new(mesh, setup).expect("a sound problem");
+    let (field, _) = model.solve(mesh).expect("it is solved");
+    let size: f64 = exact.iter().map(|b| b * b).sum();
+    let difference = |b: [c64; 3]| (0..3).map(|d| (b[d] - exact[d]).norm_sqr()).sum::<f64>();
+    let all = field.flux_densities(&model, mesh).into_iter();
+    all.map(|b| (difference(b) / size).sqrt()).fold(0.0, f64::max)
+}
+
+/// Edge elements hold a uniform field exactly, on faces of any direction: what is left is the solver's residual.
+#[test]
+fn an_oblique_field_on_leaning_sides_is_uniform_inside() {
+    let (mesh, field) = (leaning(), [0.3, -0.2, 0.5]);
+    for order in [Order::Linear, Order::Quadratic] {
+        let error = error(&mesh, setup(order, &OUTSIDE, uniform(field)), field);
+        assert!(error < 1e-9, "{order:?}: {error:e}");
+    }
+}
+
+/// Along z between flux-normal planes, the field need be given on the other sides alone.
+#[test]
+fn a_field_on_a_part_of_the_outside_is_uniform_inside() {
+    let (mesh, field) = (leaning(), [0.0, 0.0, 0.5]);
+    for order in [Order::Linear, Order::Quadratic] {
+        let mut setup = setup(order, &OUTSIDE[..4], uniform(field));
+        setup.boundaries.extend(["z_min", "z_max"].map(|name| (name.to_owned(), Boundary::FluxNormal)));
+        let error = error(&mesh, setup, field);
+        assert!(error < 1e-9, "{order:?}: {error:e}");
+    }
+}
+
+#[test]
+fn two_applied_fields_that_share_an_edge_agree_on_it_or_are_refused() {
+    let mesh = leaning();
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        let with = |other: [f64; 3]| {
+            let mut setup = setup(Order::Linear, &OUTSIDE[..2], uniform([0.0, 0.0, 0.5]));
+            setup.family = family;
+            setup.boundaries.push(("y_min".to_owned(), uniform(other)));
+            FieldModel::new(&mesh, setup)
+        };
+        assert!(with([0.0, 0.0, 0.5]).is_ok());
+        let error = with([0.0, 0.0, 0.4]).unwrap_err();
+        assert!(
+            matches!(&error, SolverError::TwoFields { surfaces, .. } if surfaces[1] == "y_min"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_perfect_conductor_on_a_surface_with_an_applied_field_is_refused() {
+    let (mesh, surface) = leaning().without_region(RegionId(1)).expect("what is left");
+    let block = Conductor { name: "block".to_owned(), surface, law: SurfaceLaw::Perfect };
+    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
+        let at = |names: &[&str]| {
+            let mut setup = setup(Order::Linear, names, uniform([0.0, 0.0, 0.5]));
+            (setup.family, setup.conductors) = (family, vec![block.clone()]);
+            FieldModel::new(&mesh, setup)
+        };
+        assert!(at(&["x_max", "y_max"]).is_ok(), "it touches the two other sides");
+        let error = at(&OUTSIDE).unwrap_err();
+        assert!(
+            matches!(&error, SolverError::FieldOnConductor { conductor, .. } if conductor == "block"),
+            "{error}"
+        );
+    }
+}
