@@ -4,9 +4,8 @@
 //! gains from that error shrinks where the cells do. So the run's mesh is generated anew with every cell that moves or is
 //! observed divided ([`DividedMesh`]), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
 //! constraints are measured there too. Variables of a control grid mean the same on any mesh; where the nodes are the
-//! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]), and a
-//! thickness, which is a function of the variables, is left out. A check that cannot be done is reported, and costs a run
-//! nothing else.
+//! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]). A check
+//! that cannot be done is reported, and costs a run nothing else.
 //!
 //! What both meshes share shows in neither ratio: the size of the box and its far cells, materials, conditions, elements and
 //! their order, the model of every region.
@@ -15,7 +14,7 @@
 
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::constraint::{Bound, Quantity};
+use fluxmorph_optimizer::constraint::Bound;
 use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
@@ -68,14 +67,6 @@ impl ShapePair {
         }
         let surface = Box::new(design_triangulation(design, &setup.full_mesh)?);
         Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
-    }
-
-    /// The variables of both shapes, where another mesh has the same.
-    fn variables(&self) -> [&[f64]; 2] {
-        match self {
-            Self::Variables(pair) => pair.each_ref().map(Vec::as_slice),
-            _ => [&[]; 2],
-        }
     }
 
     /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
@@ -224,18 +215,15 @@ impl MeshIndependence<'_> {
             return Ok(None);
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
-        let has_variables = matches!(self.shapes, ShapePair::Variables(_));
-        let mut problem = setup.problem.with_constraints(|constraint| {
-            has_variables || !matches!(constraint.quantity, Quantity::Thickness { .. })
-        });
+        let mut problem = setup.problem;
         let tets = problem.original().topology().tets().len();
         let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());
         let mut cache = SolverCache::default();
-        for (displacement, p) in displacements.into_iter().zip(self.shapes.variables()) {
+        for displacement in displacements {
             if interrupted() {
                 return Ok(None);
             }
-            let analysis = match analysis_at(&mut problem, &mut cache, displacement, p, interrupted) {
+            let analysis = match analysis_at(&mut problem, &mut cache, displacement, interrupted) {
                 Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(None),
                 analysis => analysis?,
             };
@@ -275,12 +263,11 @@ fn fresh_configuration(config: &Config) -> Config {
     fresh
 }
 
-/// The analysis of a shape with the variables `p`, reached from the undeformed mesh.
+/// The analysis of a shape, reached from the undeformed mesh.
 fn analysis_at(
     problem: &mut Problem,
     cache: &mut SolverCache,
     displacement: Vec<Point>,
-    p: &[f64],
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Analysis, Error> {
     let undeformed = problem.shape().map(|shape| shape.motion().clone());

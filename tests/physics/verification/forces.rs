@@ -40,6 +40,7 @@ fn mesh(refinement: f64) -> Mesh {
         surfaces: Vec::new(),
         growth: 1.8,
         refinement,
+        division: None,
     };
     boxes(&parameters).expect("boxes within the box")
 }

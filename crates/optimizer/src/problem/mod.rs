@@ -80,13 +80,6 @@ impl Problem {
         Self { share, ..self }
     }
 
-    /// The same with some of its constraints.
-    #[must_use]
-    pub fn with_constraints(mut self, keep: impl FnMut(&Constraint) -> bool) -> Self {
-        self.constraints.retain(keep);
-        self
-    }
-
     /// The same with other states.
     ///
     /// # Panics
