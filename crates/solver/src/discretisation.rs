@@ -105,7 +105,7 @@ impl Discretisation {
                 // Gradients have no curl: they couple in conductors alone.
                 return Coupling::full(if weak_form.conducts(e) { 4 } else { 2 });
             }
-            let decoupled = !weak_form.couples_components() && !turned(space.carriers_of(e));
+            let decoupled = !weak_form.couples_components(e) && !turned(space.carriers_of(e));
             let potential = if decoupled { Coupling::diagonal(3) } else { Coupling::full(3) };
             if weak_form.conducts(e) { potential.union(with_psi()) } else { potential }
         };

@@ -17,7 +17,9 @@ use crate::element::edge::{Ascending, EdgeShape, FieldPoint, tet::EdgeTet};
 use crate::element::lagrange::Lagrange;
 use crate::element::point::{self, PointField};
 use crate::element::quadratic::LagrangeTet;
+use crate::element::quadrature::Node;
 use crate::element::tabulated::Rule;
+use crate::element::tensor::Curls;
 use crate::element::volume::{AphiTet, Coefficients, NodalField};
 use crate::element::{Complex3, impedance, interface};
 use crate::space::{ElementFamily, Order};
@@ -42,6 +44,12 @@ impl Local {
             *value = of(a);
         }
         Self { count, values }
+    }
+
+    /// Adds to one coefficient.
+    #[inline]
+    pub(crate) fn add(&mut self, carrier: usize, component: usize, value: c64) {
+        self.values[carrier][component] += value;
     }
 
     /// One entry a carrier.
@@ -72,6 +80,15 @@ impl Cell {
         Ascending::new(&self.tet, self.order)
     }
 
+    /// The number, in the order of the mesh's vertices, of every point of a rule in their ascending order: rules are
+    /// symmetric, so that a permutation of the vertices permutes the points.
+    fn points_of(&self, rule: Rule) -> Vec<usize> {
+        let nodes = rule.nodes();
+        let same =
+            |(of_mesh, _): &Node, (ascending, _): &Node| self.ascending_coordinates(of_mesh) == *ascending;
+        nodes.iter().map(|to| nodes.iter().position(|from| same(from, to)).expect("symmetric")).collect()
+    }
+
     /// Barycentric coordinates in ascending order of the vertices.
     fn ascending_coordinates(&self, lambda: &[f64; 4]) -> [f64; 4] {
         self.order.map(|place| lambda[usize::from(place)])
@@ -95,10 +112,15 @@ impl<const N: usize, const M: usize> From<ElementIntegral<N, M>> for LocalIntegr
 /// What receives functions: carrier, component, value [1/m or 1], curl [1/m² or 1/m].
 pub type EachFunction<'a> = dyn FnMut(usize, usize, Point, Point) + 'a;
 
+/// What receives curls: point of the rule, carrier, component, curl [1/m² or 1/m].
+pub(crate) type EachCurl<'a> = dyn FnMut(usize, usize, usize, Point) + 'a;
+
 /// Elements of one family and order.
 pub(crate) trait Family: Sync {
     /// Every function at a point given by the barycentric coordinates of the mesh's vertices.
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>);
+    /// The curl of every function that has one, at the points of a rule.
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>);
     /// The field at such a point.
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint;
     /// The field at a vertex, by its place in the mesh's order.
@@ -144,7 +166,15 @@ pub(crate) trait Family: Sync {
 }
 
 /// The matrices of elements with `N` and faces with `F` carriers.
-pub(crate) trait Matrices<const N: usize, const F: usize>: Sync {
+pub(crate) trait Matrices<const N: usize, const F: usize>: Family {
+    /// The curls of all functions at the points of a rule.
+    fn curls(&self, cell: &Cell, rule: Rule) -> Vec<Curls<N>> {
+        let mut curls = vec![[[[0.0; 3]; 4]; N]; rule.nodes().len()];
+        self.each_curl(cell, rule, &mut |point, carrier, component, curl| {
+            curls[point][carrier][component] = curl
+        });
+        curls
+    }
     /// Of a tetrahedron.
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4>;
     /// Of a surface term.
@@ -212,9 +242,10 @@ impl From<PointField> for FieldPoint {
     }
 }
 
+const UNIT: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 impl<const N: usize, const F: usize> Family for Nodal<N, F> {
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>) {
-        const UNIT: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for a in 0..N {
             let value = self.tet.value(a, lambda);
             let gradient = point::gradient(self.tet, &cell.tet, lambda, a);
@@ -222,6 +253,17 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
                 each(a, d, unit.map(|u| value * u), cross(gradient, unit));
             }
             each(a, 3, gradient, [0.0; 3]);
+        }
+    }
+
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>) {
+        for (point, at) in self.tet.at(rule).iter().enumerate() {
+            for a in 0..N {
+                let gradient = at.gradient(&cell.tet.gradients, a);
+                for (d, unit) in UNIT.into_iter().enumerate() {
+                    each(point, a, d, cross(gradient, unit));
+                }
+            }
         }
     }
 
@@ -341,6 +383,13 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         for (carrier, component, value, curl) in self.tet.functions_at(&cell.ascending(), &lambda) {
             each(carrier, component, value, curl);
         }
+    }
+
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>) {
+        let points = cell.points_of(rule);
+        self.tet.each_curl(&cell.ascending(), rule, &mut |point, carrier, component, curl| {
+            each(points[point], carrier, component, curl);
+        });
     }
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {

@@ -61,9 +61,11 @@ pub fn recovered_flux_density(
     point: Point,
 ) -> Complex3 {
     let topology = model.topology();
-    // A magnet's face is one even where its permeability is that of air.
-    let material =
-        |e: ElementId| (model.materials()[topology.region_of()[e.index()].index()], model.remanence_of(e));
+    // A magnet's face is one even where its permeability is that of air, and that of open space is one of the map.
+    let material = |e: ElementId| {
+        let is_open = model.form().stretch_of(e).is_some();
+        (model.materials()[topology.region_of()[e.index()].index()], model.remanence_of(e), is_open)
+    };
     let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {
         elements = elements

@@ -9,10 +9,13 @@ use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::boundary::Boundary;
+use crate::element::tabulated::Rule;
+use crate::element::tensor::{TensorField, TensorTerm, WithTensor};
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
+use crate::open::{OpenRegion, Shell, Stretch};
 use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
 use crate::unknowns::Conductors;
@@ -24,6 +27,7 @@ pub(crate) struct WeakForm {
     /// By region.
     coefficients: Vec<Coefficients>,
     surfaces: Surfaces,
+    shell: Option<Shell>,
 }
 
 impl WeakForm {
@@ -31,7 +35,7 @@ impl WeakForm {
     /// factor `p`.
     ///
     /// # Errors
-    /// As [`Surfaces::new`].
+    /// As [`Surfaces::new`] and [`Shell::new`].
     pub(crate) fn new(
         mesh: &Mesh,
         elements: (ElementFamily, Order),
@@ -39,6 +43,7 @@ impl WeakForm {
         materials: &[Material],
         boundaries: &[(String, Boundary)],
         conductors: &[Conductor],
+        open: Option<&OpenRegion>,
     ) -> Result<Self, SolverError> {
         let coefficients: Vec<Coefficients> = materials
             .iter()
@@ -50,7 +55,8 @@ impl WeakForm {
             .collect();
         let surfaces =
             Surfaces::new(mesh, elements, &coefficients, boundaries, conductors, angular_frequency)?;
-        Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces })
+        let shell = open.map(|open| Shell::new(mesh, open)).transpose()?;
+        Ok(Self { topology: Arc::clone(mesh.topology()), coefficients, surfaces, shell })
     }
 
     /// The topology.
@@ -69,9 +75,26 @@ impl WeakForm {
         self.coefficients_of(e).eddy != c64::default()
     }
 
-    /// Whether the three components of `A` couple inside the regions.
-    pub(crate) fn couples_components(&self) -> bool {
-        self.coefficients.iter().any(|c| c.extra_penalty != 0.0)
+    /// Whether the three components of `A` couple inside an element.
+    pub(crate) fn couples_components(&self, e: ElementId) -> bool {
+        self.coefficients.iter().any(|c| c.extra_penalty != 0.0) || self.stretch_of(e).is_some()
+    }
+
+    /// The shell that stands for open space.
+    pub(crate) fn shell(&self) -> Option<&Shell> {
+        self.shell.as_ref()
+    }
+
+    /// The map of an element of that shell.
+    #[inline]
+    pub(crate) fn stretch_of(&self, e: ElementId) -> Option<&Stretch> {
+        self.shell.as_ref().and_then(|shell| shell.of(e))
+    }
+
+    /// What the reluctivity of an element is beyond the scalar of its region; `None` where it is that scalar.
+    pub(crate) fn tensors_of(&self, e: ElementId) -> Option<TensorField> {
+        let reluctivity = self.coefficients_of(e).reluctivity;
+        self.stretch_of(e).map(|stretch| stretch.tensors(reluctivity, Rule::Degree5))
     }
 
     /// Triangles with a term.
@@ -109,7 +132,10 @@ impl WeakForm {
         cell: Cell,
         e: ElementId,
     ) -> impl LocalMatrix<c64, N, 4> {
-        matrices.tet(cell, *self.coefficients_of(e))
+        let term = self
+            .tensors_of(e)
+            .map(|field| TensorTerm::new(cell.tet.volume, &field, &matrices.curls(&cell, field.rule)));
+        WithTensor { scalar: matrices.tet(cell, *self.coefficients_of(e)), term }
     }
 
     /// The matrix of a triangle, by its number.

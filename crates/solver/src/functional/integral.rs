@@ -8,8 +8,10 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
 use super::FunctionalValue;
+use crate::element::Complex3;
+use crate::element::tensor::TensorField;
 use crate::error::SolverError;
-use crate::family::LocalIntegral;
+use crate::family::{Cell, Family, Local, LocalIntegral};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 use crate::surface::{SurfaceLaw, SurfaceTerm};
@@ -82,8 +84,13 @@ impl Integral {
                 let share = if model.angular_frequency() == 0.0 { 0.5 } else { 0.25 };
                 sum.elements(of, |e| {
                     let factor = share * model.coefficients_of(e).reluctivity;
-                    let field = solution.element(model, e);
-                    elements.flux_energy(&space.cell(mesh, e), factor, model.remanence_of(e), field.values())
+                    let (cell, field) = (space.cell(mesh, e), solution.element(model, e));
+                    let mut energy =
+                        elements.flux_energy(&cell, factor, model.remanence_of(e), field.values());
+                    if let Some(tensors) = model.form().tensors_of(e) {
+                        add_tensor_energy(elements, &cell, (share, &tensors), &field, &mut energy);
+                    }
+                    energy
                 });
             }
             Self::VolumeLoss(of) => sum.elements(of, |e| {
@@ -109,6 +116,34 @@ impl Integral {
         }
         sum.into_value()
     }
+}
+
+/// Adds `f ∫B̄·D B` of a tensor at the points of its rule, in an element that is held.
+fn add_tensor_energy(
+    elements: &dyn Family,
+    cell: &Cell,
+    (factor, tensors): (f64, &TensorField),
+    field: &Local,
+    energy: &mut LocalIntegral<4>,
+) {
+    let mut flux_densities = vec![[c64::default(); 3]; tensors.values.len()];
+    elements.each_curl(cell, tensors.rule, &mut |point, carrier, component, curl| {
+        let u = field.values()[carrier][component];
+        (0..3).for_each(|d| flux_densities[point][d] += u * curl[d]);
+    });
+    let points = tensors.rule.nodes().iter().zip(&tensors.values).zip(&flux_densities);
+    let strengths: Vec<Complex3> = points
+        .map(|(((_, share), d), b)| {
+            let weight = factor * share * cell.tet.volume;
+            d.map(|row| (0..3).map(|j| weight * row[j] * b[j].conj()).sum())
+        })
+        .collect();
+    for (b, h) in flux_densities.iter().zip(&strengths) {
+        energy.value += (0..3).map(|d| (b[d] * h[d]).re).sum::<f64>();
+    }
+    elements.each_curl(cell, tensors.rule, &mut |point, carrier, component, curl| {
+        energy.potentials.add(carrier, component, (0..3).map(|d| strengths[point][d] * curl[d]).sum());
+    });
 }
 
 /// Gathers element integrals.
