@@ -47,12 +47,22 @@ pub struct RunResult {
     /// Losses and probes at every frequency; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateResult>,
+    /// Open space, where the mesh has a shell that stands for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub open: Option<OpenResult>,
     /// The linear systems.
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
     pub timings_s: BTreeMap<String, f64>,
     /// Most memory held [bytes].
     pub peak_memory_bytes: u64,
+}
+
+/// The part of open space in the field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OpenResult {
+    /// Share of the field's energy in the shell, in the order of the frequencies.
+    pub energy_share: Vec<f64>,
 }
 
 /// The objective of a run.
@@ -277,6 +287,7 @@ pub(crate) mod tests {
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
             states: vec![],
+            open: None,
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],
                 worst_residual: 1e-11,

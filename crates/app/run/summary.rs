@@ -7,13 +7,13 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timings};
-use fluxmorph_solver::{SolverError, recovery};
+use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery};
 
 use super::Session;
 use crate::error::Error;
 use crate::files::{
-    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ProbeResult, RunResult, StateResult,
-    StopReason, TermResult, peak_memory_bytes,
+    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, OpenResult, ProbeResult, RunResult,
+    StateResult, StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -66,6 +66,7 @@ impl Session<'_> {
             probes,
             losses_w,
             states: if states.len() > 1 { states } else { Vec::new() },
+            open: open(problem, analysis)?,
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             peak_memory_bytes: peak_memory_bytes(),
@@ -132,6 +133,22 @@ impl Session<'_> {
             probes,
         }
     }
+}
+
+/// The share of the energy in open space, where there is some.
+fn open(problem: &Problem, analysis: &Analysis) -> Result<Option<OpenResult>, Error> {
+    let share = |(model, solution): (&FieldModel, &FieldSolution)| -> Result<Option<f64>, Error> {
+        let Some(open) = model.setup().open else { return Ok(None) };
+        let of = |region| -> Result<f64, SolverError> {
+            Ok(Functional::energy(model, region)?.evaluate(model, &analysis.mesh, solution)?.value)
+        };
+        let (shell, all) = (of(Some(open.region))?, of(None)?);
+        Ok(Some(if all > 0.0 { shell / all } else { 0.0 }))
+    };
+    let shares =
+        problem.states().iter().zip(&analysis.solutions).map(share).collect::<Result<Vec<_>, _>>()?;
+    let shares: Option<Vec<f64>> = shares.into_iter().collect();
+    Ok(shares.map(|energy_share| OpenResult { energy_share }))
 }
 
 /// The terms of the objective at a design.

@@ -55,6 +55,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
                 .map(|(region, loss)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)))),
         );
     }
+    if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
+        rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
+    }
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
         rows.push(("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations)));

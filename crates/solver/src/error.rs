@@ -93,6 +93,17 @@ pub enum SolverError {
         /// What is wrong there.
         what: String,
     },
+    /// What open space cannot hold.
+    #[error(
+        "the open region `{region}` holds {what}; there is air alone, and a field that vanishes at infinity: matter and coils \
+         with their windows belong inside"
+    )]
+    OpenContents {
+        /// Name of the region.
+        region: String,
+        /// What is there.
+        what: &'static str,
+    },
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]
     EmptyRegion {

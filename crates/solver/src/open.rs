@@ -148,7 +148,7 @@ impl Shell {
 /// Refuses what open space cannot hold: matter, sources, and a field that does not vanish at infinity.
 ///
 /// # Errors
-/// [`SolverError::Parameter`].
+/// [`SolverError::OpenContents`].
 pub(crate) fn check_contents(
     shell: &Shell,
     mesh: &Mesh,
@@ -168,12 +168,7 @@ pub(crate) fn check_contents(
     } else {
         return Ok(());
     };
-    Err(SolverError::Parameter {
-        what: format!("open region `{}`", mesh.topology().region_names()[region]),
-        value: what.to_owned(),
-        expected: "air alone, and a field that vanishes at infinity: matter and coils with their windows belong inside"
-            .to_owned(),
-    })
+    Err(SolverError::OpenContents { region: mesh.topology().region_names()[region].clone(), what })
 }
 
 /// The two sides of a shell as seen from the centre.

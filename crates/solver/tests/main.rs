@@ -4,6 +4,7 @@ mod coil_regions;
 mod edge;
 mod grounding;
 mod guards;
+mod open;
 mod prisms;
 mod sources;
 mod two_level;

@@ -13,6 +13,7 @@ use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
 use super::objective::{Objective, Probe};
+use super::open::Open;
 use super::optimizer::Optimizer;
 use super::output::Output;
 use super::remesh::Remesh;
@@ -22,7 +23,8 @@ use crate::config::table::table;
 use crate::config::text::source::SourceMap;
 
 /// The tables that only mean something to a field problem.
-const OF_THE_FIELD: [&str; 6] = ["coils", "objective", "boundaries", "constraints", "materials", "regions"];
+const OF_THE_FIELD: [&str; 7] =
+    ["coils", "objective", "boundaries", "open", "constraints", "materials", "regions"];
 
 table! {
     /// The configuration of a run of Fluxmorph. A quantity is a text with a unit, such as "10 mm", or a bare number in SI.
@@ -41,6 +43,8 @@ table! {
         coils: Vec<Coil> = TABLES => Vec::new();
         /// The boundary conditions.
         boundaries: Boundaries = TABLE => Boundaries::default();
+        /// Open space around the mesh.
+        open: Option<Open> = TABLE;
         /// What is optimised; needed by `run` and `gradient`.
         objective: Option<Objective> = TABLE;
         /// What must keep within bounds meanwhile.

@@ -13,6 +13,7 @@ mod material;
 mod mesh;
 mod morph;
 mod objective;
+mod open;
 mod optimizer;
 mod order;
 mod output;
@@ -40,6 +41,7 @@ pub use morph::{
     Target, Tune, TunedParameter,
 };
 pub use objective::{Goal, Objective, Probe, Sum, Term};
+pub use open::Open;
 pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use petsc::{Petsc, PetscKrylov, PetscSolver, PetscSubSolver};

@@ -127,7 +127,8 @@ mod tests {
             })
             .sum();
         let scalar = family.tet(cell, law);
-        let whole = with_tensor(family, law, &TensorField { rule, values });
+        let field = TensorField { rule, values };
+        let whole = with_tensor(family, law, &field);
         let added = bilinear(&l, |a, b| whole.block(a, b), &u) - bilinear(&l, |a, b| scalar.block(a, b), &u);
         assert!((added - expected).norm() < 1e-12 * expected.norm(), "{added} {expected}");
     }
