@@ -32,8 +32,8 @@ pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
 pub(crate) use result::to_json;
 pub use result::{
-    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, ObjectiveResult, OpenResult, ProbeResult,
-    RunResult, StateResult, TermResult, Verification,
+    ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, ObjectiveResult,
+    OpenResult, ProbeResult, RunResult, StateResult, TermResult, Verification,
 };
 pub(crate) use run_directory::LOCK;
 pub use run_directory::{OverwritePolicy, RunDirectory};

@@ -82,9 +82,25 @@ pub struct ObjectiveResult {
     /// How the verified ratio came about; `None` without one, and where the initial design is the best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
+    /// How homogeneous the field is, where that is a term of the objective; its keys stand beside the others.
+    #[serde(flatten)]
+    pub homogeneity: Option<HomogeneityResult>,
     /// The terms at the best design.
     #[serde(default)]
     pub terms: Vec<TermResult>,
+}
+
+/// How homogeneous the field is at the best design, at the first frequency of the term.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HomogeneityResult {
+    /// The mean of what is compared: of vectors, the modulus of their mean [T].
+    pub mean_b_t: f64,
+    /// Relative rms deviation from the mean, in parts per million.
+    pub rms_ppm: f64,
+    /// The same at the initial design; `None` where the objective has other terms too.
+    pub initial_rms_ppm: Option<f64>,
+    /// Largest less smallest value over the mean, in parts per million; of vectors, of their part along the mean.
+    pub peak_to_peak_ppm: f64,
 }
 
 /// The gain of a run computed again on a mesh that the optimiser never saw.
@@ -245,6 +261,7 @@ pub(crate) mod tests {
                     best: 1.1,
                     ratio: 0.5,
                 }),
+                homogeneity: None,
                 terms: vec![TermResult {
                     kind: "loss".to_owned(),
                     region: Some("plate".to_owned()),

@@ -12,8 +12,8 @@ use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recov
 use super::Session;
 use crate::error::Error;
 use crate::files::{
-    ConstraintResult, DesignResult, LinearSolverResult, MeshResult, OpenResult, ProbeResult, RunResult,
-    StateResult, StopReason, TermResult, peak_memory_bytes,
+    ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, OpenResult,
+    ProbeResult, RunResult, StateResult, StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -162,6 +162,24 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
         value,
     };
     terms.zip(&analysis.terms).map(of).collect()
+}
+
+/// How homogeneous the field of an analysis is, for the first term that asks; `initial` is the objective at the initial design.
+pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) -> Option<HomogeneityResult> {
+    let terms = &problem.objective()?.terms;
+    let quality = |term: &Term| {
+        let index = *term.states.first()?;
+        let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
+        term.functional.field_quality(model, &analysis.mesh, solution)
+    };
+    let quality = terms.iter().find_map(quality)?;
+    let is_alone = matches!(terms.as_slice(), [term] if term.weight == 1.0 && term.states.len() == 1);
+    Some(HomogeneityResult {
+        mean_b_t: quality.mean,
+        rms_ppm: 1e6 * quality.rms,
+        initial_rms_ppm: is_alone.then(|| 1e6 * initial.sqrt()),
+        peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
+    })
 }
 
 /// The constraints at a design.

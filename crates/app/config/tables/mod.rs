@@ -28,7 +28,7 @@ pub use coil::{
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
-pub use functional::{Functional, ObjectiveKind, Weighting};
+pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use material::{Material, Region, RegionModel};

@@ -92,6 +92,9 @@ dimensions! {
     /// An energy [J].
     Energy = "an energy", in "J", such as "1.5 J":
         decimal("J", 0), decimal("mJ", -3), decimal("kJ", 3);
+    /// A ratio of like quantities [1].
+    Ratio = "a ratio", in "1", such as "1e-8 1":
+        decimal("1", 0);
     /// A volume [m³].
     Volume = "a volume", in "m\u{b3}", such as "400 cm3":
         decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("cm3", -6),

@@ -2,9 +2,10 @@
 //!
 //! `dF/dx = explicit − 2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )` with `K λ = ∂F/∂u`: [`FunctionalValue::derivative`] is the right
 //! side of the adjoint problem, [`FunctionalValue::explicit`] the first term, and [`crate::adjoint`] the second.
-//! `observation` holds what is a function of B in cells that do not move, `integral` the integrals of densities over
+//! `observation` holds what is a function of B in cells that do not move, `homogeneity` its deviation from its own mean, `integral` the integrals of densities over
 //! regions that may. Weighted sums, bounds and several frequencies are the optimiser's business.
 
+mod homogeneity;
 mod integral;
 mod observation;
 
@@ -16,6 +17,7 @@ use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+pub use homogeneity::{Compared, FieldQuality};
 pub use integral::Integral;
 pub use observation::{Observation, Observed, Weighting};
 
@@ -84,6 +86,19 @@ impl Functional {
         match self {
             Self::Observation(observation) => observation.cell_flux_densities(model, mesh, solution),
             Self::Integral(_) => Vec::new(),
+        }
+    }
+
+    /// How homogeneous the field is, where that is what is observed.
+    pub fn field_quality(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Option<FieldQuality> {
+        match self {
+            Self::Observation(observation) => observation.field_quality(model, mesh, solution),
+            Self::Integral(_) => None,
         }
     }
 
