@@ -180,6 +180,7 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
         best_evaluation: optimised.best.evaluation,
         verified_ratio: None,
         verification: None,
+        homogeneity: None,
         terms: Vec::new(),
     };
     let shapes = ShapePair::of(&config, setup, &optimised.best.values).unwrap_or_else(|e| panic!("{e}"));

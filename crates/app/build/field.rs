@@ -16,6 +16,7 @@ use fluxmorph_solver::{
 
 use super::curves::Curves;
 use super::locate_error::DiagnosticSink;
+use super::open;
 use crate::config::{
     self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
     SolverMethod, SourceMap,
@@ -161,6 +162,7 @@ fn field_model(
         let applied = UniformField { flux_density: field.b, centre: field.center };
         boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
     }
+    boundaries.extend(open::condition(config));
     let linear_solver = linear_solver(&config.analysis.linear_solver);
     let setup = FieldModelSetup {
         frequency,
@@ -173,6 +175,7 @@ fn field_model(
         conductors,
         coils,
         boundaries,
+        open: open::region(config, mesh.topology())?,
         linear_solver,
         ownership: share.map(|share| (share.clone(), distributed_settings(&config.analysis.petsc))),
     };

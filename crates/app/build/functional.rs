@@ -7,7 +7,7 @@ use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_optimizer::{Error as OptimizerError, geometric};
-use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::functional::{self, Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use crate::config::{
@@ -163,6 +163,15 @@ fn term(
         ObjectiveKind::TargetField => {
             let target = functional.target.unwrap_or_default();
             Functional::observation(mesh, region()?, Observed::Deviation { target, weighting })?
+        }
+        ObjectiveKind::Homogeneity => {
+            let direction = functional.direction.unwrap_or_default();
+            let of = match functional.compare {
+                Some(config::Compared::Component) => functional::Compared::Component(direction),
+                Some(config::Compared::Modulus) => functional::Compared::Modulus,
+                _ => functional::Compared::Vector,
+            };
+            Functional::observation(mesh, region()?, Observed::Homogeneity { of, weighting })?
         }
         ObjectiveKind::FieldComponent => {
             let direction = functional.direction.unwrap_or_default();

@@ -186,6 +186,10 @@ impl Blame<'_> {
                 };
                 self.at(&place.unwrap_or(format!("{path}.region")), error)
             }
+            SolverError::Open { .. } | SolverError::OpenContents { .. } => {
+                let is_region = self.config.open.as_ref().is_some_and(|open| open.region.is_some());
+                self.at(if is_region { "open.region" } else { "open.surfaces" }, error)
+            }
             SolverError::EmptyRegion { region, .. } => self.region(region, error),
             SolverError::ProbeOutside { probe, .. } => {
                 let index = self.config.probes.iter().position(|own| own.name == *probe)?;

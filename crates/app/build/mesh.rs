@@ -14,6 +14,7 @@ use fluxmorph_geometry::topology::{OUTSIDE, face_key};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 
 use super::locate_error::with_advice;
+use super::open;
 use crate::config::{
     CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span,
     Target,
@@ -48,7 +49,8 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
             })
         }
     }?;
-    Ok(Built { mesh: named_interfaces(built.mesh, config)?, ..built })
+    let mesh = named_interfaces(built.mesh, config)?;
+    Ok(Built { mesh: open::with_shell(mesh, config, source)?, ..built })
 }
 
 /// The mesh with a surface for every interface that the configuration names.
@@ -120,6 +122,9 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     add("boundaries.flux_normal", &config.boundaries.flux_normal);
     if let Some(field) = &config.boundaries.uniform_field {
         add("boundaries.uniform_field.surfaces", &field.surfaces);
+    }
+    if let Some(open) = &config.open {
+        add("open.surfaces", &open.surfaces);
     }
     for (i, coil) in config.coils.iter().enumerate() {
         if let CoilShape::Region(region) = &coil.shape

@@ -14,6 +14,7 @@ pub(crate) mod locate_error;
 pub(crate) mod memory_limit;
 pub(crate) mod mesh;
 mod motion;
+mod open;
 mod outline;
 mod plausible;
 mod shape;
@@ -154,11 +155,12 @@ fn problem_on(
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probe_faults(config, source, &full_mesh, &mesh);
+    faults.extend(open::probe_faults(config, source, &full_mesh));
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
     faults.extend(plausible::element_faults(config, source, &full_mesh, &audits));
     let mut sink = DiagnosticSink::new(config, source, faults);
     if conductors.is_empty() && !motion_alone {
-        sink.take(check_conditions(&config.boundaries, source))?;
+        sink.take(check_conditions(config, source))?;
     }
     progress.stage(Stage::Unknowns);
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
@@ -236,9 +238,10 @@ fn check_names(
 }
 
 /// Refuses a field problem whose potential no surface fixes.
-fn check_conditions(conditions: &Boundaries, source: &SourceMap) -> Result<(), Error> {
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = conditions;
-    if !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some() {
+fn check_conditions(config: &Config, source: &SourceMap) -> Result<(), Error> {
+    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
+    let is_given = !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some();
+    if is_given || open::condition(config).is_some() {
         return Ok(());
     }
     let message = "no surface has a condition: the potential is known up to a constant only";
@@ -330,7 +333,10 @@ fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
 fn name_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = names(config, source, topology);
     faults.extend(field::coil_faults(config, source));
-    faults.extend(mesh::inner_faults(config, source, topology));
+    let open = open::faults(config, source);
+    let inner = mesh::inner_faults(config, source, topology).into_iter();
+    faults.extend(inner.filter(|fault| open.iter().all(|known| known.span != fault.span)));
+    faults.extend(open);
     faults.extend(functional::faults(config, source, topology));
     faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
     faults
@@ -359,6 +365,9 @@ fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagno
     }
     for (path, name) in functional::regions(config) {
         region(path, name);
+    }
+    if let Some(name) = config.open.as_ref().and_then(|open| open.region.as_deref()) {
+        region("open.region".to_owned(), name);
     }
     if let Some(remesh) = &config.remesh {
         if let config::RemeshExtent::Regions(names) = &remesh.extent {

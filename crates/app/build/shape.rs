@@ -210,6 +210,12 @@ fn overlap_faults(
                 .help("take the region out of remesh.region, or shrink remesh.box"),
         );
     }
+    if let Some(e) = model.open_elements().find(moves) {
+        let at = millimetres(centroid(mesh.vertices(e)));
+        let message = format!("the shell of open space reaches into the remesh region, at {at}");
+        let fault = source.diagnostic("open", message);
+        faults.push(fault.expected("a remesh region inside the shell, which does not move"));
+    }
     if let Some(e) = model.source_elements().find(moves) {
         let place = centroid(mesh.vertices(e));
         faults.push(

@@ -53,6 +53,9 @@ pub struct RunResult {
     /// Losses and probes at every frequency; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateResult>,
+    /// Open space, where the mesh has a shell that stands for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub open: Option<OpenResult>,
     /// The linear systems.
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
@@ -62,6 +65,13 @@ pub struct RunResult {
     pub warnings: Vec<String>,
     /// Most memory held [bytes].
     pub peak_memory_bytes: u64,
+}
+
+/// The part of open space in the field.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OpenResult {
+    /// Share of the field's energy in the shell, in the order of the frequencies.
+    pub energy_share: Vec<f64>,
 }
 
 /// The objective of a run.
@@ -81,9 +91,25 @@ pub struct ObjectiveResult {
     /// How the verified ratio came about; `None` without one, and where the initial design is the best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
+    /// How homogeneous the field is, where that is a term of the objective; its keys stand beside the others.
+    #[serde(flatten)]
+    pub homogeneity: Option<HomogeneityResult>,
     /// The terms at the best design.
     #[serde(default)]
     pub terms: Vec<TermResult>,
+}
+
+/// How homogeneous the field is at the best design, at the first frequency of the term.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct HomogeneityResult {
+    /// The mean of what is compared: of vectors, the modulus of their mean [T].
+    pub mean_b_t: f64,
+    /// Relative rms deviation from the mean, in parts per million.
+    pub rms_ppm: f64,
+    /// The same at the initial design; `None` where the objective has other terms too.
+    pub initial_rms_ppm: Option<f64>,
+    /// Largest less smallest value over the mean, in parts per million; of vectors, of their part along the mean.
+    pub peak_to_peak_ppm: f64,
 }
 
 /// The gain of a run computed again on a mesh that the optimiser never saw.
@@ -283,6 +309,7 @@ pub(crate) mod tests {
                     ratio: 0.5,
                     constraints: Vec::new(),
                 }),
+                homogeneity: None,
                 terms: vec![TermResult {
                     kind: "loss".to_owned(),
                     region: Some("plate".to_owned()),
@@ -327,6 +354,7 @@ pub(crate) mod tests {
             forces: Vec::new(),
             saturation: None,
             states: vec![],
+            open: None,
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],
                 worst_residual: 1e-11,

@@ -338,6 +338,7 @@ mod tests {
             best_evaluation: 1,
             verified_ratio: None,
             verification: None,
+            homogeneity: None,
             terms: Vec::new(),
         };
         let mut recorded = Recorded::default();

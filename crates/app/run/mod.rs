@@ -45,7 +45,7 @@ pub(crate) use resume::configuration;
 pub(crate) use resume::resume_held;
 pub use resume::{RunLimits, SavedRun, resume};
 pub use solve::solve;
-use summary::{constraints, linear_solver, terms};
+use summary::{constraints, homogeneity, linear_solver, terms};
 
 /// What a session needs besides the configuration.
 #[derive(Clone, Copy)]
@@ -190,6 +190,7 @@ impl Session<'_> {
                 best_evaluation: best.evaluation,
                 verified_ratio: None,
                 verification: None,
+                homogeneity: homogeneity(problem, &best.analysis, optimised.initial),
                 terms: terms(problem, &best.analysis),
             }),
             constraints: constraints(problem, &best.analysis, &optimised.bounds),

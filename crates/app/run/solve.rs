@@ -6,7 +6,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, RoundStart, S
 
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
-use super::summary::{constraints, terms};
+use super::summary::{constraints, homogeneity, terms};
 use super::{Options, Session};
 use crate::build::Mode;
 use crate::config::{Config, FieldsKept, SourceMap};
@@ -127,6 +127,7 @@ impl Session<'_> {
                 best_evaluation: 0,
                 verified_ratio: None,
                 verification: None,
+                homogeneity: homogeneity(problem, analysis, value),
                 terms: terms(problem, analysis),
             }),
             constraints: constraints(problem, analysis, &bounds),

@@ -7,7 +7,9 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timings};
-use fluxmorph_solver::{RigidMotion, SolverError, recovery, saturation};
+use fluxmorph_solver::{
+    FieldModel, FieldSolution, Functional, RigidMotion, SolverError, recovery, saturation,
+};
 
 use super::Session;
 use super::reservations::reservations;
@@ -15,8 +17,9 @@ use crate::build::force;
 use crate::config;
 use crate::error::Error;
 use crate::files::{
-    ConstraintResult, DesignResult, ForceResult, LinearSolverResult, MeshResult, ProbeResult, RunResult,
-    SaturatedRegion, SaturationResult, StateResult, StopReason, TermResult, peak_memory_bytes,
+    ConstraintResult, DesignResult, ForceResult, HomogeneityResult, LinearSolverResult, MeshResult,
+    OpenResult, ProbeResult, RunResult, SaturatedRegion, SaturationResult, StateResult, StopReason,
+    TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -73,6 +76,7 @@ impl Session<'_> {
             forces: self.forces(analysis)?,
             saturation: saturation(problem, analysis),
             states: if states.len() > 1 { states } else { Vec::new() },
+            open: open(problem, analysis)?,
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             warnings,
@@ -180,6 +184,22 @@ fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult
     })
 }
 
+/// The share of the energy in open space, where there is some.
+fn open(problem: &Problem, analysis: &Analysis) -> Result<Option<OpenResult>, Error> {
+    let share = |(model, solution): (&FieldModel, &FieldSolution)| -> Result<Option<f64>, Error> {
+        let Some(open) = model.setup().open else { return Ok(None) };
+        let of = |region| -> Result<f64, SolverError> {
+            Ok(Functional::energy(model, region)?.evaluate(model, &analysis.mesh, solution)?.value)
+        };
+        let (shell, all) = (of(Some(open.region))?, of(None)?);
+        Ok(Some(if all > 0.0 { shell / all } else { 0.0 }))
+    };
+    let shares =
+        problem.states().iter().zip(&analysis.solutions).map(share).collect::<Result<Vec<_>, _>>()?;
+    let shares: Option<Vec<f64>> = shares.into_iter().collect();
+    Ok(shares.map(|energy_share| OpenResult { energy_share }))
+}
+
 /// The terms of the objective at a design.
 pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
     let terms = problem.objective().into_iter().flat_map(|objective| &objective.terms);
@@ -191,6 +211,24 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
         value,
     };
     terms.zip(&analysis.terms).map(of).collect()
+}
+
+/// How homogeneous the field of an analysis is, for the first term that asks; `initial` is the objective at the initial design.
+pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) -> Option<HomogeneityResult> {
+    let terms = &problem.objective()?.terms;
+    let quality = |term: &Term| {
+        let index = *term.states.first()?;
+        let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
+        term.functional.field_quality(model, &analysis.mesh, solution)
+    };
+    let quality = terms.iter().find_map(quality)?;
+    let is_alone = matches!(terms.as_slice(), [term] if term.weight == 1.0 && term.states.len() == 1);
+    Some(HomogeneityResult {
+        mean_b_t: quality.mean,
+        rms_ppm: 1e6 * quality.rms,
+        initial_rms_ppm: is_alone.then(|| 1e6 * initial.sqrt()),
+        peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
+    })
 }
 
 /// The constraints at a design.

@@ -35,7 +35,7 @@ impl Named {
             _ => format!("{goal} a sum of {} terms", terms.len()),
         };
         let name = printable(&name).into_owned();
-        Self { name, unit: if is_one_unit { format!(" {unit}") } else { String::new() } }
+        Self { name, unit: if is_one_unit && unit != "1" { format!(" {unit}") } else { String::new() } }
     }
 }
 
@@ -61,6 +61,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     if let Some(saturation) = &result.saturation {
         rows.extend(saturation.regions.iter().map(saturated));
         rows.push(("Newton steps", saturation.newton_steps.to_string()));
+    }
+    if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
+        rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
     }
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
@@ -111,10 +114,23 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, initial", format!("{initial:.6e}{unit}")));
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
+    rows.extend(homogeneity(objective));
     if let Some(fresh) = &objective.verification {
         rows.push(("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets)));
     }
     rows
+}
+
+/// How homogeneous the field is.
+fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
+    let figures = objective.homogeneity?;
+    let before = figures.initial_rms_ppm.filter(|initial| *initial != figures.rms_ppm);
+    let before = before.map(|initial| format!(" (was {initial:.4})")).unwrap_or_default();
+    let text = format!(
+        "{:.4} ppm rms{before}, {:.4} ppm peak to peak, of a mean of {:.6e} T",
+        figures.rms_ppm, figures.peak_to_peak_ppm, figures.mean_b_t
+    );
+    Some(("homogeneity", text))
 }
 
 /// The frequencies of an analysis, and what was measured.
@@ -126,6 +142,7 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         // Of an analysis it is a measured quantity: there is no goal.
         let what = named.name.split_once(' ').map_or("", |(_, what)| what);
         rows.push(("value", format!("{value}  {what}").trim_end().to_owned()));
+        rows.extend(homogeneity(objective));
     }
     rows
 }

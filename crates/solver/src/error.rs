@@ -104,6 +104,32 @@ pub enum SolverError {
         /// Why, and what to do.
         fault: RegionFault,
     },
+    /// A region that cannot stand for open space.
+    #[error(
+        "the region `{region}` cannot be open space: at ({:.3}, {:.3}, {:.3}) mm {what}; a shell lies between two closed \
+         surfaces, or their parts between symmetry planes through the centre, of which every ray from the centre meets \
+         each once",
+        at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+    )]
+    Open {
+        /// Name of the region.
+        region: String,
+        /// Where [m].
+        at: [f64; 3],
+        /// What is wrong there.
+        what: String,
+    },
+    /// What open space cannot hold.
+    #[error(
+        "the open region `{region}` holds {what}; there is air alone, and a field that vanishes at infinity: matter and coils \
+         with their windows belong inside"
+    )]
+    OpenContents {
+        /// Name of the region.
+        region: String,
+        /// What is there.
+        what: &'static str,
+    },
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]
     EmptyRegion {

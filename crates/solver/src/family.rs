@@ -17,8 +17,9 @@ use crate::element::edge::{Ascending, EdgeShape, FieldPoint, tet::EdgeTet};
 use crate::element::lagrange::Lagrange;
 use crate::element::point::{self, PointField};
 use crate::element::quadratic::LagrangeTet;
+use crate::element::quadrature::Node;
 use crate::element::tabulated::Rule;
-use crate::element::tangent::Curls;
+use crate::element::tensor::{Curls, CurlsOfRule};
 use crate::element::virtual_work::{self, VirtualWork};
 use crate::element::volume::{AphiTet, Coefficients, NodalField};
 use crate::element::{Complex3, impedance, interface};
@@ -44,6 +45,12 @@ impl Local {
             *value = of(a);
         }
         Self { count, values }
+    }
+
+    /// Adds to one coefficient.
+    #[inline]
+    pub(crate) fn add(&mut self, carrier: usize, component: usize, value: c64) {
+        self.values[carrier][component] += value;
     }
 
     /// One entry a carrier.
@@ -72,6 +79,15 @@ pub struct Cell {
 impl Cell {
     fn ascending(&self) -> Ascending {
         Ascending::new(&self.tet, self.order)
+    }
+
+    /// The number, in the order of the mesh's vertices, of every point of a rule in their ascending order: rules are
+    /// symmetric, so that a permutation of the vertices permutes the points.
+    fn points_of(&self, rule: Rule) -> Vec<usize> {
+        let nodes = rule.nodes();
+        let same =
+            |(of_mesh, _): &Node, (ascending, _): &Node| self.ascending_coordinates(of_mesh) == *ascending;
+        nodes.iter().map(|to| nodes.iter().position(|from| same(from, to)).expect("symmetric")).collect()
     }
 
     /// Barycentric coordinates in ascending order of the vertices.
@@ -103,10 +119,15 @@ impl<const N: usize> From<VirtualWork<N>> for (LocalIntegral<4>, [Point; 4]) {
 /// What receives functions: carrier, component, value [1/m or 1], curl [1/m² or 1/m].
 pub type EachFunction<'a> = dyn FnMut(usize, usize, Point, Point) + 'a;
 
+/// What receives curls: point of the rule, carrier, component, curl [1/m² or 1/m].
+pub(crate) type EachCurl<'a> = dyn FnMut(usize, usize, usize, Point) + 'a;
+
 /// Elements of one family and order.
 pub(crate) trait Family: Sync {
     /// Every function at a point given by the barycentric coordinates of the mesh's vertices.
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>);
+    /// The curl of every function that has one, at the points of a rule.
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>);
     /// The field at such a point.
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint;
     /// The field at a vertex, by its place in the mesh's order.
@@ -168,11 +189,19 @@ pub(crate) trait Family: Sync {
 }
 
 /// The matrices of elements with `N` and faces with `F` carriers.
-pub(crate) trait Matrices<const N: usize, const F: usize>: Sync {
+pub(crate) trait Matrices<const N: usize, const F: usize>: Family {
+    /// The curls of all functions at the points of a rule.
+    fn curls(&self, cell: &Cell, rule: Rule) -> Vec<Curls<N>> {
+        let mut curls = vec![[[[0.0; 3]; 4]; N]; rule.nodes().len()];
+        self.each_curl(cell, rule, &mut |point, carrier, component, curl| {
+            curls[point][carrier][component] = curl
+        });
+        curls
+    }
     /// Of a tetrahedron.
     fn tet(&self, cell: Cell, law: Coefficients) -> impl LocalMatrix<c64, N, 4>;
-    /// Curls of its functions.
-    fn curls(&self, cell: &Cell) -> Curls<N>;
+    /// The same at the points of [`Family::flux_integral`], in its order.
+    fn flux_curls(&self, cell: &Cell) -> CurlsOfRule<N>;
     /// Of a surface term.
     fn triangle(&self, vertices: [Point; 3], term: SurfaceTerm) -> impl LocalMatrix<c64, F, 4>;
 }
@@ -238,9 +267,10 @@ impl From<PointField> for FieldPoint {
     }
 }
 
+const UNIT: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 impl<const N: usize, const F: usize> Family for Nodal<N, F> {
     fn functions(&self, cell: &Cell, lambda: &[f64; 4], each: &mut EachFunction<'_>) {
-        const UNIT: [Point; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for a in 0..N {
             let value = self.tet.value(a, lambda);
             let gradient = point::gradient(self.tet, &cell.tet, lambda, a);
@@ -248,6 +278,17 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
                 each(a, d, unit.map(|u| value * u), cross(gradient, unit));
             }
             each(a, 3, gradient, [0.0; 3]);
+        }
+    }
+
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>) {
+        for (point, at) in self.tet.at(rule).iter().enumerate() {
+            for a in 0..N {
+                let gradient = at.gradient(&cell.tet.gradients, a);
+                for (d, unit) in UNIT.into_iter().enumerate() {
+                    each(point, a, d, cross(gradient, unit));
+                }
+            }
         }
     }
 
@@ -362,7 +403,7 @@ impl Matrices<4, 3> for Nodal<4, 3> {
         AphiTet::new(cell.tet, law)
     }
 
-    fn curls(&self, cell: &Cell) -> Curls<4> {
+    fn flux_curls(&self, cell: &Cell) -> CurlsOfRule<4> {
         point::curls(self.tet, &cell.tet)
     }
 
@@ -378,7 +419,7 @@ impl Matrices<10, 6> for Nodal<10, 6> {
         LagrangeTet::new(self.tet, cell.tet, law)
     }
 
-    fn curls(&self, cell: &Cell) -> Curls<10> {
+    fn flux_curls(&self, cell: &Cell) -> CurlsOfRule<10> {
         point::curls(self.tet, &cell.tet)
     }
 
@@ -394,6 +435,13 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         for (carrier, component, value, curl) in self.tet.functions_at(&cell.ascending(), &lambda) {
             each(carrier, component, value, curl);
         }
+    }
+
+    fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>) {
+        let points = cell.points_of(rule);
+        self.tet.each_curl(&cell.ascending(), rule, &mut |point, carrier, component, curl| {
+            each(points[point], carrier, component, curl);
+        });
     }
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
@@ -496,7 +544,7 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Matrices<N,
         EdgeTet::new(self.tet, &cell.ascending(), law)
     }
 
-    fn curls(&self, cell: &Cell) -> Curls<N> {
+    fn flux_curls(&self, cell: &Cell) -> CurlsOfRule<N> {
         self.tet.curls(&cell.ascending())
     }
 

@@ -27,6 +27,7 @@ use crate::load::Sources;
 use crate::material::Material;
 use crate::newton::{self, NewtonObserver};
 use crate::nonlinear::Tangents;
+use crate::open::{self, OpenRegion, Shell};
 use crate::solution::FieldSolution;
 use crate::space::{ElementFamily, Order, Space};
 use crate::surface::{Conductor, SurfaceTerm};
@@ -57,6 +58,8 @@ pub struct FieldModelSetup {
     pub coils: Vec<Coil>,
     /// Conditions on named surfaces; outer faces without one are natural.
     pub boundaries: Vec<(String, Boundary)>,
+    /// The region that stands for open space, if one does.
+    pub open: Option<OpenRegion>,
     /// Linear solver.
     pub linear_solver: LinearSolverSettings,
     /// The ranks over which the problem is distributed, and how they solve; `None` for one process.
@@ -77,6 +80,7 @@ impl Default for FieldModelSetup {
             conductors: Vec::new(),
             coils: Vec::new(),
             boundaries: Vec::new(),
+            open: None,
             linear_solver: LinearSolverSettings::default(),
             ownership: None,
         }
@@ -152,6 +156,9 @@ impl FieldModel {
         let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
         let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
         continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
+        if let Some(shell) = weak_form.shell() {
+            open::check_contents(shell, mesh, &setup, sources.fixed_elements())?;
+        }
         let shared = Arc::new(SharedParts { fine, sources, analysis: analysis.map(Arc::new) });
         Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
     }
@@ -198,6 +205,7 @@ impl FieldModel {
             &setup.materials,
             &setup.boundaries,
             &setup.conductors,
+            setup.open.as_ref(),
         )?;
         Ok((angular_frequency, form.with_curves(&setup.bh)))
     }
@@ -374,6 +382,11 @@ impl FieldModel {
         &self.setup.coils
     }
 
+    /// Elements of the shell that stands for open space, ascending: these must not move.
+    pub fn open_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.weak_form.shell().into_iter().flat_map(Shell::elements)
+    }
+
     /// Elements that a coil meets: these must not move.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.shared.sources.fixed_elements()
@@ -415,6 +428,10 @@ impl FieldModel {
     #[inline]
     pub fn coefficients_of(&self, e: ElementId) -> &Coefficients {
         self.weak_form.coefficients_of(e)
+    }
+
+    pub(crate) fn form(&self) -> &WeakForm {
+        &self.weak_form
     }
 
     pub(crate) fn surface(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::bh::{BhCurve, Tangent};
 use crate::element::Complex3;
 use crate::element::density::OfFlux;
-use crate::element::tangent::MOST_POINTS;
+use crate::element::tensor::MOST_POINTS;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;

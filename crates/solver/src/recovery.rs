@@ -61,10 +61,11 @@ pub fn recovered_flux_density(
     point: Point,
 ) -> Complex3 {
     let topology = model.topology();
-    // A magnet's face is one even where its permeability is that of air.
+    // A magnet's face is one even where its permeability is that of air, and that of open space is one of the map.
     let material = |e: ElementId| {
         let linear = model.materials()[topology.region_of()[e.index()].index()];
-        (linear, model.remanence_of(e), model.curve_of(e))
+        let is_open = model.form().stretch_of(e).is_some();
+        (linear, model.remanence_of(e), model.curve_of(e), is_open)
     };
     let mut elements = BTreeSet::from([element]);
     for _ in 0..LAYERS_LIMIT {

@@ -98,7 +98,8 @@ impl FieldSolution {
     #[inline]
     pub fn at(&self, model: &FieldModel, mesh: &Mesh, e: ElementId, lambda: &[f64; 4]) -> FieldPoint {
         let space = model.space();
-        space.elements().field(&space.cell(mesh, e), lambda, self.element(model, e).values())
+        let field = space.elements().field(&space.cell(mesh, e), lambda, self.element(model, e).values());
+        outside(model, e, lambda, field)
     }
 
     /// `A_x, A_y, A_z` [T m] and `ψ` [T m²] at nodes of the mesh. Edge elements do not tell `A` from `∇ψ`, and are
@@ -132,7 +133,8 @@ impl FieldSolution {
     #[inline]
     fn at_centroid(&self, model: &FieldModel, mesh: &Mesh, e: ElementId) -> FieldPoint {
         let space = model.space();
-        space.elements().at_centroid(&space.cell(mesh, e), self.element(model, e).values())
+        let field = space.elements().at_centroid(&space.cell(mesh, e), self.element(model, e).values());
+        outside(model, e, &[0.25; 4], field)
     }
 
     /// `B` [T] in every element, shape `(n_tets, 3)`.
@@ -223,6 +225,17 @@ impl FieldSolution {
         }
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));
         losses
+    }
+}
+
+/// The field at the place that a point of the open shell stands for; elsewhere as it is.
+#[inline]
+fn outside(model: &FieldModel, e: ElementId, lambda: &[f64; 4], field: FieldPoint) -> FieldPoint {
+    match model.form().stretch_of(e) {
+        Some(stretch) => {
+            FieldPoint { flux_density: stretch.flux_density(lambda, field.flux_density), ..field }
+        }
+        None => field,
     }
 }
 

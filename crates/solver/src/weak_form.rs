@@ -10,12 +10,14 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
 use crate::boundary::Boundary;
-use crate::element::tangent::{CurlMatrix, WithTangent};
+use crate::element::tabulated::Rule;
+use crate::element::tensor::{CurlsOfRule, TensorField, TensorTerm, WithTensor};
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
 use crate::nonlinear::Tangents;
+use crate::open::{OpenRegion, Shell, Stretch};
 use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
 use crate::unknowns::Conductors;
@@ -31,6 +33,7 @@ pub(crate) struct WeakForm {
     /// Those of a region with a curve, ascending.
     elements_with_a_law: Vec<ElementId>,
     surfaces: Surfaces,
+    shell: Option<Shell>,
 }
 
 impl WeakForm {
@@ -38,7 +41,7 @@ impl WeakForm {
     /// factor `p`.
     ///
     /// # Errors
-    /// As [`Surfaces::new`].
+    /// As [`Surfaces::new`] and [`Shell::new`].
     pub(crate) fn new(
         mesh: &Mesh,
         elements: (ElementFamily, Order),
@@ -46,6 +49,7 @@ impl WeakForm {
         materials: &[Material],
         boundaries: &[(String, Boundary)],
         conductors: &[Conductor],
+        open: Option<&OpenRegion>,
     ) -> Result<Self, SolverError> {
         let coefficients: Vec<Coefficients> = materials
             .iter()
@@ -57,8 +61,16 @@ impl WeakForm {
             .collect();
         let surfaces =
             Surfaces::new(mesh, elements, &coefficients, boundaries, conductors, angular_frequency)?;
+        let shell = open.map(|open| Shell::new(mesh, open)).transpose()?;
         let topology = Arc::clone(mesh.topology());
-        Ok(Self { topology, coefficients, curves: Vec::new(), elements_with_a_law: Vec::new(), surfaces })
+        Ok(Self {
+            topology,
+            coefficients,
+            curves: Vec::new(),
+            elements_with_a_law: Vec::new(),
+            surfaces,
+            shell,
+        })
     }
 
     /// The same with B–H laws by region; the rest is linear.
@@ -97,7 +109,26 @@ impl WeakForm {
 
     /// Whether the three components of `A` couple inside an element.
     pub(crate) fn couples_components(&self, e: ElementId) -> bool {
-        self.coefficients.iter().any(|c| c.extra_penalty != 0.0) || self.curve_of(e).is_some()
+        self.coefficients.iter().any(|c| c.extra_penalty != 0.0)
+            || self.curve_of(e).is_some()
+            || self.stretch_of(e).is_some()
+    }
+
+    /// The shell that stands for open space.
+    pub(crate) fn shell(&self) -> Option<&Shell> {
+        self.shell.as_ref()
+    }
+
+    /// The map of an element of that shell.
+    #[inline]
+    pub(crate) fn stretch_of(&self, e: ElementId) -> Option<&Stretch> {
+        self.shell.as_ref().and_then(|shell| shell.of(e))
+    }
+
+    /// What the reluctivity of an element is beyond the scalar of its region; `None` where it is that scalar.
+    pub(crate) fn tensors_of(&self, e: ElementId) -> Option<TensorField> {
+        let reluctivity = self.coefficients_of(e).reluctivity;
+        self.stretch_of(e).map(|stretch| stretch.tensors(reluctivity, Rule::Degree5))
     }
 
     /// Triangles with a term.
@@ -135,9 +166,18 @@ impl WeakForm {
         cell: Cell,
         (e, tangents): (ElementId, Option<&Tangents>),
     ) -> impl LocalMatrix<c64, N, 4> {
-        let tangent = tangents.and_then(|tangents| tangents.of(e));
-        let tangent = tangent.map(|tensors| Box::new(CurlMatrix::new(matrices.curls(&cell), tensors)));
-        WithTangent { linear: matrices.tet(cell, *self.coefficients_of(e)), tangent }
+        let term = match tangents.and_then(|tangents| tangents.of(e)) {
+            Some(tensors) => {
+                let CurlsOfRule { count, weights, curls } = matrices.flux_curls(&cell);
+                Some(TensorTerm::new((0..count).map(|p| (weights[p], &tensors[p], &curls[p]))))
+            }
+            None => self.tensors_of(e).map(|field| {
+                let curls = matrices.curls(&cell, field.rule);
+                let points = field.rule.nodes().iter().zip(&field.values).zip(&curls);
+                TensorTerm::new(points.map(|(((_, share), d), curls)| (share * cell.tet.volume, d, curls)))
+            }),
+        };
+        WithTensor { scalar: matrices.tet(cell, *self.coefficients_of(e)), term }
     }
 
     /// The matrix of a triangle, by its number.

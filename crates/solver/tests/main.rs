@@ -5,6 +5,7 @@ mod coil_regions;
 mod edge;
 mod grounding;
 mod guards;
+mod open;
 mod prisms;
 mod saturation;
 mod sheet;

@@ -6,6 +6,7 @@ mod advice;
 mod summary;
 mod table;
 mod text;
+mod truncation;
 
 use std::io::Write;
 

@@ -11,9 +11,10 @@ use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
+use super::truncation::Truncation;
 use crate::build::{Audited, Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{
-    Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Optimizer, Probe, RegionModel,
+    Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Open, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
 };
 use crate::error::Error;
@@ -51,6 +52,9 @@ pub(super) struct Summary<'a> {
     pub(super) linear_solvers: Vec<String>,
     pub(super) coils: &'a [Coil],
     pub(super) boundaries: &'a Boundaries,
+    pub(super) open: Option<&'a Open>,
+    /// The nearest wall, where space is not open.
+    pub(super) truncation: Option<Truncation>,
     pub(super) objective: Option<&'a Objective>,
     /// Unit of the objective in SI; `None` where its terms have several.
     pub(super) objective_unit: Option<&'static str>,
@@ -201,6 +205,8 @@ pub(super) fn summary<'a>(
         linear_solvers: problem.states().iter().map(FieldModel::method_name).collect(),
         coils: &config.coils,
         boundaries: &config.boundaries,
+        open: config.open.as_ref(),
+        truncation: Truncation::of(&setup),
         objective: config.objective.as_ref(),
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,

@@ -75,6 +75,21 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         let [x, y, z] = field.b;
         row("uniform field", format!("({x}, {y}, {z}) T on {}", field.surfaces.join(", ")));
     }
+    if let Some(open) = summary.open {
+        let beyond = open.region.as_deref().map_or_else(|| open.surfaces.join(", "), str::to_owned);
+        row("open space", format!("beyond {beyond}"));
+    }
+    if let Some(wall) = &summary.truncation {
+        let (distance, size) = (millimetre(wall.distance_m), millimetre(wall.source_size_m));
+        let times = wall.distance_m / wall.source_size_m;
+        row(
+            "nearest wall",
+            format!(
+                "{}: {distance} mm from coils and matter, {times:.1} of their half diagonal {size} mm; [open] takes walls away",
+                wall.surface
+            ),
+        );
+    }
     row("linear solver", summary.linear_solvers.join(", "));
     match summary.objective {
         Some(objective) => {

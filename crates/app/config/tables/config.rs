@@ -14,6 +14,7 @@ use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
 use super::objective::{Objective, Probe};
+use super::open::Open;
 use super::optimizer::Optimizer;
 use super::output::Output;
 use super::remesh::Remesh;
@@ -23,8 +24,8 @@ use crate::config::table::table;
 use crate::config::text::source::SourceMap;
 
 /// The tables that only mean something to a field problem.
-const OF_THE_FIELD: [&str; 7] =
-    ["coils", "forces", "objective", "boundaries", "constraints", "materials", "regions"];
+const OF_THE_FIELD: [&str; 8] =
+    ["coils", "forces", "objective", "boundaries", "open", "constraints", "materials", "regions"];
 
 table! {
     /// The configuration of a run of Fluxmorph. A quantity is a text with a unit, such as "10 mm", or a bare number in SI.
@@ -45,6 +46,8 @@ table! {
         boundaries: Boundaries = TABLE => Boundaries::default();
         /// Bodies on which the force is reported.
         forces: Vec<ForceBody> = TABLES => Vec::new();
+        /// Open space around the mesh.
+        open: Option<Open> = TABLE;
         /// What is optimised; needed by `run` and `gradient`.
         objective: Option<Objective> = TABLE;
         /// What must keep within bounds meanwhile.

@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::design::COMPONENTS;
-use super::functional::{Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
+use super::functional::{Compared, Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
 use crate::config::table::kinds::{WORD, quantity};
 use crate::config::table::rules::{Rules, Then, is, present};
@@ -62,6 +62,8 @@ table! {
         /// As in `[objective]`.
         target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
         /// As in `[objective]`.
+        compare: Option<Compared> = WORD;
+        /// As in `[objective]`.
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// As in `[objective]`.
@@ -80,14 +82,14 @@ table! {
 }
 
 /// The keys of a functional of the field.
-const OF_A_FIELD: [&str; 4] = ["weighting", "target", "direction", "frequency"];
+const OF_A_FIELD: [&str; 5] = ["weighting", "target", "compare", "direction", "frequency"];
 /// The keys of a bound on a value.
 const BOUNDS: [&str; 2] = ["upper", "upper_ratio"];
 /// The keys of a bound on a thickness.
 const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
 /// The keys that a thickness does not have.
-const NOT_OF_A_THICKNESS: [&str; 7] =
-    ["region", "weighting", "target", "direction", "frequency", "upper", "upper_ratio"];
+const NOT_OF_A_THICKNESS: [&str; 8] =
+    ["region", "weighting", "target", "compare", "direction", "frequency", "upper", "upper_ratio"];
 
 impl LimitKeys {
     /// The keys that go with other kinds.
@@ -124,6 +126,7 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
     let units = [
         (json!({ "allOf": [sums, by_volume] }), Dimension::FluxDensityIntegral, Range::POSITIVE),
         (json!({ "allOf": [sums, { "not": by_volume }] }), Dimension::FluxDensitySquared, Range::POSITIVE),
+        (is("kind", &["homogeneity"]), Dimension::Ratio, Range::POSITIVE),
         (is("kind", &["field_component"]), Dimension::FluxDensity, Range::FINITE),
         (is("kind", &["loss"]), Dimension::Power, Range::POSITIVE),
         (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
@@ -199,6 +202,8 @@ choice! {
         /// As in `[objective]`.
         TargetField = "target_field" | "uniformity",
         /// As in `[objective]`.
+        Homogeneity = "homogeneity",
+        /// As in `[objective]`.
         FieldComponent = "field_component",
         /// As in `[objective]`.
         Loss = "loss",
@@ -255,6 +260,7 @@ impl Group for Limit {
         let field = match kind {
             Kind::FluxDensitySquared => ObjectiveKind::FluxDensitySquared,
             Kind::TargetField => ObjectiveKind::TargetField,
+            Kind::Homogeneity => ObjectiveKind::Homogeneity,
             Kind::FieldComponent => ObjectiveKind::FieldComponent,
             Kind::Loss => ObjectiveKind::Loss,
             Kind::Energy => ObjectiveKind::Energy,
@@ -270,8 +276,8 @@ impl Group for Limit {
 
 impl Limit {
     fn field(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
-        let LimitKeys { region, weighting, target, direction, frequency, upper_ratio, .. } = written;
-        let mut functional = Functional { kind, region, weighting, target, direction, frequency };
+        let LimitKeys { region, weighting, target, compare, direction, frequency, upper_ratio, .. } = written;
+        let mut functional = Functional { kind, region, weighting, target, compare, direction, frequency };
         functional.check(section);
         let range = match kind {
             ObjectiveKind::FieldComponent | ObjectiveKind::Force | ObjectiveKind::Torque => Range::FINITE,

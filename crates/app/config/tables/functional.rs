@@ -15,12 +15,15 @@ table! {
         /// The region it is measured in; for `force` and `torque` a body of `[[forces]]`. Required, but for `energy`: without it
         /// the energy is that of everything that is meshed.
         region: Option<String> = TEXT;
-        /// For `flux_density_squared` and `target_field`: how the cells of the region are weighted. Default `"point"`, as in the
-        /// paper.
+        /// For `flux_density_squared`, `target_field` and `homogeneity`: how the cells of the region are weighted. Default
+        /// `"point"`, as in the paper; of `homogeneity` `"volume"`.
         weighting: Option<Weighting> = WORD;
         /// For `target_field`, required: the flux density wished for [T].
         target: Option<[f64; 3]> = quantity(FluxDensity, FINITE);
-        /// For `field_component`, `force` and `torque`, required: a vector along the component; its length does not matter.
+        /// For `homogeneity`: what is compared with its mean. Default: the component along `direction`, without one the vector.
+        compare: Option<Compared> = WORD;
+        /// For `field_component`, `force` and `torque`, required, and for `homogeneity`: a vector along the component; its length
+        /// does not matter.
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// The one frequency it is taken at [Hz], one of `[analysis]`. Default: the values at all frequencies are added.
@@ -34,6 +37,9 @@ pub(super) const TARGET_FIELD: [&str; 2] = ["target_field", "uniformity"];
 /// Kinds that are a component.
 const DIRECTED: [&str; 3] = ["field_component", "force", "torque"];
 
+/// Kinds that may have one.
+const MAY_BE_DIRECTED: [&str; 4] = ["field_component", "force", "torque", "homogeneity"];
+
 /// Which keys go with which kind.
 pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
     rules
@@ -46,7 +52,10 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
         .when("kind", &TARGET_FIELD, Then { required: &["target"], refused: &[] })
         .unless("kind", &TARGET_FIELD, Then { required: &[], refused: &["target"] })
         .when("kind", &DIRECTED, Then { required: &["direction"], refused: &[] })
-        .unless("kind", &DIRECTED, Then { required: &[], refused: &["direction"] })
+        .unless("kind", &MAY_BE_DIRECTED, Then { required: &[], refused: &["direction"] })
+        .unless("kind", &["homogeneity"], Then { required: &[], refused: &["compare"] })
+        .when("compare", &["component"], Then { required: &["direction"], refused: &[] })
+        .when("compare", &["vector", "modulus"], Then { required: &[], refused: &["direction"] })
 }
 
 choice! {
@@ -57,6 +66,9 @@ choice! {
         /// Deviation from a field that is wished for: Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is
         /// to vanish. A field that is even but of another strength counts as deviating. The region must not move.
         TargetField = "target_field" | "uniformity",
+        /// Deviation from the field's own mean, whatever that is: Σ w |b − b̄|² / Σ w |b̄|² [1], the square of the relative rms
+        /// deviation, for b as `compare` says; the result has its figures in ppm. The region must not move.
+        Homogeneity = "homogeneity",
         /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. The region must not move.
         FieldComponent = "field_component",
         /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
@@ -74,6 +86,18 @@ choice! {
 }
 
 choice! {
+    /// What of B is compared with its mean.
+    pub enum Compared {
+        /// The vector.
+        Vector = "vector",
+        /// The component along `direction`.
+        Component = "component",
+        /// The modulus |B|.
+        Modulus = "modulus",
+    }
+}
+
+choice! {
     /// Weights of the cells of a region.
     pub enum Weighting {
         /// One term for each observation cell, as in the paper.
@@ -86,7 +110,7 @@ choice! {
 impl ObjectiveKind {
     /// Whether the cells are weighted.
     fn sums_over_cells(self) -> bool {
-        matches!(self, Self::FluxDensitySquared | Self::TargetField)
+        matches!(self, Self::FluxDensitySquared | Self::TargetField | Self::Homogeneity)
     }
 
     /// Whether it acts on a body of `[[forces]]`.
@@ -99,13 +123,18 @@ impl Functional {
     /// Checks which keys go with the kind, and completes what follows from it.
     pub(super) fn check(&mut self, section: &Section<'_>) {
         let kind = self.kind;
+        let is_homogeneity = kind == ObjectiveKind::Homogeneity;
+        let is_component =
+            DIRECTED.contains(&kind.name()) || is_homogeneity && self.compare == Some(Compared::Component);
+        let takes_direction = is_component || is_homogeneity && self.compare.is_none();
         if !section.has("region") && kind != ObjectiveKind::Energy {
             section.missing(&["region"], "region = \"observation\"");
         }
         for (key, example, wanted) in [
             ("weighting", None, kind.sums_over_cells()),
             ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::TargetField),
-            ("direction", Some("direction = [0, 0, 1]"), DIRECTED.contains(&kind.name())),
+            ("direction", is_component.then_some("direction = [0, 0, 1]"), takes_direction),
+            ("compare", None, is_homogeneity),
         ] {
             match (section.has(key), example) {
                 (true, _) if !wanted => {
@@ -118,7 +147,12 @@ impl Functional {
             }
         }
         self.direction = self.direction.and_then(|vector| unit_vector(section, vector));
-        self.weighting = kind.sums_over_cells().then(|| self.weighting.unwrap_or(Weighting::Point));
+        let usual = if is_homogeneity { Weighting::Volume } else { Weighting::Point };
+        self.weighting = kind.sums_over_cells().then(|| self.weighting.unwrap_or(usual));
+        if is_homogeneity && self.compare.is_none() {
+            let given = if self.direction.is_some() { Compared::Component } else { Compared::Vector };
+            self.compare = Some(given);
+        }
     }
 
     /// Checks that its frequency is analysed, and that a loss is not sought where nothing is induced; `analysed` [Hz] is
@@ -147,6 +181,7 @@ impl Functional {
             (ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField, _) => {
                 Dimension::FluxDensitySquared
             }
+            (ObjectiveKind::Homogeneity, _) => Dimension::Ratio,
             (ObjectiveKind::FieldComponent, _) => Dimension::FluxDensity,
             (ObjectiveKind::Loss, _) => Dimension::Power,
             (ObjectiveKind::Energy, _) => Dimension::Energy,

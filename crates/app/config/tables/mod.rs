@@ -14,6 +14,7 @@ mod material;
 mod mesh;
 mod morph;
 mod objective;
+mod open;
 mod optimizer;
 mod order;
 mod output;
@@ -29,7 +30,7 @@ pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
-pub use functional::{Functional, ObjectiveKind, Weighting};
+pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use material::{Material, Region, RegionModel};
@@ -42,6 +43,7 @@ pub use morph::{
     Target, Tune, TunedParameter,
 };
 pub use objective::{Goal, Objective, Probe, Sum, Term};
+pub use open::Open;
 pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use petsc::{Petsc, PetscKrylov, PetscSolver, PetscSubSolver};

@@ -98,6 +98,9 @@ dimensions! {
     /// A torque [N m].
     Torque = "a torque", in "N m", such as "1.5 N m":
         decimal("N m", 0), decimal("Nm", 0), decimal("mN m", -3), decimal("mNm", -3), decimal("kN m", 3), decimal("kNm", 3);
+    /// A ratio of like quantities [1].
+    Ratio = "a ratio", in "1", such as "1e-8 1":
+        decimal("1", 0);
     /// A volume [m³].
     Volume = "a volume", in "m\u{b3}", such as "400 cm3":
         decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("cm3", -6),

@@ -2,8 +2,8 @@
 
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
-    Algorithm, BodyKind, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal, Limit,
-    ObjectiveKind, UpperBound, Weighting,
+    Algorithm, BodyKind, Compared, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal,
+    Limit, ObjectiveKind, UpperBound, Weighting,
 };
 
 /// What is made small or large.
@@ -36,6 +36,14 @@ pub(super) fn functional(functional: &Functional) -> String {
         ObjectiveKind::TargetField => {
             let target = functional.target.unwrap_or_default().map(given).join(", ");
             sum(&format!("|B − ({target}) T|²"))
+        }
+        ObjectiveKind::Homogeneity => {
+            let of = match functional.compare {
+                Some(Compared::Component) => format!("B along ({})", along(functional)),
+                Some(Compared::Modulus) => "|B|".to_owned(),
+                _ => "B".to_owned(),
+            };
+            format!("the relative variance of {of} over {region} (its deviation from its own mean)")
         }
         ObjectiveKind::FieldComponent => format!("the mean of B along ({}) in {region}", along(functional)),
         ObjectiveKind::Loss => format!("the eddy-current loss in {region}"),

@@ -9,8 +9,8 @@
 //! components of `A` couple on those triangles only. [`volume`] holds the linear tetrahedron, [`quadratic`] that of any
 //! order, [`interface`] the triangles, [`impedance`] the Leontovich surface with `ψ` on it; [`lagrange`], [`quadrature`] and
 //! [`tabulated`] what they are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
-//! [`tangent`] what a B–H law adds to the matrix; [`density`] integrals of energy and loss with their derivatives;
-//! [`virtual_work`] forces; `edge` all of that for edge elements.
+//! [`tensor`] what reluctivities that are tensors add to the matrix; [`density`] integrals of energy and loss with their
+//! derivatives; [`virtual_work`] forces; `edge` all of that for edge elements.
 
 pub mod density;
 #[cfg(test)]
@@ -23,7 +23,7 @@ pub mod point;
 pub mod quadratic;
 pub mod quadrature;
 pub mod tabulated;
-pub mod tangent;
+pub mod tensor;
 mod triangle;
 pub mod virtual_work;
 pub mod volume;

@@ -5,7 +5,7 @@ use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::lagrange::Lagrange;
 use super::tabulated::{Rule, Tabulated};
-use super::tangent::Curls;
+use super::tensor::CurlsOfRule;
 use super::volume::{Coefficients, NodalField};
 use super::{Complex3, cross3, dot3};
 
@@ -195,8 +195,8 @@ pub fn flux_shape_derivative<const N: usize>(
 }
 
 /// Curls of all functions at the points of the rule that is exact for their products.
-pub fn curls<const N: usize>(shape: &Lagrange<N, 4>, tet: &Tet4) -> Curls<N> {
-    let mut of = Curls::default();
+pub fn curls<const N: usize>(shape: &Lagrange<N, 4>, tet: &Tet4) -> CurlsOfRule<N> {
+    let mut of = CurlsOfRule::default();
     for at in shape.at(if N == 4 { Rule::Centroid } else { Rule::Degree2 }) {
         of.weights[of.count] = at.share * tet.volume;
         for (a, curls) in of.curls[of.count].iter_mut().enumerate() {

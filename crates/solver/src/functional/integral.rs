@@ -10,8 +10,9 @@ use rayon::prelude::*;
 use super::{FunctionalValue, is_static};
 use crate::element::Complex3;
 use crate::element::density::squared_deviation;
+use crate::element::tensor::TensorField;
 use crate::error::SolverError;
-use crate::family::LocalIntegral;
+use crate::family::{Cell, Family, Local, LocalIntegral};
 use crate::model::FieldModel;
 use crate::nonlinear;
 use crate::solution::FieldSolution;
@@ -91,7 +92,11 @@ impl Integral {
                     }
                     let factor = share * model.coefficients_of(e).reluctivity;
                     let density = squared_deviation(factor, model.remanence_of(e));
-                    elements.flux_integral(&cell, field.values(), &mut |b| density(b))
+                    let mut energy = elements.flux_integral(&cell, field.values(), &mut |b| density(b));
+                    if let Some(tensors) = model.form().tensors_of(e) {
+                        add_tensor_energy(elements, &cell, (share, &tensors), &field, &mut energy);
+                    }
+                    energy
                 });
             }
             Self::VolumeLoss(of) => sum.elements(of, |e| {
@@ -117,6 +122,34 @@ impl Integral {
         }
         sum.into_value()
     }
+}
+
+/// Adds `f ∫B̄·D B` of a tensor at the points of its rule, in an element that is held.
+fn add_tensor_energy(
+    elements: &dyn Family,
+    cell: &Cell,
+    (factor, tensors): (f64, &TensorField),
+    field: &Local,
+    energy: &mut LocalIntegral<4>,
+) {
+    let mut flux_densities = vec![[c64::default(); 3]; tensors.values.len()];
+    elements.each_curl(cell, tensors.rule, &mut |point, carrier, component, curl| {
+        let u = field.values()[carrier][component];
+        (0..3).for_each(|d| flux_densities[point][d] += u * curl[d]);
+    });
+    let points = tensors.rule.nodes().iter().zip(&tensors.values).zip(&flux_densities);
+    let strengths: Vec<Complex3> = points
+        .map(|(((_, share), d), b)| {
+            let weight = factor * share * cell.tet.volume;
+            d.map(|row| (0..3).map(|j| weight * row[j] * b[j].conj()).sum())
+        })
+        .collect();
+    for (b, h) in flux_densities.iter().zip(&strengths) {
+        energy.value += (0..3).map(|d| (b[d] * h[d]).re).sum::<f64>();
+    }
+    elements.each_curl(cell, tensors.rule, &mut |point, carrier, component, curl| {
+        energy.potentials.add(carrier, component, (0..3).map(|d| strengths[point][d] * curl[d]).sum());
+    });
 }
 
 /// Gathers element integrals.

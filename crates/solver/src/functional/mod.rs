@@ -2,10 +2,12 @@
 //!
 //! `dF/dx = explicit − 2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )` with `K λ = ∂F/∂u`: [`FunctionalValue::derivative`] is the right
 //! side of the adjoint problem, [`FunctionalValue::explicit`] the first term, and [`crate::adjoint`] the second.
-//! `observation` holds what is a function of B in cells that do not move, `integral` the integrals of densities over
-//! regions that may, `force` the virtual work around a body. Weighted sums, bounds and several frequencies are the optimiser's business.
+//! `observation` holds what is a function of B in cells that do not move, `homogeneity` its deviation from its own mean,
+//! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body. Weighted sums,
+//! bounds and several frequencies are the optimiser's business.
 
 mod force;
+mod homogeneity;
 mod integral;
 mod observation;
 
@@ -18,6 +20,7 @@ use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 pub use force::{Force, RigidMotion};
+pub use homogeneity::{Compared, FieldQuality};
 pub use integral::Integral;
 pub use observation::{Observation, Observed, Weighting};
 
@@ -102,6 +105,19 @@ impl Functional {
         match self {
             Self::Observation(observation) => observation.cell_flux_densities(model, mesh, solution),
             Self::Integral(_) | Self::Force(_) => Vec::new(),
+        }
+    }
+
+    /// How homogeneous the field is, where that is what is observed.
+    pub fn field_quality(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Option<FieldQuality> {
+        match self {
+            Self::Observation(observation) => observation.field_quality(model, mesh, solution),
+            Self::Integral(_) | Self::Force(_) => None,
         }
     }
 

@@ -8,6 +8,7 @@ use fluxmorph_geometry::tet4::{Point, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use super::FunctionalValue;
+use super::homogeneity::{Compared, FieldQuality, Spread};
 use crate::element::Complex3;
 use crate::element::quadrature::{self, Node};
 use crate::error::SolverError;
@@ -31,6 +32,14 @@ pub enum Observed {
     Deviation {
         /// `B_target` [T]; real, so in harmonics the imaginary part of B is to vanish.
         target: Point,
+        /// `w_k`.
+        weighting: Weighting,
+    },
+    /// How unlike its mean the flux density is: `Σ w |b − b̄|² / Σ w |b̄|²` [1], the square of the relative rms deviation, for
+    /// `b` the vector, a component or the modulus.
+    Homogeneity {
+        /// `b`.
+        of: Compared,
         /// `w_k`.
         weighting: Weighting,
     },
@@ -63,11 +72,13 @@ impl Observation {
             });
         }
         let cells = match observed {
-            Observed::Deviation { weighting: Weighting::Point, .. } => topology.cells_of(region),
-            Observed::Deviation { weighting: Weighting::Volume, .. } => {
-                elements.into_iter().map(|e| vec![e]).collect()
-            }
             Observed::Component { .. } => vec![elements],
+            Observed::Deviation { weighting, .. } | Observed::Homogeneity { weighting, .. } => {
+                match weighting {
+                    Weighting::Point => topology.cells_of(region),
+                    Weighting::Volume => elements.into_iter().map(|e| vec![e]).collect(),
+                }
+            }
         };
         Ok(Self { cells, observed })
     }
@@ -93,20 +104,18 @@ impl Observation {
         mesh: &Mesh,
         solution: &FieldSolution,
     ) -> FunctionalValue {
-        let mut value = 0.0;
         let mut derivative = vec![c64::default(); model.unknown_count()];
-        let rule: &[Node] = match (self.observed, model.space().order()) {
-            // The integral of |B|² is taken exactly; a mean over a cell needs one point of a linear B.
-            (Observed::Deviation { weighting: Weighting::Volume, .. }, Order::Quadratic) => {
-                quadrature::degree_2()
+        let samples = self.samples(model, mesh, solution);
+        let (value, by_b) = match self.observed {
+            Observed::Homogeneity { of, weighting } => {
+                Spread::new(&weighted(&samples, weighting), of).variance_with_derivatives()
             }
-            _ => &[([0.25; 4], 1.0)],
+            _ => self.sum(&samples, model.angular_frequency()),
         };
-        for (cell, (lambda, share)) in self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q))) {
-            let (b, volume) = mean(cell, lambda, *share, model, mesh, solution);
-            let (term, by_b) = self.term(b, volume, model.angular_frequency());
-            value += term;
-            let by_b = by_b.map(|c| c / volume);
+        let places =
+            self.cells.iter().flat_map(|c| self.rule(model.space().order()).iter().map(move |q| (c, q)));
+        for (((cell, (lambda, share)), (_, volume)), by_b) in places.zip(&samples).zip(by_b) {
+            let by_b = by_b.map(|c| c / *volume);
             for &e in cell {
                 let cell = model.space().cell(mesh, e);
                 let carriers = model.space().carriers_of(e);
@@ -118,6 +127,47 @@ impl Observation {
             }
         }
         FunctionalValue { value, derivative, explicit: None }
+    }
+
+    /// Where `B` is taken in each element of a cell.
+    fn rule(&self, order: Order) -> &'static [Node] {
+        match (self.observed, order) {
+            // The integral of |B|² is taken exactly; a mean over a cell needs one point of a linear B.
+            (
+                Observed::Deviation { weighting: Weighting::Volume, .. }
+                | Observed::Homogeneity { weighting: Weighting::Volume, .. },
+                Order::Quadratic,
+            ) => quadrature::degree_2(),
+            _ => &[([0.25; 4], 1.0)],
+        }
+    }
+
+    /// `B` [T] and the volume [m³] that it stands for, of every cell at every point of the rule.
+    fn samples(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(Complex3, f64)> {
+        let rule = self.rule(model.space().order());
+        let at =
+            |cell| rule.iter().map(move |(lambda, share)| mean(cell, lambda, *share, model, mesh, solution));
+        self.cells.iter().flat_map(|cell| at(cell)).collect()
+    }
+
+    /// The sum of the terms of all samples, and the derivative of each.
+    fn sum(&self, samples: &[(Complex3, f64)], angular_frequency: f64) -> (f64, Vec<Complex3>) {
+        let terms = samples.iter().map(|&(b, volume)| self.term(b, volume, angular_frequency));
+        terms.fold((0.0, Vec::new()), |(sum, mut all), (term, by_b)| {
+            all.push(by_b);
+            (sum + term, all)
+        })
+    }
+
+    /// How homogeneous the field is, where that is what is observed.
+    pub(super) fn field_quality(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Option<FieldQuality> {
+        let Observed::Homogeneity { of, weighting } = self.observed else { return None };
+        Some(Spread::new(&weighted(&self.samples(model, mesh, solution), weighting), of).quality())
     }
 
     /// The term of a cell with the mean `b` [T] and its volume [m³], and its derivative `q`: `d term = 2 Re(q·db)`.
@@ -132,6 +182,8 @@ impl Observation {
                 let square: f64 = difference.iter().map(|c| c.norm_sqr()).sum();
                 (weight * square, difference.map(|c| weight * c.conj()))
             }
+            // Its terms depend on each other.
+            Observed::Homogeneity { .. } => (0.0, [c64::default(); 3]),
             Observed::Component { direction } => {
                 let along: c64 = (0..3).map(|d| b[d] * direction[d]).sum();
                 let magnitude = along.norm();
@@ -147,6 +199,15 @@ impl Observation {
             }
         }
     }
+}
+
+/// The samples with their weights instead of their volumes.
+fn weighted(samples: &[(Complex3, f64)], weighting: Weighting) -> Vec<(Complex3, f64)> {
+    let weight = |volume: f64| match weighting {
+        Weighting::Point => 1.0,
+        Weighting::Volume => volume,
+    };
+    samples.iter().map(|&(b, volume)| (b, weight(volume))).collect()
 }
 
 /// Mean of B [T] over a cell, taken at one point of each element with the share `share` of its volume, and the volume

@@ -151,6 +151,20 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
         (0..M).map(move |f| (slots[f].0, slots[f].1, values[f].0, values[f].1))
     }
 
+    /// The curl [1/m²] of every rotational function at the points of a rule: point, carrier, component, curl.
+    pub(crate) fn each_curl(
+        &self,
+        tet: &Ascending,
+        rule: Rule,
+        each: &mut dyn FnMut(usize, usize, usize, Point),
+    ) {
+        for (point, at) in self.tables[rule as usize].iter().enumerate() {
+            for (f, &(carrier, component)) in self.slots.iter().enumerate().take(self.rotational) {
+                each(point, carrier, component, combine(&at.curl[f], &tet.products));
+            }
+        }
+    }
+
     /// The fields of given coefficients, by carrier and component, at the points of a rule, with the shares.
     #[inline]
     fn fields<'a>(

@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{Point, Tet4, dot};
 
 use super::super::point::stretch;
-use super::super::tangent::Curls;
+use super::super::tensor::CurlsOfRule;
 use super::super::volume::Coefficients;
 use super::super::{Complex3, dot3};
 use super::{Ascending, EdgeShape, combine};
@@ -117,8 +117,8 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
     }
 
     /// Curls of all functions at the points of the rule that is exact for their products.
-    pub(crate) fn curls(&self, tet: &Ascending) -> Curls<N> {
-        let mut of = Curls::default();
+    pub(crate) fn curls(&self, tet: &Ascending) -> CurlsOfRule<N> {
+        let mut of = CurlsOfRule::default();
         for at in &self.tables[self.curl_rule() as usize] {
             of.weights[of.count] = at.share * tet.volume;
             for (f, &(carrier, component)) in self.slots.iter().enumerate().take(self.rotational) {

@@ -1,0 +1,103 @@
+//! Open space of a configuration: the shell on its mesh, what must not lie in it, and what `check` says about truncation.
+
+use fluxmorph_geometry::generate::{OpenShellParameters, open_shell};
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::topology::Topology;
+use fluxmorph_geometry::{Mesh, MeshError};
+use fluxmorph_solver::{Boundary, OpenRegion};
+
+use super::functional;
+use crate::config::{Config, Diagnostic, ObjectiveKind, Open, SourceMap};
+use crate::error::Error;
+
+/// The region of a shell that is put around a mesh.
+const REGION: &str = "open";
+
+/// Its outer surface.
+const INFINITY: &str = "infinity";
+
+/// The name of the shell's region.
+fn region_of(open: &Open) -> &str {
+    open.region.as_deref().unwrap_or(REGION)
+}
+
+/// The mesh with the shell of the configuration around it; one that names no such surface is refused later, with all other names.
+pub(super) fn with_shell(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
+    let Some(open) = config.open.as_ref().filter(|open| open.region.is_none()) else { return Ok(mesh) };
+    if open.surfaces.iter().any(|name| mesh.topology().surface(name).is_err()) {
+        return Ok(mesh);
+    }
+    let parameters = OpenShellParameters {
+        surfaces: open.surfaces.clone(),
+        centre: open.center,
+        layers: open.layers,
+        region: REGION.to_owned(),
+        outer: INFINITY.to_owned(),
+    };
+    open_shell(&mesh, &parameters).map_err(|error| match error {
+        MeshError::Parameter { parameter, value, expected } => {
+            let message = format!("{parameter} = {value}: no shell can be put around the mesh");
+            source.error(vec![source.diagnostic(parameter, message).expected(expected)]).into()
+        }
+        other => other.into(),
+    })
+}
+
+/// The shell for the field problem.
+pub(super) fn region(config: &Config, topology: &Topology) -> Result<Option<OpenRegion>, Error> {
+    let of = |open: &Open| Ok(OpenRegion { region: topology.region(region_of(open))?, centre: open.center });
+    config.open.as_ref().map(of).transpose()
+}
+
+/// The condition at infinity of a shell that is put around the mesh.
+pub(super) fn condition(config: &Config) -> Option<(String, Boundary)> {
+    let open = config.open.as_ref()?;
+    open.region.is_none().then(|| (INFINITY.to_owned(), Boundary::FluxParallel))
+}
+
+/// Conditions on surfaces that are open, and functionals of B in the shell.
+pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let Some(open) = &config.open else { return Vec::new() };
+    let twice = |(path, name): (String, &str)| {
+        let is_open = path.starts_with("boundaries.") && open.surfaces.iter().any(|own| own == name);
+        is_open.then(|| {
+            source
+                .diagnostic(&path, format!("`{name}` has a condition, but space is open beyond it"))
+                .expected("each surface either here or in open.surfaces")
+        })
+    };
+    let observed = |(path, functional): (String, &crate::config::Functional)| {
+        let is_inside = functional.region.as_deref() == Some(region_of(open));
+        (is_inside && functional.kind != ObjectiveKind::Energy).then(|| {
+            let message = format!("`{}` stands for all space outside", region_of(open));
+            source
+                .diagnostic(&format!("{path}.region"), message)
+                .expected("a region inside; of the shell, only the energy means something")
+        })
+    };
+    let named = super::mesh::surface_names(config).into_iter().filter_map(twice);
+    named.chain(functional::functionals(config).into_iter().filter_map(observed)).collect()
+}
+
+/// Probe points in the shell.
+pub(super) fn probe_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
+    let Some(shell) = config.open.as_ref().and_then(|open| mesh.topology().region(region_of(open)).ok())
+    else {
+        return Vec::new();
+    };
+    let mut faults = Vec::new();
+    for (i, probe) in config.probes.iter().enumerate() {
+        for (j, found) in locate(mesh, &probe.points).into_iter().enumerate() {
+            if found.is_some_and(|(e, _)| mesh.topology().region_of()[e.index()] == shell) {
+                let at = super::millimetres(probe.points[j]);
+                let message =
+                    format!("the point {at} of the probe `{}` lies in the shell of open space", probe.name);
+                let fault = source.diagnostic(&format!("probes[{i}].points[{j}]"), message);
+                faults.push(
+                    fault.expected("a point in the mesh inside the shell, whose places mean others far away"),
+                );
+            }
+        }
+    }
+    faults
+}

@@ -1,0 +1,59 @@
+//! How far the walls of the mesh are from what makes and bends the field: what they cut off is not computed.
+
+use std::collections::HashSet;
+
+use fluxmorph_geometry::ElementId;
+use fluxmorph_geometry::box_tree::AxisBox;
+use fluxmorph_geometry::tet4::{norm, sub};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_solver::{FieldModel, Material};
+use serde::Serialize;
+
+use crate::build::Setup;
+
+/// The nearest wall that no coil, magnet, conductor or iron reaches: those that they reach are symmetry planes.
+#[derive(Debug, Serialize)]
+pub(super) struct Truncation {
+    /// Its surface.
+    pub(super) surface: String,
+    /// From the box around coils and matter to it [m].
+    pub(super) distance_m: f64,
+    /// Half the diagonal of that box [m].
+    pub(super) source_size_m: f64,
+}
+
+impl Truncation {
+    /// Of the first state; `None` where space is open, or nothing is cut off.
+    pub(super) fn of(setup: &Setup) -> Option<Self> {
+        let (model, mesh) = (setup.problem.states().first()?, setup.problem.original());
+        if model.setup().open.is_some() {
+            return None;
+        }
+        let topology = mesh.topology();
+        let points: Vec<_> = sources(model).into_iter().flat_map(|e| mesh.vertices(e)).collect();
+        let sources = AxisBox::around(&points);
+        let outer: HashSet<_> =
+            topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
+        let distance = |name: &str| -> Option<f64> {
+            let triangles = topology.surface(name).ok()?;
+            let is_wall = !triangles.is_empty() && triangles.iter().all(|t| outer.contains(&face_key(*t)));
+            let nodes = triangles.iter().flatten();
+            let nearest =
+                nodes.map(|&n| sources.square_distance(mesh.point(n))).fold(f64::INFINITY, f64::min);
+            (is_wall && nearest > 0.0 && nearest.is_finite()).then(|| nearest.sqrt())
+        };
+        let walls = topology.surface_names().filter_map(|name| Some((name, distance(name)?)));
+        let (surface, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let source_size_m = 0.5 * norm(sub(sources.upper, sources.lower));
+        Some(Self { surface: surface.to_owned(), distance_m, source_size_m })
+    }
+}
+
+/// Elements that coils meet, or that are not air.
+fn sources(model: &FieldModel) -> Vec<ElementId> {
+    let is_matter = |&e: &ElementId| {
+        let region = model.topology().region_of()[e.index()];
+        model.materials()[region.index()] != Material::AIR || model.remanence_of(e) != [0.0; 3]
+    };
+    model.source_elements().chain(model.topology().elements().filter(is_matter)).collect()
+}

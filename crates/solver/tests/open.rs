@@ -1,0 +1,166 @@
+//! The open shell against fields that reach to infinity: a magnetised sphere, and a circular coil.
+//!
+//! The mesh ends at 1.5 times the size of the source; the shell is all there is beyond.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::{
+    BlockParameters, OpenShellParameters, SphereParameters, block, open_shell, sphere,
+};
+use fluxmorph_geometry::tet4::{Point, volume};
+use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_solver::coil::{Coil, Frame, Racetrack};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::recovery::probe;
+use fluxmorph_solver::{
+    Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, OpenRegion,
+    Order, UniformField,
+};
+
+const ALL: [(ElementFamily, Order); 4] = [
+    (ElementFamily::Nodal, Order::Linear),
+    (ElementFamily::Edge, Order::Linear),
+    (ElementFamily::Nodal, Order::Quadratic),
+    (ElementFamily::Edge, Order::Quadratic),
+];
+
+fn with_shell(mesh: &Mesh, surfaces: &[&str], layers: usize) -> Mesh {
+    let parameters = OpenShellParameters {
+        surfaces: surfaces.iter().map(|&s| s.to_owned()).collect(),
+        centre: [0.0; 3],
+        layers,
+        region: "open".to_owned(),
+        outer: "infinity".to_owned(),
+    };
+    open_shell(mesh, &parameters).expect("a shell")
+}
+
+fn setup(mesh: &Mesh, (family, order): (ElementFamily, Order)) -> FieldModelSetup {
+    let region = mesh.topology().region("open").expect("the shell");
+    let conditions = [
+        ("x_min", Boundary::FluxParallel),
+        ("y_min", Boundary::FluxParallel),
+        ("z_min", Boundary::FluxNormal),
+        ("infinity", Boundary::FluxParallel),
+    ];
+    FieldModelSetup {
+        family,
+        order,
+        materials: vec![Material::AIR; mesh.topology().region_names().len()],
+        boundaries: conditions.map(|(name, condition)| (name.to_owned(), condition)).to_vec(),
+        open: Some(OpenRegion { region, centre: [0.0; 3] }),
+        ..FieldModelSetup::default()
+    }
+}
+
+/// The energy [J] in regions.
+fn energy(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution, regions: &[&str]) -> f64 {
+    let of = |name: &&str| {
+        let region = mesh.topology().region(name).expect("a region");
+        let functional = Functional::energy(model, Some(region)).expect("an energy");
+        functional.evaluate(model, mesh, solution).expect("finite").value
+    };
+    regions.iter().map(of).sum()
+}
+
+fn b_z(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution, point: Point) -> f64 {
+    probe(solution, model, mesh, "probe", &[point]).expect("inside the mesh")[0][2].re
+}
+
+/// Deviations of the energies outside and inside a sphere of uniform remanence.
+fn magnetised_sphere(elements: (ElementFamily, Order), divisions: usize, layers: usize) -> [f64; 2] {
+    let radius = 0.05;
+    let parameters =
+        SphereParameters { radius, outer_radius: 1.5 * radius, divisions, ..SphereParameters::default() };
+    let mesh = with_shell(&sphere(&parameters).expect("a sphere"), &["outer"], layers);
+    let mut setup = setup(&mesh, elements);
+    let magnet = mesh.topology().region("sphere").expect("the magnet");
+    setup.remanence = vec![[0.0; 3]; 3];
+    setup.remanence[magnet.index()] = [0.0, 0.0, 1.0];
+    let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+    let (solution, _) = model.solve(&mesh).expect("it is solved");
+    let meshed: f64 =
+        mesh.topology().elements_of(magnet).into_iter().map(|e: ElementId| volume(mesh.vertices(e))).sum();
+    // ½ν|B_r/3|² inside, twice as much outside; facets take some of the sphere's volume.
+    let inside = 0.5 / VACUUM_PERMEABILITY / 9.0 * meshed;
+    [
+        energy(&model, &mesh, &solution, &["air", "open"]) / (2.0 * inside) - 1.0,
+        energy(&model, &mesh, &solution, &["sphere"]) / inside - 1.0,
+    ]
+}
+
+/// `B_z` [T] on the axis of a circular coil of a square winding, by filaments.
+fn on_axis(radius: f64, width: f64, z: f64) -> f64 {
+    let n = 40;
+    let place = |i: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * width;
+    let filament = |a: f64, z: f64| VACUUM_PERMEABILITY * a * a / (2.0 * (a * a + z * z).powf(1.5));
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (place(i), place(j))));
+    pairs.map(|(r, h)| filament(radius + r, z - h)).sum::<f64>() / (n * n) as f64
+}
+
+/// Deviation of `B_z` on the axis near the end of the mesh, a box or a ball.
+fn coil(elements: (ElementFamily, Order), in_box: bool, n: usize, layers: usize) -> f64 {
+    let (radius, width) = (0.04, 0.02);
+    let size = 1.5 * 0.05;
+    let inside = if in_box {
+        let parameters = BlockParameters { size: [size; 3], cells: [n; 3], ..BlockParameters::default() };
+        with_shell(&block(&parameters).expect("a box"), &["x_max", "y_max", "z_max"], layers)
+    } else {
+        let parameters = SphereParameters {
+            radius: 0.05,
+            outer_radius: size,
+            divisions: n,
+            ..SphereParameters::default()
+        };
+        with_shell(&sphere(&parameters).expect("a ball"), &["outer"], layers)
+    };
+    let frame = Frame::new([0.0; 3], [0.0, 0.0, 1.0], None).expect("a frame");
+    let circular = Racetrack::circular(frame, radius - 0.5 * width, width, width).expect("a coil");
+    let mut setup = setup(&inside, elements);
+    setup.coils =
+        vec![Coil { name: "coil".to_owned(), ampere_turns: c64::from(1.0), shape: circular.into() }];
+    let model = FieldModel::new(&inside, setup).expect("a sound problem");
+    let (solution, _) = model.solve(&inside).expect("it is solved");
+    let z = 0.95 * size;
+    b_z(&model, &inside, &solution, [0.0, 0.0, z]) / on_axis(radius, width, z) - 1.0
+}
+
+/// `½∫ν|B|²` outside the magnet is twice that inside: to 1 % with linear elements, to 0.2 % with quadratic ones. The energy
+/// inside is that of the mesh in the magnet, which a coarse one misses by more.
+#[test]
+fn the_exterior_energy_of_a_magnetised_sphere_is_that_of_a_dipole() {
+    for (elements, bound, inside) in
+        [(ALL[0], 0.01, 0.1), (ALL[1], 0.01, 0.05), (ALL[2], 0.002, 0.002), (ALL[3], 0.002, 0.002)]
+    {
+        let [exterior, interior] = magnetised_sphere(elements, 6, 4);
+        assert!(exterior.abs() < bound && interior.abs() < inside, "{elements:?}: {exterior} {interior}");
+    }
+}
+
+/// At 0.95 of the way to the end of the mesh the field on the axis is that of the coil alone, in a ball and in a box: to
+/// 0.2 %, at 1.4 times the coil's size.
+#[test]
+fn the_field_of_a_coil_does_not_feel_the_end_of_the_mesh() {
+    for in_box in [false, true] {
+        let deviation = coil(ALL[3], in_box, 8, 3);
+        assert!(deviation.abs() < 0.002, "{in_box}: {deviation}");
+    }
+}
+
+#[test]
+fn what_open_space_cannot_hold_is_refused() {
+    let inside = block(&BlockParameters { size: [0.075; 3], cells: [2; 3] }).expect("a box");
+    let mesh = with_shell(&inside, &["x_max", "y_max", "z_max"], 2);
+    let refusal = |change: &dyn Fn(&mut FieldModelSetup)| {
+        let mut setup = setup(&mesh, ALL[0]);
+        change(&mut setup);
+        FieldModel::new(&mesh, setup).expect_err("it is no open space").to_string()
+    };
+    let steel = Material { relative_permeability: 800.0, conductivity: 0.0 };
+    let matter = refusal(&|setup| setup.materials[1] = steel);
+    assert!(matter.contains("`open` holds a material other than air"), "{matter}");
+    let field = UniformField { flux_density: [0.0, 0.0, 1.0], centre: None };
+    let applied = refusal(&|setup| setup.boundaries[3].1 = Boundary::UniformField(field));
+    assert!(applied.contains("a uniform field applied outside"), "{applied}");
+    let folded = refusal(&|setup| setup.open.as_mut().expect("open").centre = [0.2; 3]);
+    assert!(folded.contains("cannot be open space: at"), "{folded}");
+}
