@@ -77,12 +77,6 @@ pub enum Error {
         /// Why, and what to do.
         cause: String,
     },
-    /// The gain of a run could not be looked at again.
-    #[error("{cause}")]
-    NotChecked {
-        /// Why.
-        cause: String,
-    },
     /// A rank could not write its piece of a field.
     #[error("the fields cannot be written: {cause}")]
     Pieces {

@@ -105,26 +105,13 @@ pub fn set_up_watched(
     if mode == Mode::Optimisation {
         config.optimisation(source)?;
     }
-    progress.stage(Stage::Mesh);
-    mesh::build(config, source)
-        .and_then(|built| build_problem(config, source, built, mode, group, progress))
-        .map_err(|error| locate_error::attribute_error(error, config, source))
-}
-
-/// Sets up the field problem of a configuration on another mesh with all its regions and surfaces.
-///
-/// # Errors
-/// As [`set_up`].
-pub fn set_up_field(config: &Config, source: &SourceMap, mesh: Mesh) -> Result<Setup, Error> {
-    let built = mesh::Built { mesh, notices: Vec::new() };
-    build_problem(config, source, built, Mode::Analysis, None, &mut |_| ())
+    build_problem(config, source, mode, group, progress)
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
 fn build_problem(
     config: &Config,
     source: &SourceMap,
-    built: mesh::Built,
     mode: Mode,
     group: Option<&RankGroup>,
     progress: &mut dyn Progress,

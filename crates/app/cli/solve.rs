@@ -20,7 +20,7 @@ use crate::run::{self, Options};
 fn subject(args: &SolveArgs) -> Result<(Config, SourceMap, Option<PathBuf>), Error> {
     let path = &args.common.config;
     if path.file_name() != Some(OsStr::new("result.json")) {
-        let (config, source, design) = subject(args)?;
+        let (config, source) = args.common.load()?;
         return Ok((config, source, args.design.clone()));
     }
     // A bare name has an empty folder.
@@ -44,7 +44,7 @@ fn subject(args: &SolveArgs) -> Result<(Config, SourceMap, Option<PathBuf>), Err
 /// When the configuration, the files or the numbers fail; the error knows its exit code.
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
-    let (config, source) = args.common.load()?;
+    let (config, source, design) = subject(args)?;
     let ranks = Ranks::join(&config, signal.number())?;
     let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
         if let Some(code) = ranks.run_worker(&config, &source, Mode::Analysis) {

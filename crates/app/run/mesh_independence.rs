@@ -18,7 +18,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Bound;
 use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::memory_estimate::{of_evaluation, of_other_mesh};
+use fluxmorph_optimizer::memory_estimate::of_other_mesh;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 use super::confirmation::ShapeMeshes;
@@ -27,7 +27,7 @@ use super::summary;
 use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, Verification};
+use crate::files::{ObjectiveResult, OverwritePolicy, Verification};
 use crate::show::Observer;
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
@@ -213,11 +213,7 @@ impl MeshIndependence<'_> {
         let Some(meshes) = self.meshes else { return Ok(None) };
         let parts = self.config.output.verify_refinement;
         let finer = FinerProblem::new(self.config, self.source, &meshes.full, Cut::Growth(parts))?;
-        let needed = of_evaluation(&finer.setup.problem);
-        if let Some(shortage) = memory_limit::shortage(needed) {
-            let cause = format!("finer elements take {shortage}");
-            return Err(Error::NotChecked { cause });
-        }
+        memory_limit::check_problem(&finer.setup.problem, self.source, OverwritePolicy::Keep)?;
         let tets = finer.setup.problem.original().topology().tets().len();
         let values = finer.values(&meshes.solved, interrupted)?;
         values.map(|values| verification(parts, tets, values)).transpose()
