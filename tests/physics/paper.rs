@@ -187,7 +187,14 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
     let stop_reason = optimised.stop_reason;
     let fresh = FreshMesh::of(&config, &setup.problem);
     let fresh = fresh.as_ref();
-    let gain = MeshIndependence { config: &config, source: &source, stop_reason, shapes: &shapes, fresh };
+    let gain = MeshIndependence {
+        config: &config,
+        source: &source,
+        stop_reason,
+        shapes: &shapes,
+        fresh,
+        meshes: None,
+    };
     gain.verify(&mut objective, &|| false, &mut Silent);
     let verified = objective.verified_ratio.expect("the shield can be generated anew");
     println!("{name}: F/F0 {:.4}, {:?}", objective.ratio, objective.verification);

@@ -2,6 +2,7 @@
 //! Every test works in its own temporary directory.
 #![allow(missing_docs)]
 
+mod accuracy;
 mod cli;
 mod commands;
 mod designs;

@@ -1,8 +1,9 @@
 //! Objective and constraints of a configuration on its states.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
@@ -43,6 +44,22 @@ pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         Some((format!("constraints[{k}].region"), region.as_str()))
     });
     fields.chain(forces).chain(bodies).collect()
+}
+
+/// The mesh with the cells of every region that is measured written down: a finer mesh has the same ones then, and a sum
+/// over cells the same terms.
+///
+/// # Errors
+/// As [`Mesh::new`].
+pub(crate) fn with_cells_written_down(config: &Config, mesh: &Mesh) -> Result<Mesh, MeshError> {
+    let mut topology = mesh.topology().as_ref().clone();
+    for (_, name) in regions(config) {
+        if topology.given_cells(name).is_none() {
+            let cells = topology.cells_of(topology.region(name)?);
+            topology = topology.with_cells(name, cells);
+        }
+    }
+    Mesh::new(Arc::new(topology), mesh.points().to_vec())
 }
 
 /// What objective and constraints ask of regions that these cannot give.

@@ -35,6 +35,11 @@ struct Room {
     addresses: u64,
 }
 
+/// Most tetrahedra of a mesh that a problem can be set up on in the memory that is left.
+pub(crate) fn most_tets() -> usize {
+    room(0).map_or(usize::MAX, |room| (room.bytes / SETUP_BYTES_PER_TET) as usize)
+}
+
 /// Refuses a mesh that cannot fit, before it is made; of a sweep the meshes of all cases.
 ///
 /// # Errors

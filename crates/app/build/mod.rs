@@ -24,6 +24,8 @@ mod soundness;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
+pub(crate) use field::remaining_nodes;
+pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
 pub use outline::{Outline, OutlinedDesign, outline};
 pub use skin::Audited;
@@ -126,6 +128,16 @@ fn build_problem(
 pub(crate) fn set_up_on(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Setup, Error> {
     let built = mesh::Built { mesh, notices: Vec::new() };
     problem_on(built, config, source, Mode::Optimisation, None, &mut |_| ())
+        .map_err(|error| locate_error::attribute_error(error, config, source))
+}
+
+/// Sets up the field problem of a configuration on another mesh with all its regions and surfaces.
+///
+/// # Errors
+/// As [`set_up`].
+pub(crate) fn set_up_field(config: &Config, source: &SourceMap, mesh: Mesh) -> Result<Setup, Error> {
+    let built = mesh::Built { mesh, notices: Vec::new() };
+    problem_on(built, config, source, Mode::Analysis, None, &mut |_| ())
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 

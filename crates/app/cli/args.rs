@@ -175,8 +175,14 @@ pub struct SolveArgs {
     pub common: CommonArgs,
 
     /// Design to analyse: a result.json, or a JSON array of lengths in metres
+    ///
+    /// A result.json in place of the configuration stands for the configuration of its run and this option.
     #[arg(long, value_name = "FILE")]
     pub design: Option<PathBuf>,
+
+    /// Halve all edges of the design's mesh N times before it is analysed: eight times the elements each
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=6))]
+    pub refine: u32,
 }
 
 /// Options of `morph`.
@@ -298,7 +304,15 @@ impl CommonArgs {
     /// # Errors
     /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
     pub fn load(&self) -> Result<(Config, SourceMap), Error> {
-        let (mut config, source) = Config::from_file(&self.config, &self.overrides).map_err(with_names)?;
+        let (config, source) = Config::from_file(&self.config, &self.overrides).map_err(with_names)?;
+        self.checked(config, source)
+    }
+
+    /// A configuration that leads out of its folder only where that is allowed, and whose mesh fits, with `--out` applied.
+    ///
+    /// # Errors
+    /// As [`CommonArgs::load`].
+    pub fn checked(&self, mut config: Config, source: SourceMap) -> Result<(Config, SourceMap), Error> {
         if !self.work.allow_outside {
             let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
             source.confined(by)?;

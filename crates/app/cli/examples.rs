@@ -42,6 +42,7 @@ Examples:
   fluxmorph solve shield.toml
   fluxmorph solve shield.toml --out runs/thick --set mesh.shield.plate='[\"120 mm\", \"240 mm\", \"20 mm\"]'
   fluxmorph solve shield.toml --design runs/shield/result.json --set analysis.frequency='400 Hz' --out runs/other
+  fluxmorph solve runs/shield/result.json --refine 1
   fluxmorph solve shield.toml --json --quiet | jq .probes";
 
 pub(super) const MORPH: &str = "\

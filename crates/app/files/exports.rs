@@ -1,7 +1,9 @@
-//! The mesh of the best design in the forms that other programs read: a Gmsh file, and STL files of surfaces.
+//! The mesh of the best design, or a finer one, in the forms that other programs read: a Gmsh file, and STL files of surfaces.
 //!
 //! It is the mesh that was solved on: a region that its impedance surface replaces is not in it. Coordinates are in the unit
 //! of the mesh file, and in millimetres where the mesh was generated.
+
+use std::path::Path;
 
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, stl_bytes};
 use fluxmorph_geometry::{Mesh, MeshError};
@@ -15,7 +17,7 @@ use crate::show::Observer;
 /// Largest mesh written as text, which people can read and compare: about 25 MB. Beyond, bytes are read faster.
 const LARGEST_TEXT: usize = 500_000;
 
-/// Writes what `[output]` asks for.
+/// Writes what `[output]` asks for, the mesh as `optimum`.
 ///
 /// A surface that cannot be written is a warning: the result of a run is worth more than one of its forms.
 ///
@@ -24,13 +26,14 @@ const LARGEST_TEXT: usize = 500_000;
 pub(crate) fn write(
     config: &Config,
     directory: &RunDirectory,
+    optimum: &Path,
     mesh: &Mesh,
     observer: &mut dyn Observer,
 ) -> Result<(), Error> {
     let unit = mesh::unit(config);
     if config.output.mesh {
-        match optimum(mesh, unit) {
-            Ok(bytes) => directory.write(&directory.optimum(), &bytes)?,
+        match gmsh_file(mesh, unit) {
+            Ok(bytes) => directory.write(optimum, &bytes)?,
             Err(error) => observer.warning(&format!("the mesh of the optimum is not written: {error}")),
         }
     }
@@ -51,7 +54,7 @@ pub(crate) fn write(
 }
 
 /// The Gmsh file of a mesh.
-fn optimum(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
+fn gmsh_file(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
     let large = mesh.topology().tets().len() > LARGEST_TEXT;
     msh_bytes(mesh, unit.metres(), if large { MshEncoding::Binary } else { MshEncoding::Ascii })
 }

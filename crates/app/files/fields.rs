@@ -19,6 +19,8 @@ pub struct FieldData<'a> {
     pub displacement: &'a [Point],
     /// dF/dx at the nodes [unit of F per m], shape `(n_nodes, 3)`; `None` is written as zeros.
     pub sensitivity: Option<&'a [Point]>,
+    /// What every element adds to the estimated error of the objective [unit of F], shape `(n_tets,)`; `None`: no such array.
+    pub error: Option<&'a [f64]>,
     /// One solution per state. For a piece only the potentials at its nodes matter.
     pub solutions: &'a [FieldSolution],
 }
@@ -30,6 +32,7 @@ impl<'a> FieldData<'a> {
             mesh: &analysis.mesh,
             displacement: &analysis.displacement,
             sensitivity: analysis.sensitivity.as_deref(),
+            error: None,
             solutions: &analysis.solutions,
         }
     }
@@ -77,6 +80,7 @@ struct Arrays {
     sensitivity: Vec<Point>,
     region: Vec<i32>,
     quality: Vec<f64>,
+    error: Option<Vec<f64>>,
 }
 
 impl Arrays {
@@ -94,6 +98,7 @@ impl Arrays {
             sensitivity: data.sensitivity.map_or_else(|| vec![[0.0; 3]; nodes.len()], at),
             region: elements.iter().map(|e| regions[e.index()].0 as i32).collect(),
             quality: qualities_of(data.mesh, elements),
+            error: data.error.map(|error| elements.iter().map(|e| error[e.index()]).collect()),
         }
     }
 
@@ -111,6 +116,8 @@ impl Arrays {
         let mut fields: Vec<Field<'_>> = first.in_cells().into();
         fields.push(Field { name: "region", data: ArrayData::Integer(&self.region) });
         fields.push(Field { name: "quality", data: ArrayData::Scalar(&self.quality) });
+        let error = self.error.as_ref();
+        fields.extend(error.map(|error| Field { name: "error_estimate", data: ArrayData::Scalar(error) }));
         fields.extend(others.iter().flat_map(StateArrays::in_cells));
         fields
     }

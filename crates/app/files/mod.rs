@@ -1,5 +1,6 @@
 //! The layer through which everything is written: whole files, the history, and the run directory.
 
+mod accuracy;
 mod csv;
 mod design_file;
 mod disk;
@@ -19,6 +20,7 @@ mod synced;
 
 use std::path::PathBuf;
 
+pub use accuracy::{Accuracy, CrossCheck, SAFETY, Verdict};
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, read_design};
 pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};

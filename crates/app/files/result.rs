@@ -6,6 +6,7 @@ use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::problem::{RoundEvent, RoundStart};
 use serde::{Deserialize, Serialize};
 
+use super::accuracy::Accuracy;
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory};
 
@@ -27,6 +28,9 @@ pub struct RunResult {
     pub iterations: usize,
     /// The objective; `None` when the configuration has none.
     pub objective: Option<ObjectiveResult>,
+    /// How exact it is; `None` without an objective, and where nothing is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accuracy: Option<Accuracy>,
     /// The constraints at the best design, in the order of the configuration.
     #[serde(default)]
     pub constraints: Vec<ConstraintResult>,
@@ -286,6 +290,7 @@ pub(crate) fn to_json(value: &impl Serialize) -> Vec<u8> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::files::{CrossCheck, Verdict};
 
     pub(crate) fn example() -> RunResult {
         RunResult {
@@ -317,6 +322,13 @@ pub(crate) mod tests {
                     weight: 1.0,
                     value: 1.0,
                 }],
+            }),
+            accuracy: Some(Accuracy {
+                error_estimate_relative: Some(0.004),
+                error_estimate: Some([0.01, 0.001]),
+                refinements: 0,
+                cross_check: Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio: 0.502 }),
+                verdict: Some(Verdict::Confirmed),
             }),
             constraints: vec![ConstraintResult {
                 name: "volume_plate".to_owned(),
@@ -374,6 +386,8 @@ pub(crate) mod tests {
             ("", &["schema_version", "command", "evaluations", "iterations", "probes", "peak_memory_bytes"]),
             ("/objective", &["initial", "best", "ratio", "best_evaluation", "verified_ratio"]),
             ("/design", &["values_m", "lower_m", "upper_m", "points_m"]),
+            ("/accuracy", &["error_estimate_relative", "refinements", "cross_check"]),
+            ("/accuracy/cross_check", &["elements", "order", "ratio"]),
             ("/mesh", &["nodes", "tets", "unknowns", "worst_quality_initial", "worst_quality_final"]),
             ("/losses_w", &["plate"]),
             ("/linear_solver", &["worst_residual"]),

@@ -48,6 +48,8 @@ files! {
     tuned = "tuned.toml";
     /// `optimum.msh`, the mesh of the best design.
     optimum = "optimum.msh";
+    /// `optimum_refined.msh`, the same with finer elements.
+    optimum_refined = "optimum_refined.msh";
     /// `report.html`, one page about the run.
     report = "report.html";
 }

@@ -5,7 +5,8 @@
 //! observed divided ([`DividedMesh`]), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
 //! constraints are measured there too. Variables of a control grid mean the same on any mesh; where the nodes are the
 //! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]). A check
-//! that cannot be done is reported, and costs a run nothing else.
+//! that cannot be done is reported, and costs a run nothing else. A mesh that cannot be generated anew has all its elements
+//! cut instead, at both shapes ([`FinerProblem`]).
 //!
 //! What both meshes share shows in neither ratio: the size of the box and its far cells, materials, conditions, elements and
 //! their order, the model of every region.
@@ -20,11 +21,13 @@ use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
+use super::confirmation::ShapeMeshes;
+use super::finer::{Cut, FinerProblem};
 use super::summary;
 use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, Verification};
+use crate::files::{ObjectiveResult, OverwritePolicy, Verification};
 use crate::show::Observer;
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
@@ -109,6 +112,8 @@ pub struct MeshIndependence<'a> {
     pub shapes: &'a ShapePair,
     /// The mesh to check on; `None` where there is none.
     pub fresh: Option<&'a FreshMesh>,
+    /// The meshes of both shapes: what is cut where no mesh can be generated anew.
+    pub meshes: Option<&'a ShapeMeshes>,
 }
 
 /// The mesh of a check.
@@ -170,11 +175,8 @@ impl MeshIndependence<'_> {
                 self.compute(fresh, interrupted)
             }
             None => {
-                observer.notice(
-                    "the best shape is not checked on a fresh mesh: only the generators `shield`, `boxes` and `sphere` make \
-                     one",
-                );
-                return Check::Finished;
+                observer.phase("checking the best shape on finer elements");
+                self.compute_on_finer_elements(interrupted)
             }
         };
         match outcome {
@@ -201,6 +203,20 @@ impl MeshIndependence<'_> {
             }
         }
         Check::Finished
+    }
+
+    /// Both values on the run's own meshes with all elements cut; `None` where a signal came first.
+    fn compute_on_finer_elements(
+        &self,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Option<Verification>, Error> {
+        let Some(meshes) = self.meshes else { return Ok(None) };
+        let parts = self.config.output.verify_refinement;
+        let finer = FinerProblem::new(self.config, self.source, &meshes.full, Cut::Growth(parts))?;
+        memory_limit::check_problem(&finer.setup.problem, self.source, OverwritePolicy::Keep)?;
+        let tets = finer.setup.problem.original().topology().tets().len();
+        let values = finer.values(&meshes.solved, interrupted)?;
+        values.map(|values| verification(parts, tets, values)).transpose()
     }
 
     /// Both values on the fresh mesh; `None` where a signal came first.
@@ -233,15 +249,20 @@ impl MeshIndependence<'_> {
             constraints = summary::constraints(&problem, &analysis, &bounds);
             values.push(analysis.objective.unwrap_or(f64::NAN));
         }
-        let (initial, best) = (values[0], values[1]);
-        let ratio = best / initial;
-        if !ratio.is_finite() {
-            let cause = "the objective of the initial design is zero on the fresh mesh";
-            return Err(OptimizerError::Optimisation { cause }.into());
-        }
-        let refinement = fresh.parts as f64;
-        Ok(Some(Verification { refinement, tets, initial, best, ratio, constraints }))
+        let (refinement, values) = (fresh.parts as f64, [values[0], values[1]]);
+        let found = verification(refinement, tets, values)?;
+        Ok(Some(Verification { constraints, ..found }))
     }
+}
+
+/// What was found on a mesh with so many elements.
+fn verification(refinement: f64, tets: usize, [initial, best]: [f64; 2]) -> Result<Verification, Error> {
+    let ratio = best / initial;
+    if !ratio.is_finite() {
+        let cause = "the objective of the initial design is zero on the fresh mesh";
+        return Err(OptimizerError::Optimisation { cause }.into());
+    }
+    Ok(Verification { refinement, tets, initial, best, ratio, constraints: Vec::new() })
 }
 
 /// The bounds of the constraints where this is the analysis of the initial shape.
@@ -289,7 +310,6 @@ mod tests {
 
     use super::*;
     use crate::build::{Mode, set_up};
-    use crate::config::{BlockMesh, MeshConfig};
 
     /// The coarse shield; without its control grid every node is a variable.
     fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {
@@ -344,7 +364,8 @@ mod tests {
         let mut recorded = Recorded::default();
         let setup = set_up(config, source, Mode::Optimisation).expect("a sound problem");
         let fresh = FreshMesh::of(config, &setup.problem).map(|fresh| FreshMesh { memory: 0, ..fresh });
-        let check = MeshIndependence { config, source, stop_reason, shapes, fresh: fresh.as_ref() };
+        let check =
+            MeshIndependence { config, source, stop_reason, shapes, fresh: fresh.as_ref(), meshes: None };
         check.verify(&mut objective, &|| interrupted, &mut recorded);
         (objective, recorded)
     }
@@ -392,22 +413,6 @@ mod tests {
         // Bilinear on squares or linear on triangles: the two differ along the ridge of the shape alone.
         assert!((grid - nodes).abs() < 2e-3, "{grid} {nodes}");
         assert!(grid < 0.99, "the shape changes the field: {grid}");
-    }
-
-    #[test]
-    fn a_mesh_that_cannot_be_generated_anew_is_told_once() {
-        let (mut config, source) = quick(false);
-        config.mesh = MeshConfig::Block(BlockMesh::default());
-        let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
-        let (objective, recorded) =
-            verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
-        assert_eq!((objective.verified_ratio, objective.verification), (None, None));
-        assert!(
-            recorded.notices.len() == 1 && recorded.notices[0].contains("generators"),
-            "{:?}",
-            recorded.notices
-        );
-        assert!(recorded.warnings.is_empty());
     }
 
     #[test]

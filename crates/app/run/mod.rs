@@ -5,6 +5,8 @@
 //! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
 //! final name is whole, and it can be resumed.
 
+pub mod confirmation;
+pub mod finer;
 pub mod journal;
 pub(crate) mod launcher;
 pub mod mesh_independence;
@@ -22,6 +24,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
+use confirmation::ShapeMeshes;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::problem::RoundEvent;
@@ -166,9 +169,9 @@ impl Session<'_> {
     ) -> Result<RunResult, Error> {
         let config = self.config;
         self.continuation.iter().for_each(|event| observer.round(event));
-        let problem = &mut self.setup.problem;
+        let first = self.setup.problem.moved(self.initial_design())?;
         let optimised = driver::optimise(
-            problem,
+            &mut self.setup.problem,
             &config.optimizer.settings(),
             observer,
             &mut recorder,
@@ -176,9 +179,12 @@ impl Session<'_> {
         )?;
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
-            recorder.write(best.evaluation, problem, &best.analysis)?;
+            recorder.write(best.evaluation, &self.setup.problem, &best.analysis)?;
         }
-        exports::write(config, &self.directory, &best.analysis.mesh, observer)?;
+        let optimum = self.directory.optimum();
+        exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
+        let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
+        let errors = self.estimate_errors(first, (&best.analysis, optimised.stop_reason), observer)?;
         let problem = &self.setup.problem;
         let result = RunResult {
             evaluations: optimised.evaluations,
@@ -193,6 +199,7 @@ impl Session<'_> {
                 homogeneity: homogeneity(problem, &best.analysis, optimised.initial),
                 terms: terms(problem, &best.analysis),
             }),
+            accuracy: None,
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
             rounds: self.continuation.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
@@ -206,10 +213,11 @@ impl Session<'_> {
             )?
         };
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
+        let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved };
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.verify_on_fresh_mesh(result, &shapes, observer)
+        self.confirm(result, (&shapes, &meshes, errors), observer)
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
@@ -257,14 +265,20 @@ impl Session<'_> {
         Ok(self.directory.write(&self.directory.resolved(), resolved_toml(self.config).as_bytes())?)
     }
 
-    /// The result with the gain checked on a fresh mesh; the run's own problem is gone then.
+    /// The design that a run begins with; empty without a design.
+    fn initial_design(&self) -> &[f64] {
+        self.setup.problem.shape().map(|shape| shape.initial()).unwrap_or_default()
+    }
+
+    /// The result with the gain checked on a fresh mesh, by other elements and by its estimated errors; the run's own problem
+    /// is gone then.
     ///
     /// # Errors
     /// When the result cannot be written.
-    fn verify_on_fresh_mesh(
+    fn confirm(
         &mut self,
         mut result: RunResult,
-        shapes: &ShapePair,
+        (shapes, meshes, errors): (&ShapePair, &ShapeMeshes, Option<[f64; 2]>),
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
@@ -274,18 +288,21 @@ impl Session<'_> {
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
+        let stop_reason = result.stop_reason;
         let check = MeshIndependence {
             config,
             source,
-            stop_reason: result.stop_reason,
+            stop_reason,
             shapes,
             fresh: fresh.as_ref(),
+            meshes: Some(meshes),
         };
-        if let Some(objective) = &mut result.objective
-            && check.verify(objective, self.interrupted, observer) == Check::CutShort
-        {
-            // `resume` can do it later: the search is complete, the run is not.
-            result.status = RunStatus::Interrupted;
+        if let Some(objective) = &mut result.objective {
+            if check.verify(objective, self.interrupted, observer) == Check::CutShort {
+                // `resume` can do it later: the search is complete, the run is not.
+                result.status = RunStatus::Interrupted;
+            }
+            result.accuracy = self.accuracy((objective, stop_reason), meshes, errors, observer);
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);

@@ -97,6 +97,7 @@ impl CommandHandler for PieceWriter {
             mesh: &mesh,
             displacement: &displacement,
             sensitivity: Some(&sensitivity),
+            error: None,
             solutions: &solutions,
         };
         let rank = self.share.group.rank();

@@ -68,7 +68,7 @@ impl DirectoryRecorder {
         if self.written.last() == Some(&evaluation) {
             return Ok(());
         }
-        write_field(&self.directory, self.pieces.as_ref(), evaluation, problem, analysis)?;
+        write_field(&self.directory, self.pieces.as_ref(), evaluation, problem, (analysis, None))?;
         self.written.push(evaluation);
         write_collection(&self.directory, &self.written)
     }
@@ -112,18 +112,19 @@ fn is_wanted(kept: FieldsKept, record: &Record) -> bool {
     }
 }
 
-/// Writes the field file of an evaluation, or the pieces of all ranks.
+/// Writes the field file of an evaluation, with the estimated error of every element where there is one, or the pieces of
+/// all ranks.
 pub(super) fn write_field(
     directory: &RunDirectory,
     pieces: Option<&SharedPieces>,
     evaluation: usize,
     problem: &Problem,
-    analysis: &Analysis,
+    (analysis, error): (&Analysis, Option<&[f64]>),
 ) -> Result<(), Error> {
     if let Some(pieces) = pieces {
         return pieces.write(directory, evaluation, problem, analysis);
     }
-    let bytes = fields::vtu(problem.states(), &FieldData::of(analysis))?;
+    let bytes = fields::vtu(problem.states(), &FieldData { error, ..FieldData::of(analysis) })?;
     Ok(directory.write_field(evaluation, &bytes)?)
 }
 

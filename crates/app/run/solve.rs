@@ -4,24 +4,26 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, RoundStart, SolverCache, Stage};
 
+use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
-use super::summary::{constraints, homogeneity, terms};
+use super::summary::{constraints, design_result, homogeneity, terms};
 use super::{Options, Session};
-use crate::build::Mode;
+use crate::build::{Mode, memory_limit};
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
-use crate::files::{DesignFile, ObjectiveResult, RunResult, StopReason, exports};
+use crate::files::{Accuracy, DesignFile, ObjectiveResult, RunResult, StopReason, exports};
 use crate::show::RunObserver;
 
-/// Analyses one design and writes its field and result.
+/// Analyses one design and writes its field and result; on a mesh with all edges halved so many times, where its mesh is
+/// that of the design on the coarse one.
 ///
 /// # Errors
 /// As [`super::run`].
 pub fn solve(
     config: &Config,
     source: &SourceMap,
-    design: Option<DesignFile>,
+    (design, halvings): (Option<DesignFile>, u32),
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
@@ -39,7 +41,16 @@ pub fn solve(
         prepared.continuation = problem.continue_to(p, options.interrupted)?;
     }
     let problem = &prepared.setup.problem;
-    let moved = problem.moved(p)?;
+    let mut moved = problem.moved(p)?;
+    let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p, &rounds));
+    if halvings > 0 {
+        let cut = Cut::Halvings(halvings);
+        let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
+        moved = finer.moved(&moved.mesh)?;
+        prepared.setup = finer.setup;
+        memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
+    }
+    let p = if halvings > 0 { &[] } else { p };
     let session = prepared.begin("solve", observer)?;
     let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
@@ -47,8 +58,8 @@ pub fn solve(
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
         let analysis = problem.analyse(moved, Derivatives::First, cache, stages)?;
-        let design = values.as_deref().map(|values| (values, rounds.as_slice()));
-        session.write_analysis(design, &analysis, observer)
+        let result = session.write_analysis((p, halvings), &analysis, observer)?;
+        Ok(RunResult { design: design.take(), ..result })
     })?;
     Ok(concluded.result)
 }
@@ -101,7 +112,7 @@ impl Session<'_> {
     /// Writes the field and the exports of an analysis; returns its result.
     fn write_analysis(
         &self,
-        design: Option<(&[f64], &[RoundStart])>,
+        (p, halvings): (&[f64], u32),
         analysis: &Analysis,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
@@ -110,12 +121,16 @@ impl Session<'_> {
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
         }
-        let bounds = problem.bounds(design.map(|(values, _)| values).unwrap_or_default(), analysis)?;
+        let bounds = problem.bounds(p, analysis)?;
+        let estimate = self.estimate_error(analysis, observer);
         if config.output.fields != FieldsKept::Nothing {
-            write_field(&self.directory, self.pieces().as_ref(), 0, problem, analysis)?;
+            let error = estimate.as_ref().map(|estimate| estimate.by_element.as_slice());
+            write_field(&self.directory, self.pieces().as_ref(), 0, problem, (analysis, error))?;
             write_collection(&self.directory, &[0])?;
         }
-        exports::write(config, &self.directory, &analysis.mesh, observer)?;
+        let directory = &self.directory;
+        let optimum = if halvings > 0 { directory.optimum_refined() } else { directory.optimum() };
+        exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
         Ok(RunResult {
@@ -130,9 +145,13 @@ impl Session<'_> {
                 homogeneity: homogeneity(problem, analysis, value),
                 terms: terms(problem, analysis),
             }),
+            accuracy: analysis.objective.zip(estimate).map(|(value, estimate)| Accuracy {
+                refinements: halvings as usize,
+                ..Accuracy::of_analysis(value, estimate.objective)
+            }),
             constraints: constraints(problem, analysis, &bounds),
             rounds: self.continuation.clone(),
-            ..self.result(reason, analysis, design, initial_quality, timings, observer)?
+            ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })
     }
 }

@@ -6,7 +6,7 @@ use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Timings};
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shape, Timings};
 use fluxmorph_solver::{
     FieldModel, FieldSolution, Functional, RigidMotion, SolverError, recovery, saturation,
 };
@@ -42,13 +42,8 @@ impl Session<'_> {
             .map(|index| self.state_result(index, analysis, &located, observer))
             .collect();
         let StateResult { probes, losses_w, .. } = states[0].clone();
-        let design = problem.shape().zip(design).map(|(shape, (values, rounds))| DesignResult {
-            values_m: values.to_vec(),
-            lower_m: shape.lower().to_vec(),
-            upper_m: shape.upper().to_vec(),
-            points_m: shape.surface().points().to_vec(),
-            rounds: rounds.to_vec(),
-        });
+        let design =
+            problem.shape().zip(design).map(|(shape, (values, rounds))| design_result(shape, values, rounds));
         let topology = mesh.topology();
         let warnings = reservations(self.config, &self.setup, analysis);
         warnings.iter().for_each(|warning| observer.warning(warning));
@@ -60,6 +55,7 @@ impl Session<'_> {
             evaluations: 0,
             iterations: 0,
             objective: None,
+            accuracy: None,
             constraints: Vec::new(),
             rounds: Vec::new(),
             design,
@@ -198,6 +194,17 @@ fn open(problem: &Problem, analysis: &Analysis) -> Result<Option<OpenResult>, Er
         problem.states().iter().zip(&analysis.solutions).map(share).collect::<Result<Vec<_>, _>>()?;
     let shares: Option<Vec<f64>> = shares.into_iter().collect();
     Ok(shares.map(|energy_share| OpenResult { energy_share }))
+}
+
+/// A design with what it means.
+pub(super) fn design_result(shape: &Shape, values: &[f64], rounds: &[RoundStart]) -> DesignResult {
+    DesignResult {
+        values_m: values.to_vec(),
+        lower_m: shape.lower().to_vec(),
+        upper_m: shape.upper().to_vec(),
+        points_m: shape.surface().points().to_vec(),
+        rounds: rounds.to_vec(),
+    }
 }
 
 /// The terms of the objective at a design.

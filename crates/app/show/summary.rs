@@ -3,7 +3,10 @@
 use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Goal, Objective};
-use crate::files::{ConstraintResult, ForceResult, ObjectiveResult, RunResult, RunStatus, SaturatedRegion};
+use crate::files::{
+    ConstraintResult, CrossCheck, ForceResult, ObjectiveResult, RunResult, RunStatus, SAFETY,
+    SaturatedRegion, Verdict,
+};
 use crate::printable::printable;
 
 /// What the objective of a run is called, and its unit.
@@ -118,6 +121,17 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     if let Some(fresh) = &objective.verification {
         rows.push(("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets)));
     }
+    let Some(accuracy) = &result.accuracy else { return rows };
+    if let Some(error) = accuracy.error_estimate_relative {
+        rows.push(("error bar of F/F0", format!("± {:.1e} (estimated)", SAFETY * error * ratio.abs())));
+    }
+    if let Some(CrossCheck { elements, order, ratio }) = &accuracy.cross_check {
+        rows.push(("F/F0 by other elements", format!("{ratio:.5} ({elements}, order {order})")));
+    }
+    rows.extend(accuracy.verdict.map(|verdict| {
+        let style = if verdict == Verdict::Confirmed { styles.good } else { styles.bad };
+        ("gain", styled(style, verdict.describe()))
+    }));
     rows
 }
 
@@ -143,6 +157,9 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         let what = named.name.split_once(' ').map_or("", |(_, what)| what);
         rows.push(("value", format!("{value}  {what}").trim_end().to_owned()));
         rows.extend(homogeneity(objective));
+        if let Some([error, _]) = result.accuracy.as_ref().and_then(|accuracy| accuracy.error_estimate) {
+            rows.push(("estimated error", format!("{error:+.1e}{}", named.unit)));
+        }
     }
     rows
 }

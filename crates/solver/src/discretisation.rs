@@ -16,7 +16,7 @@ use crate::family::{self, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
 use crate::nonlinear::Tangents;
-use crate::prolongation::{ScalarSpace, prolongation};
+use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, ElementFamily, Order, Space};
 use crate::surface::SurfaceTerm;
@@ -135,7 +135,7 @@ impl Discretisation {
     /// aggregates elsewhere, by the couplings of `matrix`.
     ///
     /// # Errors
-    /// As [`Unknowns::new`]; [`SolverError::Parameter`] for edge elements, which have none.
+    /// As [`Unknowns::new`]; [`SolverError::Parameter`] for first-order edge elements, which have none.
     pub(crate) fn prolongation(
         &self,
         mesh: &Mesh,
@@ -143,14 +143,21 @@ impl Discretisation {
         boundaries: &[(String, Boundary)],
         matrix: &CsrMatrix<c64>,
     ) -> Result<CsrMatrix<f64>, SolverError> {
-        if self.space.family() == ElementFamily::Edge {
-            return Err(SolverError::Parameter {
-                what: "linear_solver.method".to_owned(),
-                value: "two_level".to_owned(),
-                expected: "a factor, or an incomplete one: edge elements have no coarse level".to_owned(),
-            });
-        }
         let conductors = weak_form.conductors();
+        if self.space.family() == ElementFamily::Edge {
+            if self.space.order() == Order::Linear {
+                return Err(SolverError::Parameter {
+                    what: "linear_solver.method".to_owned(),
+                    value: "two_level".to_owned(),
+                    expected:
+                        "a factor, or an incomplete one: first-order edge elements have no coarse level"
+                            .to_owned(),
+                });
+            }
+            let edges = Space::new(mesh.topology(), ElementFamily::Edge, Order::Linear);
+            let coarse = Unknowns::new(mesh, &edges, &conductors, boundaries)?;
+            return Ok(injection(&coarse, &self.unknowns));
+        }
         if self.space.order() == Order::Quadratic {
             let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
             let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;

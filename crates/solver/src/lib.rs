@@ -15,6 +15,7 @@ pub mod coil;
 mod discretisation;
 mod distributed;
 pub mod element;
+pub mod enrichment;
 pub mod error;
 pub mod family;
 mod fixed_directions;

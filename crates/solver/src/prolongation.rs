@@ -78,6 +78,20 @@ pub fn prolongation(
     CsrMatrix { structure: Arc::new(structure), values }
 }
 
+/// The unknowns of first-order edge elements as unknowns of second-order ones, whose functions they are too; shape
+/// `(fine.dofs.count(), coarse.dofs.count())`.
+pub fn injection(coarse: &Unknowns, fine: &Unknowns) -> CsrMatrix<f64> {
+    let equations = |unknowns: &Unknowns, carrier: usize| -> [Option<usize>; 4] {
+        let is_carrier = carrier < unknowns.dofs.carrier_count();
+        std::array::from_fn(|c| is_carrier.then(|| unknowns.dofs.equation(CarrierId::new(carrier), c))?)
+    };
+    let rows = (0..fine.dofs.carrier_count()).flat_map(|carrier| {
+        let pairs = equations(fine, carrier).into_iter().zip(equations(coarse, carrier));
+        pairs.filter_map(|(row, column)| row.map(|_| column.map(|c| (c, 1.0)).into_iter().collect()))
+    });
+    CsrMatrix::from_rows(coarse.dofs.count(), rows.collect::<Vec<_>>())
+}
+
 /// Column of every unknown on the vertices.
 struct Columns {
     number: Vec<u32>,

@@ -3,6 +3,7 @@
 mod applied;
 mod coil_regions;
 mod edge;
+mod estimate;
 mod grounding;
 mod guards;
 mod open;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
+use super::accuracy::Accuracy;
 use super::analysis::Analysis;
 use super::boundary::Boundaries;
 use super::coil::Coil;
@@ -60,6 +61,8 @@ table! {
         morph: Option<Morph> = TABLE;
         /// The algorithm.
         optimizer: Optimizer = TABLE => Optimizer::default();
+        /// How exact the result is to be, and what is done to know it.
+        accuracy: Accuracy = TABLE => Accuracy::default();
         /// Points at which the flux density is reported.
         probes: Vec<Probe> = TABLES => Vec::new();
         /// Where results go.

@@ -1,5 +1,6 @@
 //! The tables of the configuration, one file each; `config` is the whole.
 
+mod accuracy;
 mod analysis;
 mod boundary;
 mod coil;
@@ -21,6 +22,7 @@ mod output;
 mod petsc;
 mod remesh;
 
+pub use accuracy::Accuracy;
 pub use analysis::{Analysis, ElementOrder, Elements, Frequencies};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{

@@ -43,8 +43,8 @@ table! {
         /// `run`: after the optimisation the mesh is generated anew with every cell that moves or is observed divided in so many
         /// parts along each axis (a fraction is rounded up), and the initial and the best shape are analysed on it, their
         /// constraints too. What an optimiser gained from the errors of one mesh is lost on another. 0: no check. With the
-        /// default the check costs two analyses without gradients on three to five times the elements. A mesh from a file or of
-        /// the generator `block` has no check.
+        /// default the check costs two analyses without gradients on three to five times the elements. Of a mesh from a file or
+        /// of the generator `block` every element is cut at both shapes, into at least so many parts on average.
         verify_refinement: f64 = zero_or(Range::closed(1.0, MOST_PARTS)) => 2.0;
         /// Whether a run ends with `report.html`. Default `true`: it is what one looks at first.
         report: bool = FLAG => true;

@@ -82,7 +82,7 @@ impl RunData {
             Snapshot::read(&directory, evaluation, &outline)
         });
         let [before, after] = fields;
-        let mut files = vec!["fields.pvd".to_owned(), "optimum.msh".to_owned()];
+        let mut files = ["fields.pvd", "optimum.msh", "optimum_refined.msh"].map(str::to_owned).to_vec();
         files.extend(manifest.surfaces.iter().cloned());
         files.extend(["history.csv", "result.json", "resolved.toml", "config.toml"].map(str::to_owned));
         let there =

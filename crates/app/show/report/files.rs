@@ -51,6 +51,7 @@ fn describe(file: &str) -> &'static str {
     match file {
         "fields.pvd" => "the series of fields, for ParaView and pyvista",
         "optimum.msh" => "the mesh of this design, for Gmsh",
+        "optimum_refined.msh" => "the same with finer elements",
         "history.csv" => "a row for each evaluation",
         "result.json" => "all numbers of the result",
         "resolved.toml" => "the configuration with every default",

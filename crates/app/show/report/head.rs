@@ -9,7 +9,7 @@ use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::{MeshConfig, Objective};
-use crate::files::{ObjectiveResult, RunStatus, StopReason};
+use crate::files::{Accuracy, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict};
 
 /// Title, status, what was done in a sentence, and key figures.
 pub(super) fn head(data: &RunData) -> Markup {
@@ -76,6 +76,8 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
         cards.push(("objective F / F₀", number(ratio, 4), remark));
     }
     cards.extend(objective.map(|objective| fresh_mesh_card(data, objective)));
+    let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
+    cards.extend(objective.zip(accuracy).and_then(|(objective, accuracy)| gain_card(objective, accuracy)));
     let (evaluations, iterations) = match (&data.result, data.history.last()) {
         (Some(result), _) => (result.evaluations, result.iterations),
         (None, Some(row)) => (row.evaluation.saturating_add(1), row.iteration),
@@ -84,6 +86,21 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
     let best = data.best.map_or(String::new(), |best| format!("; best: {best}"));
     cards.push(("evaluations", evaluations.to_string(), format!("{iterations} iterations improved{best}")));
     cards
+}
+
+/// Whether the gain is the shape's, with the error bar; `None` where nothing says so.
+fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
+    let verdict = match accuracy.verdict? {
+        Verdict::Confirmed => "confirmed",
+        Verdict::NotConfirmed => "NOT CONFIRMED",
+    };
+    let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
+    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", number(objective.ratio, 4), number(bar, 1)));
+    let other = accuracy.cross_check.as_ref().map(|check| {
+        format!("{} by {} elements of order {}", number(check.ratio, 4), check.elements, check.order)
+    });
+    let remark: Vec<String> = bar.into_iter().chain(other).collect();
+    Some(("gain", verdict.to_owned(), remark.join("; ")))
 }
 
 /// The gain on a mesh that was not optimised on.

@@ -44,6 +44,11 @@ impl Bisection {
         }
     }
 
+    /// Number of elements as the mesh is now.
+    pub fn element_count(&self) -> usize {
+        self.tets.len()
+    }
+
     /// Bisects the elements that are `marked`, by their numbers in the mesh of [`Bisection::refinement`], and all others whose
     /// edges that cuts.
     ///

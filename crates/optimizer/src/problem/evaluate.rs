@@ -111,7 +111,7 @@ impl Problem {
         Ok(analysis)
     }
 
-    fn terms(&self) -> &[Term] {
+    pub(super) fn terms(&self) -> &[Term] {
         self.objective.as_ref().map_or(&[], |sum| &sum.terms)
     }
 
@@ -148,7 +148,7 @@ impl Problem {
     }
 
     /// Constraints on functionals of the field, with their numbers.
-    fn field_constraints(&self) -> impl Iterator<Item = (usize, &Term)> {
+    pub(super) fn field_constraints(&self) -> impl Iterator<Item = (usize, &Term)> {
         self.constraints.iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
             Quantity::Field(term) => Some((k, term)),
             _ => None,

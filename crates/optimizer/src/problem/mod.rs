@@ -13,6 +13,7 @@
 mod adjoint_accumulator;
 mod analysis;
 mod continuation;
+mod estimate;
 mod evaluate;
 pub mod finite;
 mod progress;
@@ -33,6 +34,7 @@ use crate::error::Error;
 use crate::objective::WeightedSum;
 
 pub use analysis::{Analysis, Measured, Timings};
+pub use estimate::ErrorEstimate;
 pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
 pub use round_event::{RoundEvent, RoundKind};

@@ -1,0 +1,128 @@
+//! What `result.json` says of how exact its objective is.
+
+use serde::{Deserialize, Serialize};
+
+/// Least share of a gain that must be left in another discretisation.
+const LEAST_SHARE: f64 = 0.5;
+
+/// What an estimate is multiplied by for an error bar: effectivities between one half and two have been measured
+/// (docs/verification.md).
+pub const SAFETY: f64 = 2.0;
+
+/// How exact the objective is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
+pub struct Accuracy {
+    /// Estimated error of the ratio of a run, or of the objective of an analysis, relative to it; `None` where there is no
+    /// estimate.
+    pub error_estimate_relative: Option<f64>,
+    /// Estimated errors of the objective at the initial and at the best design, with sign [its unit]; of an analysis both are
+    /// the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_estimate: Option<[f64; 2]>,
+    /// Times the mesh was refined to keep a tolerance.
+    pub refinements: usize,
+    /// The same two shapes by other elements on the same mesh.
+    pub cross_check: Option<CrossCheck>,
+    /// Whether the gain of a run is the shape's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
+}
+
+/// The gain of a run by other elements on its own mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CrossCheck {
+    /// Their family.
+    pub elements: String,
+    /// Their order.
+    pub order: u8,
+    /// `best / initial` by them.
+    pub ratio: f64,
+}
+
+/// Whether the gain of a run is the shape's, or the mesh's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// At least half of it is left on another mesh, by other elements, and after the estimated error is taken off.
+    Confirmed,
+    /// It is not.
+    NotConfirmed,
+}
+
+impl Accuracy {
+    /// Of an analysis with an objective and its estimated error.
+    pub fn of_analysis(objective: f64, error: f64) -> Self {
+        Self {
+            error_estimate_relative: relative(error, objective),
+            error_estimate: Some([error; 2]),
+            ..Self::default()
+        }
+    }
+
+    /// Enters the estimated errors of the objective at both designs of a run; the ratio without them.
+    pub fn estimated(&mut self, [initial, best]: [f64; 2], errors: [f64; 2]) -> f64 {
+        let corrected = (best + errors[1]) / (initial + errors[0]);
+        self.error_estimate = Some(errors);
+        self.error_estimate_relative = relative(corrected - best / initial, best / initial);
+        corrected
+    }
+
+    /// Judges a gain by the ratios that other computations of the same shapes have; nothing is said of no gain or by none.
+    pub fn judge(&mut self, ratio: f64, others: &[f64]) {
+        let share = |other: &f64| (other - 1.0) / (ratio - 1.0);
+        if ratio == 1.0 || others.is_empty() {
+            return;
+        }
+        let is_left = others.iter().all(|other| share(other) >= LEAST_SHARE);
+        self.verdict = Some(if is_left { Verdict::Confirmed } else { Verdict::NotConfirmed });
+    }
+}
+
+/// The size of an error relative to a value; `None` where that is no number.
+fn relative(error: f64, value: f64) -> Option<f64> {
+    Some((error / value).abs()).filter(|relative| relative.is_finite())
+}
+
+impl Verdict {
+    /// It in words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Confirmed => "confirmed: the gain is the shape's",
+            Self::NotConfirmed => "NOT CONFIRMED: the gain is the mesh's",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn verdict(ratio: f64, others: &[f64]) -> Option<Verdict> {
+        let mut accuracy = Accuracy::default();
+        accuracy.judge(ratio, others);
+        accuracy.verdict
+    }
+
+    #[test]
+    fn half_of_a_gain_must_be_left_everywhere_whichever_way_is_better() {
+        assert_eq!(verdict(0.5, &[0.52, 0.7]), Some(Verdict::Confirmed));
+        assert_eq!(verdict(0.5, &[0.52, 0.8]), Some(Verdict::NotConfirmed));
+        assert_eq!(verdict(0.155, &[1.37]), Some(Verdict::NotConfirmed), "the pole of nodal elements");
+        assert_eq!(verdict(2.0, &[1.6]), Some(Verdict::Confirmed));
+        assert_eq!(verdict(2.0, &[1.4]), Some(Verdict::NotConfirmed));
+        assert_eq!(verdict(1.0, &[1.0]), None);
+        assert_eq!(verdict(0.5, &[]), None);
+    }
+
+    #[test]
+    fn errors_that_both_designs_have_alike_cancel_in_the_ratio() {
+        let mut accuracy = Accuracy::default();
+        assert_eq!(accuracy.estimated([2.0, 1.0], [0.2, 0.1]), 0.5);
+        assert_eq!(accuracy.error_estimate_relative, Some(0.0));
+        accuracy.estimated([2.0, 1.0], [0.0, 0.1]);
+        let error = accuracy.error_estimate_relative.expect("a number");
+        // One rounding of each of a few operations.
+        assert!((error - 0.1).abs() < 1e-15, "{error}");
+        assert_eq!(Accuracy::of_analysis(0.0, 1.0).error_estimate_relative, None);
+    }
+}

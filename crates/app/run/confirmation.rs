@@ -1,0 +1,155 @@
+//! How exact the objective of a run or an analysis is: estimated errors, the same shapes by other elements, the verdict.
+//!
+//! A run has three second opinions: the ratio on a mesh that the optimiser never saw (`mesh_independence`), the ratio
+//! without the estimated errors, and that of other elements on the same mesh. First-order edge elements are checked by what
+//! the estimate has of second order, second-order ones by the first, nodal ones by edge elements of their order, which are
+//! right where these are not. None of them costs more than a few evaluations; what fails or does not fit is said, and costs
+//! the run nothing else.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
+use fluxmorph_remesh::Moved;
+
+use super::Session;
+use super::finer::{Cut, FinerProblem};
+use crate::build::memory_limit;
+use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
+use crate::error::Error;
+use crate::files::{Accuracy, CrossCheck, ObjectiveResult, StopReason, Verdict};
+use crate::show::Observer;
+
+/// The meshes of the initial and of the best shape, and the one with all regions that both began as.
+#[derive(Clone, Debug)]
+pub struct ShapeMeshes {
+    /// As read or generated.
+    pub full: Mesh,
+    /// Without the regions that their surfaces replace: of the initial and of the best shape.
+    pub solved: [Mesh; 2],
+}
+
+/// Bytes that an estimate takes for each tetrahedron beside the problem: pattern, matrix and incomplete factor of second
+/// order. Measured on the shield with edge elements: 9 kB.
+const ESTIMATE_BYTES_PER_TET: usize = 10_000;
+
+impl Session<'_> {
+    /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
+    pub(super) fn estimate_error(
+        &self,
+        analysis: &Analysis,
+        observer: &mut dyn Observer,
+    ) -> Option<ErrorEstimate> {
+        let problem = &self.setup.problem;
+        let analysed = &self.config.analysis;
+        let is_wanted = self.config.accuracy.estimate && problem.objective().is_some();
+        if !is_wanted || problem.share().is_some() || analysed.order == ElementOrder::Quadratic {
+            return None;
+        }
+        let needed = analysis.mesh.topology().tets().len() * ESTIMATE_BYTES_PER_TET;
+        if let Some(shortage) = memory_limit::shortage(needed) {
+            observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
+            return None;
+        }
+        observer.phase("estimating the error of the mesh");
+        match problem.estimate_error(analysis) {
+            Ok(estimate) => Some(estimate),
+            Err(error) => {
+                observer.notice(&format!("the error of the mesh is not estimated: {error}"));
+                None
+            }
+        }
+    }
+
+    /// The estimated errors of the objective at the initial and the best design of a run.
+    ///
+    /// # Errors
+    /// As [`fluxmorph_optimizer::problem::Problem::analyse`].
+    pub(super) fn estimate_errors(
+        &self,
+        initial: Moved,
+        (best, stop_reason): (&Analysis, StopReason),
+        observer: &mut dyn Observer,
+    ) -> Result<Option<[f64; 2]>, Error> {
+        if !self.is_checked(stop_reason) {
+            return Ok(None);
+        }
+        let Some(at_best) = self.estimate_error(best, observer) else { return Ok(None) };
+        if best.mesh.points() == initial.mesh.points() {
+            return Ok(Some([at_best.objective; 2]));
+        }
+        let problem = &self.setup.problem;
+        let cache = &mut SolverCache::default();
+        let first = problem.analyse(initial, Derivatives::None, cache, &mut NoProgress)?;
+        let at_first = self.estimate_error(&first, observer);
+        Ok(at_first.map(|at_first| [at_first.objective, at_best.objective]))
+    }
+}
+
+impl Session<'_> {
+    /// What is known of how exact the ratio of a run is.
+    pub(super) fn accuracy(
+        &self,
+        (objective, stop_reason): (&ObjectiveResult, StopReason),
+        meshes: &ShapeMeshes,
+        errors: Option<[f64; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Option<Accuracy> {
+        let mut accuracy = Accuracy::default();
+        let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
+        if self.is_checked(stop_reason) && objective.ratio != 1.0 {
+            observer.phase("checking the best shape by other elements");
+            match cross_check(self.config, self.source, meshes, self.interrupted) {
+                Ok(found) => accuracy.cross_check = found,
+                Err(error) => observer.notice(&format!("there is no check by other elements: {error}")),
+            }
+        }
+        if let (None, Some(ratio), Elements::Edge) =
+            (&accuracy.cross_check, corrected, self.config.analysis.elements)
+        {
+            accuracy.cross_check = Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio });
+        }
+        let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
+        let others: Vec<f64> =
+            [objective.verified_ratio, corrected, cross_check].into_iter().flatten().collect();
+        accuracy.judge(objective.ratio, &others);
+        if accuracy.verdict == Some(Verdict::NotConfirmed) {
+            observer.warning(
+                "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements or \
+                 without the estimated errors; refine the mesh, or take analysis.order = 2",
+            );
+        }
+        (accuracy != Accuracy::default()).then_some(accuracy)
+    }
+
+    /// Whether the result of a run that has ended so is to be looked at again.
+    fn is_checked(&self, stop_reason: StopReason) -> bool {
+        let is_cut_short = matches!(stop_reason, StopReason::Interrupted | StopReason::MaxTime);
+        self.config.output.verify_refinement != 0.0 && !is_cut_short && !(self.interrupted)()
+    }
+}
+
+/// The ratio of a run by other elements on its own mesh; `None` for first-order edge elements, which the estimate checks.
+///
+/// # Errors
+/// As [`FinerProblem::analyse`].
+pub(super) fn cross_check(
+    config: &Config,
+    source: &SourceMap,
+    meshes: &ShapeMeshes,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<Option<CrossCheck>, Error> {
+    let order = match (config.analysis.elements, config.analysis.order) {
+        (Elements::Nodal, order) => order,
+        (Elements::Edge, ElementOrder::Quadratic) => ElementOrder::Linear,
+        (Elements::Edge, ElementOrder::Linear) => return Ok(None),
+    };
+    let mut other = config.clone();
+    (other.analysis.elements, other.analysis.order) = (Elements::Edge, order);
+    (other.analysis.penalty, other.analysis.linear_solver.method) = (1.0, SolverMethod::Automatic);
+    let problem = FinerProblem::new(&other, source, &meshes.full, Cut::Halvings(0))?;
+    let values = problem.values(&meshes.solved, interrupted)?;
+    Ok(values.map(|[initial, best]| CrossCheck {
+        elements: "edge".to_owned(),
+        order: order.into(),
+        ratio: best / initial,
+    }))
+}

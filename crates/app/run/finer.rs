@@ -1,0 +1,188 @@
+//! The field problem of a configuration on a finer mesh, for any shape of the mesh that was cut.
+//!
+//! A shape is where the nodes of the mesh that is solved on lie. New nodes lie in the middle of its edges: the shape stays what
+//! it is, facets of curved surfaces too, and no elastic map is needed. What differs is the error of the field alone. All
+//! shapes of one mesh share what follows from the finer topology.
+//!
+//! Does not live here: how meshes are cut (`fluxmorph_geometry::refine`), and what the values are compared with
+//! (`mesh_independence`).
+
+use fluxmorph_geometry::refine::{Bisection, RefineLimits, Refinement, uniform};
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_remesh::{Moved, StepToInversion};
+
+use crate::build::{Setup, memory_limit, remaining_nodes, set_up_field, with_cells_written_down};
+use crate::config::{Config, SourceMap};
+use crate::error::Error;
+
+/// A field problem on a finer mesh.
+#[derive(Debug)]
+pub struct FinerProblem {
+    /// The problem, without a design.
+    pub setup: Setup,
+    refinement: Refinement,
+    /// All nodes of the mesh that was cut [m].
+    coarse: Vec<Point>,
+    /// Those of the mesh that is solved on, before it was cut and after.
+    remaining: [Vec<NodeId>; 2],
+}
+
+/// How a mesh is made finer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cut {
+    /// All edges halved so many times.
+    Halvings(u32),
+    /// At least so many times the elements: halved as often as that fits, then bisected.
+    Growth(f64),
+}
+
+impl FinerProblem {
+    /// The problem of a configuration on a mesh with all its regions, cut; its design moves nothing here.
+    ///
+    /// # Errors
+    /// [`MeshError::RefinementLimit`] where the memory does not suffice, and what the set-up fails with.
+    pub fn new(config: &Config, source: &SourceMap, mesh: &Mesh, cut: Cut) -> Result<Self, Error> {
+        let config = field_alone(config);
+        let mesh = with_cells_written_down(&config, mesh)?;
+        let coarse = mesh.points().to_vec();
+        let before = remaining_nodes(&config, mesh.topology());
+        let refinement = cut.of(mesh).map_err(fluxmorph_optimizer::Error::from)?;
+        let setup = set_up_field(&config, source, refinement.mesh().clone())?;
+        let remaining = [before, remaining_nodes(&config, refinement.mesh().topology())];
+        Ok(Self { setup, refinement, coarse, remaining })
+    }
+
+    /// The finer mesh of a shape, given by the mesh that was solved on.
+    ///
+    /// # Errors
+    /// [`MeshError::Inverted`] where elements are so flat that their parts vanish in rounding.
+    pub fn moved(&self, shape: &Mesh) -> Result<Moved, Error> {
+        let mut all = self.coarse.clone();
+        for (node, point) in self.remaining[0].iter().zip(shape.points()) {
+            all[node.index()] = *point;
+        }
+        let fine = self.refinement.prolong(&all);
+        let points = self.remaining[1].iter().map(|node| fine[node.index()]).collect();
+        let original = self.setup.problem.original();
+        let mesh =
+            Mesh::new(original.topology().clone(), points).map_err(fluxmorph_optimizer::Error::from)?;
+        let displacement = vec![[0.0; 3]; mesh.points().len()];
+        Ok(Moved { mesh, displacement, inversion: StepToInversion::NEVER })
+    }
+
+    /// The analysis of a shape.
+    ///
+    /// # Errors
+    /// As [`FinerProblem::moved`] and [`Problem::analyse`].
+    pub fn analyse(&self, shape: &Mesh, cache: &mut SolverCache) -> Result<Analysis, Error> {
+        let problem: &Problem = &self.setup.problem;
+        Ok(problem.analyse(self.moved(shape)?, Derivatives::None, cache, &mut NoProgress)?)
+    }
+
+    /// The objective at two shapes; `None` where a signal comes first.
+    ///
+    /// # Errors
+    /// As [`FinerProblem::analyse`].
+    pub fn values(
+        &self,
+        shapes: &[Mesh; 2],
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Option<[f64; 2]>, Error> {
+        let mut cache = SolverCache::default();
+        let mut values = [f64::NAN; 2];
+        for (value, shape) in values.iter_mut().zip(shapes) {
+            if interrupted() {
+                return Ok(None);
+            }
+            *value = self.analyse(shape, &mut cache)?.objective.unwrap_or(f64::NAN);
+        }
+        Ok(Some(values))
+    }
+}
+
+impl Cut {
+    /// A mesh cut so.
+    fn of(self, mesh: Mesh) -> Result<Refinement, MeshError> {
+        let limits = RefineLimits { most_tets: memory_limit::most_tets(), ..RefineLimits::default() };
+        let count = |refinement: &Refinement| refinement.mesh().topology().tets().len();
+        let mut refinement = Refinement::none(mesh);
+        let wanted = match self {
+            Self::Halvings(times) => 8f64.powi(times as i32),
+            Self::Growth(growth) => growth,
+        } * count(&refinement) as f64;
+        while 8.0 * count(&refinement) as f64 <= wanted {
+            let halved = uniform(refinement.mesh(), limits)?;
+            refinement = refinement.then(halved);
+        }
+        if count(&refinement) as f64 >= wanted {
+            return Ok(refinement);
+        }
+        let mut bisection = Bisection::new(refinement.mesh(), limits);
+        while (bisection.element_count() as f64) < wanted {
+            let all: Vec<ElementId> = (0..bisection.element_count()).map(ElementId::new).collect();
+            bisection.refine(&all)?;
+        }
+        Ok(refinement.then(bisection.refinement()?))
+    }
+}
+
+/// A configuration without what moves, and without constraints, which mean nothing then.
+fn field_alone(config: &Config) -> Config {
+    Config { design: None, remesh: None, morph: None, constraints: Vec::new(), ..config.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use fluxmorph_geometry::tet4::volume;
+
+    use super::*;
+    use crate::build::{Mode, set_up};
+
+    /// The coarse shield as shipped, and with its plate replaced by an impedance surface, whose nodes inside are not solved on.
+    fn devices() -> Vec<(Config, SourceMap)> {
+        [("shield_quick", vec![]), ("shield_impedance", vec!["mesh.shield.refinement=0.5".to_owned()])]
+            .map(|(name, overrides): (&str, Vec<String>)| {
+                let path =
+                    Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name).with_extension("toml");
+                Config::from_file(&path, &overrides).expect("a shipped configuration")
+            })
+            .into()
+    }
+
+    #[test]
+    fn a_shape_has_its_value_on_its_own_elements_and_its_bodies_on_finer_ones() {
+        for (config, source) in devices() {
+            let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+            let shape = setup.problem.shape().expect("a shape");
+            let design: Vec<f64> = (0..shape.surface().variable_count()).map(|k| 1e-5 * k as f64).collect();
+            let analysis = setup
+                .problem
+                .evaluate(&design, Derivatives::None, &mut SolverCache::default(), &mut NoProgress)
+                .expect("a sound mesh");
+            let finer =
+                |cut| FinerProblem::new(&config, &source, &setup.full_mesh, cut).expect("a sound problem");
+            let cache = &mut SolverCache::default();
+            let same = finer(Cut::Halvings(0)).analyse(&analysis.mesh, cache).expect("a sound mesh");
+            let [found, expected] = [&same, &analysis].map(|a| a.objective.expect("an objective"));
+            // The residual that every linear solution has to reach.
+            assert!((found / expected - 1.0).abs() < 1e-8, "{found} {expected}");
+            let halved = finer(Cut::Growth(1.5)).moved(&analysis.mesh).expect("a sound mesh").mesh;
+            let (topology, coarse) = (halved.topology(), analysis.mesh.topology());
+            assert!(topology.tets().len() >= coarse.tets().len() * 3 / 2);
+            for name in coarse.region_names() {
+                let of = |mesh: &Mesh| -> f64 {
+                    let topology = mesh.topology();
+                    let elements = topology.elements_of(topology.region(name).expect("inherited"));
+                    elements.into_iter().map(|e| volume(mesh.vertices(e))).sum()
+                };
+                let (found, expected) = (of(&halved), of(&analysis.mesh));
+                // Sums of 1e5 terms of one sign.
+                assert!((found - expected).abs() <= 1e-11 * expected, "{name}: {found} {expected}");
+            }
+        }
+    }
+}

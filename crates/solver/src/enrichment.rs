@@ -1,0 +1,195 @@
+//! A field of one order more on the same mesh, near one that is known: what the error of a functional is estimated from.
+//!
+//! The first-order field `u` is one of the second-order space too. There, with the residual `r = f − K u`,
+//!
+//! ```text
+//! F(u⁺) − F(u) = [F(u + e) − F(u)] + 2 Re zᵀ(r − K e),   K e ≈ r,   K z ≈ ∂F/∂u
+//! ```
+//!
+//! up to the product of what both approximations lack, so that few iterations do: the dual-weighted residual (Becker and
+//! Rannacher, Acta Numerica 10 (2001) 1) with both errors taken from one order more. `∂F/∂u` is taken half way, where it is
+//! exact for a quadratic `F`. Since `r` vanishes on the first-order space, `2 Re zᵀr` comes from the functions that only the
+//! second order has, and `Σ_i 2 Re z_i r_i` over those of an element's carriers says where the error is made.
+//!
+//! Does not live here: sums over terms and frequencies, and what is done with the number.
+
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
+
+use crate::error::SolverError;
+use crate::linear::{LinearSolver, LinearSolverSettings, Method, PreparedSystem, Reuse};
+use crate::model::{FieldModel, FieldModelSetup};
+use crate::prolongation::{ScalarSpace, injection, prolongation};
+use crate::solution::FieldSolution;
+use crate::space::{ElementFamily, Order};
+use crate::unknowns::Unknowns;
+
+/// Relative residual of the corrections. The error of a field may be a hundred times its residual; at a thousandth the product
+/// of both is still below a hundredth of the estimate.
+const TOLERANCE: f64 = 1e-3;
+
+/// Relative residual above which a correction is none.
+const REQUIRED: f64 = 1e-2;
+
+/// Iterations after which the corrections are given up. A dozen or two are usual.
+const MOST_ITERATIONS: usize = 300;
+
+/// The second-order system near a first-order field.
+#[derive(Debug)]
+pub struct Enrichment {
+    model: FieldModel,
+    system: PreparedSystem,
+    prolongation: CsrMatrix<f64>,
+    field: Vec<c64>,
+    residual: Vec<c64>,
+    correction: Vec<c64>,
+    iterations: usize,
+}
+
+/// What the dual problem says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightedResidual {
+    /// `2 Re zᵀ(r − K e)` [unit of F].
+    pub remainder: f64,
+    /// What every element adds to `2 Re zᵀr` [unit of F], shape `(n_tets,)`.
+    pub by_element: Vec<f64>,
+}
+
+impl FieldModel {
+    /// The same problem in second order, to be solved roughly.
+    ///
+    /// # Errors
+    /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks.
+    pub fn enriched(&self, mesh: &Mesh) -> Result<Self, SolverError> {
+        let refuse = |what: &str, value: &str, expected: &str| SolverError::Parameter {
+            what: what.to_owned(),
+            value: value.to_owned(),
+            expected: expected.to_owned(),
+        };
+        if self.setup().order != Order::Linear {
+            return Err(refuse("order", "2", "first order: there is no third one to estimate an error from"));
+        }
+        if !self.is_linear() {
+            return Err(refuse(
+                "bh",
+                "a curve",
+                "linear materials: the tangent of second order is not known",
+            ));
+        }
+        if self.setup().ownership.is_some() {
+            return Err(refuse("ranks", "several", "one process for an error estimate"));
+        }
+        let linear_solver = LinearSolverSettings {
+            method: LinearSolver::Fixed(Method::TwoLevel),
+            tolerance: TOLERANCE,
+            required: REQUIRED,
+            max_iterations: Some(MOST_ITERATIONS),
+            // No fallback: a factor of second order would cost more than the estimate is worth.
+            factor_bytes: 0,
+            reuse: Reuse::Never,
+        };
+        Self::new(mesh, FieldModelSetup { order: Order::Quadratic, linear_solver, ..self.setup().clone() })
+    }
+}
+
+impl Enrichment {
+    /// The correction of a state of `coarse` on a mesh; `model` is [`FieldModel::enriched`] of it.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub fn new(
+        coarse: &FieldModel,
+        model: FieldModel,
+        mesh: &Mesh,
+        state: &FieldSolution,
+    ) -> Result<Self, SolverError> {
+        let fine = model.unknowns();
+        let prolongation = match model.space().family() {
+            ElementFamily::Nodal => prolongation(coarse.unknowns(), model.space(), fine, ScalarSpace::Linear),
+            ElementFamily::Edge => injection(coarse.unknowns(), fine),
+        };
+        let mut field = vec![c64::default(); fine.dofs.count()];
+        prolongation.mul(state.values(), &mut field);
+        let matrix = model.assemble(mesh);
+        let mut residual = model.load(mesh);
+        subtract_product(&matrix, &field, &mut residual);
+        let mut system = model.prepare(matrix)?;
+        let (correction, report) = system.solve(&residual)?;
+        let iterations = report.iterations;
+        Ok(Self { model, system, prolongation, field, residual, correction, iterations })
+    }
+
+    /// The second-order model.
+    pub fn model(&self) -> &FieldModel {
+        &self.model
+    }
+
+    /// Iterations of all corrections so far.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// The state with a share of its correction: 0 is the first-order field, 1 nearly that of second order.
+    pub fn state(&self, share: f64) -> FieldSolution {
+        let with = |(u, e): (&c64, &c64)| u + share * e;
+        FieldSolution::of_state(self.field.iter().zip(&self.correction).map(with).collect())
+    }
+
+    /// Weighs the residual with the solution of the dual problem for `∂F/∂u` at half the correction.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub fn weigh(
+        &mut self,
+        coarse: &FieldModel,
+        derivative: &[c64],
+    ) -> Result<WeightedResidual, SolverError> {
+        let (dual, report) = self.system.solve(derivative)?;
+        self.iterations += report.iterations;
+        let mut rest = self.residual.clone();
+        let matrix = self.system.matrix().expect("an estimate is made in one process");
+        subtract_product(matrix, &self.correction, &mut rest);
+        let remainder = dual.iter().zip(&rest).map(|(z, r)| 2.0 * (z * r).re).sum();
+        let surplus = self.without_first_order(coarse.unknowns(), dual);
+        let weighted: Vec<f64> = surplus.iter().zip(&self.residual).map(|(z, r)| 2.0 * (z * r).re).collect();
+        Ok(WeightedResidual { remainder, by_element: self.by_element(&weighted) })
+    }
+
+    /// What only the second order has of some values: first-order functions have theirs at the same carriers.
+    fn without_first_order(&self, coarse: &Unknowns, mut values: Vec<c64>) -> Vec<c64> {
+        let fine = &self.model.unknowns().dofs;
+        let mut at_carriers = vec![c64::default(); coarse.dofs.count()];
+        for carrier in (0..coarse.dofs.carrier_count()).map(CarrierId::new) {
+            for component in 0..4 {
+                let equations = (coarse.dofs.equation(carrier, component), fine.equation(carrier, component));
+                if let (Some(coarse), Some(fine)) = equations {
+                    at_carriers[coarse] = values[fine];
+                }
+            }
+        }
+        let mut first = vec![c64::default(); values.len()];
+        self.prolongation.mul(&at_carriers, &mut first);
+        values.iter_mut().zip(first).for_each(|(value, first)| *value -= first);
+        values
+    }
+
+    /// Values of unknowns as sums over elements: every carrier gives equal shares to the elements that have it.
+    fn by_element(&self, weighted: &[f64]) -> Vec<f64> {
+        let (space, dofs) = (self.model.space(), &self.model.unknowns().dofs);
+        let elements = || (0..space.element_count()).map(ElementId::new);
+        let mut around = vec![0u32; space.carrier_count()];
+        elements().for_each(|e| space.carriers_of(e).iter().for_each(|c| around[c.index()] += 1));
+        let share = |&carrier: &CarrierId| -> f64 {
+            let own = (0..4).filter_map(|component| dofs.equation(carrier, component));
+            own.map(|equation| weighted[equation]).sum::<f64>() / f64::from(around[carrier.index()])
+        };
+        elements().map(|e| space.carriers_of(e).iter().map(share).sum()).collect()
+    }
+}
+
+/// `r −= K x`.
+fn subtract_product(matrix: &CsrMatrix<c64>, x: &[c64], r: &mut [c64]) {
+    let mut product = vec![c64::default(); x.len()];
+    matrix.mul(x, &mut product);
+    r.iter_mut().zip(product).for_each(|(r, p)| *r -= p);
+}

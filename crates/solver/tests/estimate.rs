@@ -1,0 +1,146 @@
+//! The estimated error of a functional against the error itself: on prisms with a singular edge, whose field is known
+//! (`prisms`), and around iron, against second order on halved edges.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::refine::{RefineLimits, uniform};
+use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::enrichment::Enrichment;
+use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
+};
+
+/// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
+fn square() -> Mesh {
+    let line = |n: i32, from: f64| (0..=n).map(|i| from + 0.1 * f64::from(i)).collect::<Vec<_>>();
+    let grid = Grid::new("grid", [line(20, -1.0), line(20, -1.0), vec![0.0, 0.05, 0.1]]).expect("a grid");
+    let region = |x: [f64; 3]| match (x[0], x[1]) {
+        (x, y) if x > 0.0 && y < 0.0 => RegionId(1),
+        (x, y) if x < -0.4 && y < -0.4 => RegionId(2),
+        _ => RegionId(0),
+    };
+    let topology = grid.topology(&["air", "block", "far"], region).expect("three regions");
+    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+}
+
+fn setup((family, order): (ElementFamily, Order), frequency: f64) -> FieldModelSetup {
+    let shape = Racetrack::new([0.5, 0.5, 0.05], 2, [0.15; 2], 0.1, 0.4, Corner::Mitred).expect("a coil");
+    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
+        names.iter().map(|&name| (name.to_owned(), boundary)).collect()
+    };
+    let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
+    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
+    FieldModelSetup {
+        family,
+        order,
+        frequency,
+        materials: vec![Material::AIR; 3],
+        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1e3, 0.0), shape: shape.into() }],
+        boundaries,
+        ..FieldModelSetup::default()
+    }
+}
+
+/// The value of a functional, its estimated error, and what all elements add to that.
+fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f64; 3] {
+    let coarse = FieldModel::new(mesh, setup.clone()).expect("a sound problem");
+    let (state, _) = coarse.solve(mesh).expect("it converges");
+    let value = functional.evaluate(&coarse, mesh, &state).expect("a number").value;
+    let fine = coarse.enriched(mesh).expect("a sound problem");
+    let mut enriched = Enrichment::new(&coarse, fine, mesh, &state).expect("it converges");
+    let at = |enriched: &Enrichment, share: f64| {
+        functional.evaluate(enriched.model(), mesh, &enriched.state(share)).expect("a number")
+    };
+    let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| at(&enriched, share));
+    // The same function of the same field: quadrature and rounding alone.
+    assert!((before.value - value).abs() < 1e-9 * value.abs(), "{} {value}", before.value);
+    let weighed = enriched.weigh(&coarse, &half_way.derivative).expect("it converges");
+    let error = after.value - before.value + weighed.remainder;
+    println!("{} iterations for both corrections", enriched.iterations());
+    [value, error, weighed.by_element.iter().sum()]
+}
+
+fn solved(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
+    let model = FieldModel::new(mesh, setup.clone()).expect("a sound problem");
+    let (state, _) = model.solve(mesh).expect("it converges");
+    functional.evaluate(&model, mesh, &state).expect("a number").value
+}
+
+fn observed(mesh: &Mesh) -> Functional {
+    let far = mesh.topology().region("far").expect("a region");
+    let observed = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
+    Functional::observation(mesh, far, observed).expect("a functional")
+}
+
+/// Effectivity between one half and two, and what elements add makes up the whole.
+fn assert_effective(what: &str, [value, estimated, sum]: [f64; 3], exact: f64) {
+    let effectivity = estimated / (exact - value);
+    println!("{what}: error {:+.2e} of {exact:.4e}, effectivity {effectivity:.2}", exact - value);
+    assert!((0.5..2.0).contains(&effectivity), "{what}: {effectivity}");
+    assert!((sum - estimated).abs() < 0.1 * estimated.abs(), "{what}: {sum:e} {estimated:e}");
+}
+
+/// The far field of nodal elements has to go around the edge of a perfect conductor, which they follow badly.
+#[test]
+fn the_error_of_nodal_elements_at_a_singular_edge_is_estimated() {
+    let (mesh, exposed) = square().without_region(RegionId(1)).expect("what is left");
+    let conductor = Conductor { name: "block".to_owned(), surface: exposed, law: SurfaceLaw::Perfect };
+    let functional = observed(&mesh);
+    let b = 2500.0 * 0.163_333_333_333_333_33 * VACUUM_PERMEABILITY / 3.0;
+    let exact = b * b * 0.6 * 0.6 * 0.1;
+    for frequency in [0.0, 50.0] {
+        let of = |order| FieldModelSetup {
+            conductors: vec![conductor.clone()],
+            ..setup((ElementFamily::Nodal, order), frequency)
+        };
+        let found = estimate(&mesh, &of(Order::Linear), &functional);
+        let second = solved(&mesh, &of(Order::Quadratic), &functional);
+        println!("second order has {second:.4e}, the estimate {:.4e}", found[0] + found[1]);
+        assert_effective("nodal, perfect conductor", found, exact);
+    }
+}
+
+/// A block of iron in the quarter: what is between first order and the truth, for both families, static and with eddy
+/// currents in the block.
+#[test]
+fn the_error_around_iron_is_estimated_for_both_families() {
+    let mesh = square();
+    let fine = uniform(&mesh, RefineLimits::default()).expect("eight for each");
+    for (family, frequency, conductivity) in [
+        (ElementFamily::Edge, 0.0, 0.0),
+        (ElementFamily::Nodal, 0.0, 0.0),
+        (ElementFamily::Edge, 5.0, 1e4),
+        (ElementFamily::Nodal, 5.0, 1e4),
+    ] {
+        let iron = Material { relative_permeability: 20.0, conductivity };
+        let of = |order| FieldModelSetup {
+            materials: vec![Material::AIR, iron, Material::AIR],
+            ..setup((family, order), frequency)
+        };
+        let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
+        let energy = Functional::energy(&model, None).expect("a functional");
+        let found = estimate(&mesh, &of(Order::Linear), &energy);
+        // The definition: second order on the same mesh, whatever that is worth.
+        let second = solved(&mesh, &of(Order::Quadratic), &energy);
+        let difference = second - found[0];
+        assert!((found[1] - difference).abs() < 0.02 * difference.abs(), "{} {difference}", found[1]);
+        let on_fine = FieldModel::new(fine.mesh(), of(Order::Quadratic)).expect("a sound problem");
+        let energy = Functional::energy(&on_fine, None).expect("a functional");
+        let reference = solved(fine.mesh(), &of(Order::Quadratic), &energy);
+        assert_effective(&format!("{family:?}, {frequency} Hz"), found, reference);
+    }
+}
+
+#[test]
+fn second_order_has_no_estimate_and_says_so() {
+    let mesh = square();
+    let setup = setup((ElementFamily::Edge, Order::Quadratic), 0.0);
+    let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+    let error = model.enriched(&mesh).expect_err("there is no third order");
+    assert!(error.to_string().contains("first order"), "{error}");
+}

@@ -1,0 +1,61 @@
+//! Error bars, confirmations and finer meshes, as a user sees them.
+
+use std::path::Path;
+
+use crate::support::device::shipped;
+use crate::support::folder::{count, number, read_json};
+use crate::support::program::{Finished, finish, fluxmorph, folder};
+
+fn pole(elements: &'static str, out: &Path) -> Finished {
+    finish(&mut shipped("pole", &["--set", elements, "--set", "analysis.order=1"]).command("run", out))
+}
+
+/// Nodal elements have the field of an iron circuit wrong on coarse meshes, and the optimiser uses what they have wrong.
+#[test]
+fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
+    let home = folder();
+    let nodal = home.path().join("nodal");
+    pole("analysis.elements=nodal", &nodal).says(&["NOT CONFIRMED", "the gain of this run is not confirmed"]);
+    let result = read_json(&nodal.join("result.json"));
+    assert_eq!(result["accuracy"]["verdict"], "not_confirmed");
+    assert_eq!(result["accuracy"]["cross_check"]["elements"], "edge");
+    let edge = home.path().join("edge");
+    pole("analysis.elements=edge", &edge).says(&["error bar of F/F0", "confirmed: the gain is the shape's"]);
+    let result = read_json(&edge.join("result.json"));
+    assert_eq!(result["accuracy"]["verdict"], "confirmed");
+    let (ratio, fresh) = (number(&result, "/objective/ratio"), number(&result, "/objective/verified_ratio"));
+    let bar = 2.0 * ratio * number(&result, "/accuracy/error_estimate_relative");
+    println!("F/F0 {ratio:.4} ± {bar:.4}, on a fresh mesh {fresh:.4}");
+    assert!((fresh - ratio).abs() < bar, "{fresh} is not within {ratio} ± {bar}");
+    let page = std::fs::read_to_string(edge.join("report.html")).expect("a report");
+    assert!(page.contains("confirmed") && page.contains('±'), "the card of the gain");
+
+    // The best design of that run again, on halved edges.
+    let out = home.path().join("finer");
+    let path = edge.join("result.json");
+    fluxmorph(&[&"solve", &path, &"--refine", &"1", &"--out", &out]).completed();
+    let finer = read_json(&out.join("result.json"));
+    assert_eq!(count(&finer, "/mesh/tets"), 8 * count(&result, "/mesh/tets"));
+    assert!(out.join("optimum_refined.msh").exists());
+    assert_eq!(finer["design"], result["design"]);
+    let [value, error] = ["/objective/best", "/accuracy/error_estimate/0"].map(|key| number(&finer, key));
+    let [coarse, estimated] =
+        ["/objective/best", "/accuracy/error_estimate/1"].map(|key| number(&result, key));
+    println!(
+        "{coarse:.4e} {estimated:+.1e} on the mesh of the run, {value:.4e} {error:+.1e} on halved edges"
+    );
+    // Both say the same of the truth, within what the coarser one leaves open.
+    assert!((value + error - coarse - estimated).abs() < estimated.abs(), "{value} {coarse}");
+}
+
+#[test]
+fn a_mesh_from_a_file_is_checked_on_finer_elements() {
+    let home = folder();
+    let out = home.path().join("out");
+    let options = ["--max-evaluations", "2", "--set", "analysis.order=1"];
+    finish(&mut shipped("inductor", &options).command("run", &out))
+        .with(1, &["checking the best shape on finer elements", "F/F0 on a fresh mesh"]);
+    let result = read_json(&out.join("result.json"));
+    assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);
+    assert!(result["accuracy"]["verdict"].is_string());
+}
