@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn a_thin_layer_is_no_sliver() {
         let layer = [[0.0; 3], [1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 0.01]];
-        assert!(is_layered(layer) && is_layered([layer[3], [1.0, 0.0, 0.01], [0.3, 1.0, 0.01], layer[1]]));
+        assert!(is_layered(layer) && is_layered([layer[3], [0.3, 1.0, 0.01], [1.0, 0.0, 0.01], layer[1]]));
         let sliver = [[0.0; 3], [1.0, 0.0, 0.01], [1.0, 1.0, 0.0], [0.0, 1.0, 0.01]];
         assert!(!is_layered(sliver));
     }
