@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::tet4::centroid;
+use fluxmorph_geometry::tet4::{Point, centroid};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, KinematicConstraint, MotionLaw, RemeshSetup, SolverChoice, StiffnessPolicy,
+    Subregion,
 };
 
 use crate::config::{
@@ -19,7 +20,7 @@ pub(super) fn remesh_setup(
     remesh: &Remesh,
     mesh: &Mesh,
     design_nodes: &[NodeId],
-    kinematic_constraint: KinematicConstraint,
+    (law, kinematic_constraint): (MotionLaw, KinematicConstraint),
     warnings: &mut Vec<String>,
 ) -> Result<RemeshSetup, Error> {
     let mut subregions = subregions(remesh, mesh, design_nodes, warnings)?;
@@ -52,6 +53,7 @@ pub(super) fn remesh_setup(
         subregions,
         policy,
         kinematic_constraint,
+        law,
         design_nodes: design_nodes.to_vec(),
         boundaries,
         fixed_nodes: Vec::new(),
@@ -119,6 +121,39 @@ fn check_subregions(source: &SourceMap, remesh: &Remesh, subregions: &[Subregion
     };
     let fault = source.diagnostic(key, format!("`{key}` holds no element of the mesh")).expected(expected);
     Err(source.error(vec![fault]).into())
+}
+
+/// Largest component across an axis of a direction along it: far above what is left of the normals of a plane by rounding.
+const ALONG: f64 = 1e-9;
+
+/// The coordinate axis that all directions are along, those without length aside.
+pub(super) fn common_axis(directions: &[Point]) -> Option<usize> {
+    let largest = directions.iter().flatten().fold(0.0_f64, |largest, c| largest.max(c.abs()));
+    let is_across = |axis: usize, u: &Point| (0..3).any(|d| d != axis && u[d].abs() > ALONG * largest);
+    (0..3).find(|&axis| largest > 0.0 && !directions.iter().any(|u| is_across(axis, u)))
+}
+
+/// The law of the motion for nodes that all move along `axis`, if there is one; where none is written, `default`, or the linear
+/// one without an axis or with forces.
+pub(super) fn motion_law(
+    source: &SourceMap,
+    remesh: &Remesh,
+    axis: Option<usize>,
+    default: config::MotionLaw,
+) -> Result<MotionLaw, Error> {
+    let own = remesh.subregions.iter().filter_map(|own| own.force);
+    let has_force = own.chain([remesh.force]).any(|force| force != [0.0; 3]);
+    let message = match (remesh.law.unwrap_or(default), axis) {
+        (config::MotionLaw::Linear, _) => return Ok(MotionLaw::Linear),
+        (config::MotionLaw::Rails, Some(axis)) if !has_force => return Ok(MotionLaw::Rails(axis)),
+        _ if remesh.law.is_none() => return Ok(MotionLaw::Linear),
+        (_, None) => "not all nodes move along one of x, y and z",
+        _ => "motion on rails knows no force",
+    };
+    let fault = source.diagnostic("remesh.law", message);
+    Err(source
+        .error(vec![fault.expected("law = \"linear\", or a motion along one axis without `force`")])
+        .into())
 }
 
 /// The axis of the design's direction where the motion is to follow it.

@@ -9,10 +9,10 @@ use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
-use super::elastic_body::{guidance, remesh_setup};
+use super::elastic_body::{common_axis, guidance, motion_law, remesh_setup};
 use super::{field, mesh, millimetres, name_faults, soundness};
 use crate::config::{
-    Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
+    Config, DesignMotion, DesignWord, Diagnostic, Morphing, MotionLaw, PrescribedMotion, SourceMap, Target,
 };
 use crate::error::Error;
 use crate::run::morph::path::{NodeMotion, Path, Transform};
@@ -80,8 +80,11 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     source.check(faults)?;
     let (nodes, motions): (Vec<_>, Vec<_>) = moved.into_iter().unzip();
     let guidance = guidance(source, config.design.as_ref(), remesh)?;
-    let setup = remesh_setup(source, remesh, &mesh, &nodes, guidance, &mut warnings)?;
     let path = Path::new(nodes, motions, transforms);
+    // What turns leaves its axis on the way, where it does not at the end.
+    let on_the_way = [path.at(0.37), path.at(1.0)].concat();
+    let law = motion_law(source, remesh, common_axis(&on_the_way), MotionLaw::Linear)?;
+    let setup = remesh_setup(source, remesh, &mesh, path.nodes(), (law, guidance), &mut warnings)?;
     if path.at(1.0).iter().all(|u| *u == [0.0; 3]) {
         warnings.push(
             "the prescribed motion moves no node: every displacement is zero, every factor 1 and every angle 0".to_owned(),

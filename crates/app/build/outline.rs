@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
-use fluxmorph_remesh::KinematicConstraint;
+use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 
 use super::elastic_body::{regions_at, remesh_setup};
 use super::shape::thickened_region;
@@ -101,8 +101,14 @@ fn outline_design(
         Some(remesh) => {
             let nodes: Vec<NodeId> =
                 surface.nodes().iter().filter_map(|node| node_of[node.index()]).collect();
-            let body =
-                remesh_setup(source, remesh, mesh, &nodes, KinematicConstraint::Free, &mut Vec::new())?;
+            let body = remesh_setup(
+                source,
+                remesh,
+                mesh,
+                &nodes,
+                (MotionLaw::Linear, KinematicConstraint::Free),
+                &mut Vec::new(),
+            )?;
             let elements = body.subregions.iter().flat_map(|part| part.elements.iter().copied());
             elements.collect::<BTreeSet<_>>().into_iter().collect()
         }

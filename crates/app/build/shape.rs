@@ -11,7 +11,7 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits};
 use fluxmorph_solver::FieldModel;
 
-use super::elastic_body::{guidance, regions_at, remesh_setup};
+use super::elastic_body::{common_axis, guidance, motion_law, regions_at, remesh_setup};
 use super::outline::same_nodes;
 use super::{millimetres, plausible};
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
@@ -79,7 +79,9 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
-    let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), guidance, warnings)?;
+    let law =
+        motion_law(source, inputs.remesh, common_axis(surface.directions()), config::MotionLaw::Linear)?;
+    let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), (law, guidance), warnings)?;
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
@@ -121,9 +123,11 @@ pub(super) fn shape(
         faults.extend(vanishing_faults(source, design, mesh, &surface, thickness));
     }
     source.check(faults)?;
+    // On rails elements keep their sides, and it is their room that is held.
+    let least_quality = if motion.is_one_function() { 0.0 } else { LEAST_QUALITY_SHARE * quality };
     let limits = StepLimits {
         inversion_share: inputs.remesh.inversion_share,
-        least_quality: config.optimizer.minimum_quality.unwrap_or(LEAST_QUALITY_SHARE * quality),
+        least_quality: config.optimizer.minimum_quality.unwrap_or(least_quality),
         rounds: inputs.remesh.rounds,
         ..StepLimits::default()
     };
@@ -292,7 +296,7 @@ fn held_node_fault(
 fn check_bounds(source: &SourceMap, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
     // A rank that follows gives no orders: the first one checks.
     let is_worker = share.is_some_and(|share| share.group.role() == Role::Worker);
-    if shape.limits.rounds > 0 || is_worker {
+    if shape.limits.rounds > 0 || shape.motion().is_one_function() || is_worker {
         return Ok(());
     }
     let mut faults = Vec::new();

@@ -3,8 +3,7 @@
 //! A method sees `c = ±(value − bound) / scale`, satisfied where `c ≤ 0` and of order one: the scale is the bound
 //! itself, so `c` is the relative distance from it. Quantities of the field are computed by [`crate::problem`].
 
-use fluxmorph_geometry::Mesh;
-use fluxmorph_remesh::RemeshError;
+use fluxmorph_remesh::{Moved, RemeshError};
 
 use crate::error::Error;
 use crate::geometric;
@@ -64,10 +63,10 @@ impl Constraint {
     ///
     /// # Errors
     /// [`RemeshError::NotConverged`].
-    pub fn of_shape(&self, mesh: &Mesh, shape: &Shape) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
+    pub fn of_shape(&self, moved: &Moved, shape: &Shape) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
         Ok(match &self.quantity {
             Quantity::Field(_) => None,
-            Quantity::Volume(body) => Some(body.evaluate(mesh, shape)?),
+            Quantity::Volume(body) => Some(body.evaluate(moved, shape)?),
             Quantity::Thickness { measure, bound } => {
                 // Beyond a minimum is below it, beyond a maximum above.
                 let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };

@@ -158,8 +158,7 @@ pub fn certify(
         let function = |p: &[f64]| match (&constraint.quantity, problem.shape()) {
             (Quantity::Field(_), _) | (_, None) => value(p, k + 1),
             (_, Some(shape)) => {
-                let mesh = problem.moved(p)?.mesh;
-                Ok(constraint.of_shape(&mesh, shape)?.map_or(f64::NAN, |(value, _)| value))
+                Ok(constraint.of_shape(&problem.moved(p)?, shape)?.map_or(f64::NAN, |(value, _)| value))
             }
         };
         let gradient = measured.gradient.as_ref().expect("the gradient was asked for");

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::tet4::Tet4;
+use fluxmorph_geometry::tet4::{Tet4, dot};
 use fluxmorph_geometry::{ElementId, Mesh, Topology};
 
 use crate::elasticity::{Isotropic, Stiffness, stiffness};
@@ -39,6 +39,19 @@ impl Body {
         let (factor, tensor) = weighting.of(vertices);
         let law = Isotropic { young: law.young * factor, ..law };
         stiffness(&Tet4::new(vertices), &law, &tensor)
+    }
+
+    /// Young's modulus of an element along an axis, by its position in the body, on a reference mesh.
+    pub(crate) fn weight(
+        &self,
+        reference: &Mesh,
+        weighting: &Weighting,
+        position: usize,
+        axis: usize,
+    ) -> f64 {
+        let law = self.laws[self.law_of[position] as usize];
+        let (factor, tensor) = weighting.of(reference.vertices(self.elements[position]));
+        law.young * factor * dot(tensor[axis], tensor[axis])
     }
 }
 

@@ -6,7 +6,9 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::fem::{BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup};
+use fluxmorph_geometry::fem::{
+    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix,
+};
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
@@ -43,6 +45,17 @@ impl KinematicConstraint {
     }
 }
 
+/// How the mesh follows the design.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MotionLaw {
+    /// By linear elasticity (Eq. 3), frozen on the reference mesh of a round.
+    #[default]
+    Linear,
+    /// All nodes along one coordinate axis (0, 1, 2), by a convex energy on the undeformed mesh ([`crate::rails`]): for
+    /// designs that move along that axis. There are no rounds, and all in one process.
+    Rails(usize),
+}
+
 /// What is remeshed and how.
 #[derive(Clone, Debug, Default)]
 pub struct RemeshSetup {
@@ -52,6 +65,8 @@ pub struct RemeshSetup {
     pub policy: StiffnessPolicy,
     /// Which way nodes may move; design nodes move as the design says.
     pub kinematic_constraint: KinematicConstraint,
+    /// How the mesh follows the design.
+    pub law: MotionLaw,
     /// Nodes whose displacement the design prescribes, in the order in which it comes.
     pub design_nodes: Vec<NodeId>,
     /// Surfaces with a kind; nodes of [`crate::BoundaryKind::Design`] surfaces follow the listed design nodes, ascending.
@@ -121,24 +136,56 @@ impl ElasticMap {
     fn assemble(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
         let body = &plan.body;
         let weighting = policy.weighting(reference, &body.elements);
-        let stiffness_matrix = || {
-            let (pattern, group) = plan.stiffness.as_ref().expect("one process has the whole pattern");
-            let mut matrix = CsrMatrix::zeros(pattern.structure());
-            let of = |e: ElementId| body.stiffness(reference, &weighting, e.index());
-            pattern.assemble(group, &mut matrix.values, of);
-            matrix
-        };
-        let (pattern, group) = &plan.coupling;
-        let mut coupling = CsrMatrix::zeros(pattern.structure());
-        let of = |e: ElementId| body.stiffness(reference, &weighting, plan.coupled[e.index()] as usize);
-        pattern.assemble(group, &mut coupling.values, of);
-        let solver = ElasticSolver::new(&plan.analysis, stiffness_matrix, (reference, policy))?;
+        let of = |position: usize| body.stiffness(reference, &weighting, position);
+        let coupling = plan.coupling_matrix(of);
+        let solver = ElasticSolver::new(&plan.analysis, || plan.matrix(of), (reference, policy))?;
         let mut map = Self { plan, policy, solver, coupling, offset: Vec::new() };
         map.offset = match map.plan.force.clone() {
             Some(force) => map.solve(force)?,
             None => vec![[0.0; 3]; map.plan.topology().node_count()],
         };
         Ok(map)
+    }
+
+    /// The map of a body of the same set-up whose elements, by their position in [`ElasticMap::elements`], have other symmetric
+    /// matrices, and no force: the tangent of a law that is not linear.
+    ///
+    /// # Errors
+    /// [`fluxmorph_geometry::MeshError::Factorisation`].
+    ///
+    /// # Panics
+    /// If the system is distributed.
+    pub(crate) fn with_stiffness<L: LocalMatrix<f64, 4, 3>>(
+        &self,
+        of: impl Fn(usize) -> L + Sync,
+    ) -> Result<Self, RemeshError> {
+        let plan = Arc::clone(&self.plan);
+        let coupling = plan.coupling_matrix(&of);
+        let solver = ElasticSolver::of_matrix(&plan.analysis, plan.matrix(&of))?;
+        let offset = vec![[0.0; 3]; plan.topology().node_count()];
+        Ok(Self { plan, policy: self.policy, solver, coupling, offset })
+    }
+
+    /// Weight a volume of every element of the body on a mesh, for motion along an axis: Young's modulus of its subregion by the
+    /// stiffness policy.
+    pub(crate) fn weights(&self, mesh: &Mesh, axis: usize) -> Vec<f64> {
+        let body = &self.plan.body;
+        let weighting = self.policy.weighting(mesh, &body.elements);
+        (0..body.elements.len()).map(|position| body.weight(mesh, &weighting, position, axis)).collect()
+    }
+
+    /// `K_dd⁻¹` of one component of a nodal right side, along an axis; zero where it is no unknown.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::linear`].
+    pub(crate) fn solve_along(&self, right_side: Vec<f64>, axis: usize) -> Result<Vec<f64>, RemeshError> {
+        let mut unknowns = vec![0.0; self.plan.unknowns.count()];
+        for (node, value) in (0..).map(NodeId).zip(right_side) {
+            let mut components = [0.0; 3];
+            components[axis] = value;
+            self.plan.unknowns.scatter_add(&mut unknowns, node, components);
+        }
+        Ok(self.solve(unknowns)?.iter().map(|u| u[axis]).collect())
     }
 
     /// `Δx` of every mesh node [m] for the displacement `Δx_b` of the design nodes [m], shapes `(n_nodes, 3)` and
@@ -285,6 +332,22 @@ impl ElasticMap {
 impl Plan {
     fn topology(&self) -> &Arc<Topology> {
         &self.body.topology
+    }
+
+    /// `K_dd` of element matrices by their position in the body.
+    fn matrix<L: LocalMatrix<f64, 4, 3>>(&self, of: impl Fn(usize) -> L + Sync) -> CsrMatrix<f64> {
+        let (pattern, group) = self.stiffness.as_ref().expect("one process has the whole pattern");
+        let mut matrix = CsrMatrix::zeros(pattern.structure());
+        pattern.assemble(group, &mut matrix.values, |e: ElementId| of(e.index()));
+        matrix
+    }
+
+    /// `K_db` of them.
+    fn coupling_matrix<L: LocalMatrix<f64, 4, 3>>(&self, of: impl Fn(usize) -> L + Sync) -> CsrMatrix<f64> {
+        let (pattern, group) = &self.coupling;
+        let mut matrix = CsrMatrix::zeros(pattern.structure());
+        pattern.assemble(group, &mut matrix.values, |e: ElementId| of(self.coupled[e.index()] as usize));
+        matrix
     }
 
     fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {

@@ -140,6 +140,15 @@ pub enum RemeshError {
         /// What it should be.
         tolerance: f64,
     },
+    /// The law of motion has found no equilibrium.
+    #[error(
+        "the mesh motion did not come to rest in {steps} Newton steps: the displacements, or the stiffnesses of the remesh \
+         region, span more than numbers hold; check units, bounds and the stiffness policy"
+    )]
+    NotSettled {
+        /// Steps taken.
+        steps: usize,
+    },
     /// The elastic system gives something that is no number.
     #[error(
         "the elastic system gives a {what} of {value}: the displacements, or the stiffnesses of the remesh region, span \

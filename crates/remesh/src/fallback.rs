@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 
 use fluxmorph_geometry::tet4::{Point, add};
 
-use crate::deform::{KinematicConstraint, RemeshSetup};
+use crate::deform::{KinematicConstraint, MotionLaw, RemeshSetup};
 use crate::error::RemeshError;
 use crate::load_stepping::StepLimits;
 use crate::motion::{Motion, Moved};
@@ -168,7 +168,7 @@ impl Motion {
         }
         let steps = moved.displacement.iter().zip(&smoothed.displacement);
         let displacement = steps.map(|(u, step)| add(*u, *step)).collect();
-        let moved = Moved { mesh: smoothed.mesh, displacement, inversion: moved.inversion };
+        let moved = Moved { mesh: smoothed.mesh, displacement, ..moved.clone() };
         Ok(Some((moved, smoothed.moved_nodes)))
     }
 
@@ -227,6 +227,7 @@ impl Motion {
         };
         let setup = RemeshSetup {
             kinematic_constraint: KinematicConstraint::Axis(axis),
+            law: MotionLaw::Linear,
             policy: self.policy(),
             // A third of the unknowns, in one process.
             ownership: None,

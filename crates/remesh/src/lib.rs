@@ -2,14 +2,18 @@
 //!
 //! The design nodes move by `Δx_b`; a fictitious elastic body, frozen on the reference mesh, carries the motion to all
 //! other nodes of the remesh region: `K_dd Δx_d = f_d − K_db Δx_b`. [`ElasticMap`] is that affine map and its
-//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Who moves freely, slides or stays is decided
+//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. For designs along one axis there is another law, which
+//! is one function of the design however far it goes: [`rails`], with the energy of [`barrier`]; [`carried`] says how far that
+//! is. Who moves freely, slides or stays is decided
 //! in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
 //! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,
 //! each frozen on its own reference mesh, [`load_stepping`] takes a given motion in as many of them as needed, and
 //! [`fallback`] is what is tried when a step is refused; [`smoothing`] is one of its levels.
 
+mod barrier;
 mod body;
 pub mod boundary;
+pub mod carried;
 pub mod deform;
 mod distributed;
 pub mod elasticity;
@@ -20,6 +24,7 @@ pub mod guard;
 pub mod load_stepping;
 pub mod motion;
 pub mod policy;
+mod rails;
 mod restraint;
 mod sensitivity;
 pub mod smoothing;
@@ -27,7 +32,8 @@ mod solver;
 pub mod subregion;
 
 pub use boundary::{Boundary, BoundaryKind};
-pub use deform::{ElasticMap, KinematicConstraint, RemeshSetup};
+pub use carried::{Carried, LEAST_ROOM, Room, Shortfall};
+pub use deform::{ElasticMap, KinematicConstraint, MotionLaw, RemeshSetup};
 pub use elasticity::Isotropic;
 pub use error::RemeshError;
 pub use fallback::{Fallback, FallbackLevel, FallbackReport};

@@ -3,12 +3,14 @@
 //! The motion is a path `t → Δx_b(t)`, `0 ≤ t ≤ 1`. Each round goes as far along it as [`StepLimits`] let a single linear
 //! step go: not too near to the first inversion, and not below a quality. Then the mesh reached is the next reference, its
 //! interior smoothed if elements are degraded. Where even a short step is refused, the fallbacks of [`crate::fallback`] are
-//! tried. Nothing here is chosen by a field or an objective.
+//! tried. Nothing here is chosen by a field or an objective. On rails there is one mesh a design, and the longest part of the path
+//! that is carried is taken at once.
 
 use std::ops::ControlFlow;
 
 use fluxmorph_geometry::tet4::Point;
 
+use crate::carried::Carried;
 use crate::error::RemeshError;
 use crate::fallback::{FallbackLevel, FallbackReport};
 use crate::motion::{Motion, Moved};
@@ -129,6 +131,14 @@ impl Motion {
         limits: &StepLimits,
         on_event: OnStepEvent<'_>,
     ) -> Result<SteppingOutcome, RemeshError> {
+        if let Some(Carried { share, moved, .. }) = self.carried_along(path)? {
+            let quality = self.quality(&moved.mesh).worst;
+            let (policy, inverted) = (self.policy(), 1.0 / moved.inversion.step);
+            let event = StepEvent::Stepped { round: 0, reached: share, share: inverted, quality, policy };
+            // One mesh, and no step after it to be kept from.
+            let _ = on_event(&event);
+            return Ok(SteppingOutcome { motion: self, moved, reached: share, steps: 1, fallbacks: 0 });
+        }
         let mut outcome = SteppingOutcome {
             moved: self.at_reference(),
             motion: self,

@@ -15,11 +15,12 @@ use fluxmorph_geometry::tet4::{Point, add, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
-use crate::deform::{ElasticMap, RemeshSetup};
+use crate::deform::{ElasticMap, KinematicConstraint, MotionLaw, RemeshSetup};
 use crate::error::RemeshError;
 use crate::guard::{StepToInversion, check_step, step_to_inversion};
 use crate::load_stepping::StepLimits;
 use crate::policy::StiffnessPolicy;
+use crate::rails::Rails;
 use crate::smoothing::least_shape;
 
 /// Halvings in the search for the share of a step that keeps a quality: to a thousandth of the step.
@@ -41,12 +42,14 @@ pub struct Motion {
     displacement: Vec<Point>,
     reference_design: Vec<Point>,
     map: Arc<ElasticMap>,
+    /// The law of motion along one axis, where that is the law.
+    rails: Option<Arc<Rails>>,
     moving: Arc<[ElementId]>,
     force: Force,
     round: usize,
 }
 
-/// A mesh of a round.
+/// The mesh of a design.
 #[derive(Clone, Debug)]
 pub struct Moved {
     /// The mesh.
@@ -55,6 +58,19 @@ pub struct Moved {
     pub displacement: Vec<Point>,
     /// First inversion along the straight motion from the round's reference, as a multiple of it.
     pub inversion: StepToInversion,
+    /// The derivative of the displacements by those of the design nodes; `None` where nothing moves.
+    pub tangent: Option<Arc<ElasticMap>>,
+}
+
+impl Moved {
+    /// `dF/dΔx_b` at the design nodes, shape `(n_design, 3)`, from `∂F/∂x` at all nodes of this mesh, shape `(n_nodes, 3)`;
+    /// empty where nothing moves.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::gradient`].
+    pub fn pull_back(&self, nodal: &[Point]) -> Result<Vec<Point>, RemeshError> {
+        self.tangent.as_ref().map_or(Ok(Vec::new()), |tangent| tangent.gradient(nodal))
+    }
 }
 
 impl Motion {
@@ -63,8 +79,15 @@ impl Motion {
     /// # Errors
     /// As [`ElasticMap::new`].
     pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
-        let map = Arc::new(ElasticMap::new(&original, setup)?);
-        Ok(Self::start(original, map))
+        let MotionLaw::Rails(axis) = setup.law else {
+            let map = Arc::new(ElasticMap::new(&original, setup)?);
+            return Ok(Self::start(original, map));
+        };
+        let kinematic_constraint = KinematicConstraint::Axis(axis);
+        let setup = RemeshSetup { kinematic_constraint, ownership: None, ..setup };
+        let rails = Rails::new(&original, &ElasticMap::new(&original, setup)?, axis)?;
+        let motion = Self::start(original, Arc::clone(rails.rest()));
+        Ok(Self { rails: Some(Arc::new(rails)), ..motion })
     }
 
     /// The first round with its map.
@@ -78,6 +101,7 @@ impl Motion {
             displacement,
             reference_design,
             map,
+            rails: None,
             moving,
             force: Force::Due,
             round: 0,
@@ -104,8 +128,8 @@ impl Motion {
         let map = Arc::new(self.map.rebased(&reference, policy)?);
         let (original, moving) = (self.original.clone(), Arc::clone(&self.moving));
         let (force, round) = (Force::Taken, self.round + 1);
-        let reference_design = design;
-        Ok(Self { original, reference, displacement, reference_design, map, moving, force, round })
+        let (reference_design, rails) = (design, None);
+        Ok(Self { original, reference, displacement, reference_design, map, rails, moving, force, round })
     }
 
     /// This motion, counted as the round after another.
@@ -118,6 +142,9 @@ impl Motion {
     /// # Errors
     /// As [`Motion::new`].
     pub fn restarted(&self) -> Result<Self, RemeshError> {
+        if self.rails.is_some() {
+            return Ok(self.clone());
+        }
         let map = Arc::new(self.map.restarted(&self.original)?);
         Ok(Self::start(self.original.clone(), map))
     }
@@ -151,6 +178,9 @@ impl Motion {
     /// If there is not one displacement per design node.
     pub fn step(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
         assert_eq!(design.len(), self.reference_design.len(), "one displacement per design node");
+        if let Some(rails) = &self.rails {
+            return Ok(rails.equilibrium(design)?.displacement);
+        }
         let change: Vec<Point> =
             design.iter().zip(&self.reference_design).map(|(u, reference)| sub(*u, *reference)).collect();
         match self.force {
@@ -165,6 +195,7 @@ impl Motion {
             mesh: self.reference.clone(),
             displacement: self.displacement.clone(),
             inversion: StepToInversion::NEVER,
+            tangent: Some(Arc::clone(&self.map)),
         }
     }
 
@@ -176,6 +207,9 @@ impl Motion {
     /// # Panics
     /// If there is not one displacement per design node.
     pub fn moved(&self, design: &[Point]) -> Result<Moved, RemeshError> {
+        if let Some(rails) = &self.rails {
+            return self.at(rails.equilibrium(design)?);
+        }
         let step = self.step(design)?;
         self.apply(&step, self.inversion(&step))
     }
@@ -184,7 +218,7 @@ impl Motion {
     pub(crate) fn apply(&self, step: &[Point], inversion: StepToInversion) -> Result<Moved, RemeshError> {
         let mesh = check_step(&self.reference, step)?;
         let displacement = self.displacement.iter().zip(step).map(|(u, step)| add(*u, *step)).collect();
-        Ok(Moved { mesh, displacement, inversion })
+        Ok(Moved { mesh, displacement, inversion, tangent: Some(Arc::clone(&self.map)) })
     }
 
     /// First inversion along a step from the round's reference.
@@ -251,7 +285,17 @@ impl Motion {
         &self.reference_design
     }
 
-    /// The elastic map of the round.
+    /// The law of motion along one axis, where that is the law.
+    pub(crate) fn rails(&self) -> Option<&Rails> {
+        self.rails.as_deref()
+    }
+
+    /// Whether all meshes follow from the undeformed one by one function of the design: there are no rounds.
+    pub fn is_one_function(&self) -> bool {
+        self.rails.is_some()
+    }
+
+    /// The elastic map of the round; that of a mesh at rest on rails.
     pub fn map(&self) -> &ElasticMap {
         &self.map
     }

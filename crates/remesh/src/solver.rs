@@ -126,18 +126,26 @@ impl ElasticSolver {
         matrix: impl FnOnce() -> CsrMatrix<f64>,
         (reference, policy): (&Mesh, StiffnessPolicy),
     ) -> Result<Self, RemeshError> {
+        if let SolverAnalysis::Distributed(system) = analysis {
+            let slot = system.factor(reference, policy)?;
+            return Ok(Self::Distributed(DistributedSlot { system: Arc::clone(system), slot }));
+        }
+        Self::of_matrix(analysis, matrix())
+    }
+
+    /// Factors a matrix of this process.
+    ///
+    /// # Panics
+    /// If the system is distributed.
+    pub(crate) fn of_matrix(analysis: &SolverAnalysis, matrix: CsrMatrix<f64>) -> Result<Self, RemeshError> {
         Ok(match analysis {
             SolverAnalysis::Nothing => Self::Nothing,
-            SolverAnalysis::Direct(analysis) => Self::Direct(Cholesky::new(analysis, &matrix())?),
+            SolverAnalysis::Direct(analysis) => Self::Direct(Cholesky::new(analysis, &matrix)?),
             SolverAnalysis::ComponentBlocks(analysis) => {
-                let matrix = matrix();
                 let preconditioner = ComponentPreconditioner::new(analysis, &matrix)?;
                 Self::ComponentBlocks { matrix, preconditioner }
             }
-            SolverAnalysis::Distributed(system) => {
-                let slot = system.factor(reference, policy)?;
-                Self::Distributed(DistributedSlot { system: Arc::clone(system), slot })
-            }
+            SolverAnalysis::Distributed(_) => unreachable!("a distributed system has no matrix here"),
         })
     }
 

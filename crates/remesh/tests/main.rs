@@ -1,10 +1,11 @@
-//! Tests of the crate from outside: the elastic map, boundaries, rounds and fallbacks, smoothing, steps to inversion.
+//! Tests of the crate from outside: the elastic map, boundaries, motion on rails, rounds and fallbacks, smoothing, steps to inversion.
 #![allow(clippy::unwrap_used)]
 
 mod boundaries;
 mod guards;
 mod inversion;
 mod mapping;
+mod rails;
 mod rounds;
 mod skin;
 mod smoothing;

@@ -102,6 +102,17 @@ fn the_gradient_is_exact_with_another_penalty_weighting_frequency_grid_and_force
     }
 }
 
+/// The tangent at the equilibrium of each design, and not a map that is fixed once.
+#[test]
+fn the_gradient_is_exact_on_rails() {
+    let rails = ["remesh.law=\"rails\"", "remesh.stiffness=\"inverse_volume\""];
+    for overrides in [&rails[..], &[&MESHED[..], &rails].concat()] {
+        let problem = setup("shield_quick.toml", overrides).problem;
+        holds(&problem, &initial(&problem));
+        holds(&problem, &wavy(&problem));
+    }
+}
+
 /// The quick shield with another `[design]` in place of its direction and grid.
 fn designed(design: &str, overrides: &[(&str, &str)]) -> Problem {
     let mut text = read_text(&quick());

@@ -26,7 +26,10 @@ table! {
         /// The part of the mesh that moves.
         #[serde(flatten)]
         extent: RemeshExtent = KEYS;
-        /// Poisson's ratio of the body. The default is the paper's.
+        /// How the mesh follows the design. Default: `"rails"` for a run whose design moves along x, y or z and whose body has no
+        /// `force`; `"linear"` otherwise, and for `morph`.
+        law: Option<MotionLaw> = WORD;
+        /// Poisson's ratio of the body, with the law `"linear"`. The default is the paper's.
         poisson: f64 = number(POISSON) => 0.3;
         /// Young's modulus of the body, before `stiffness` weights it. Without forces its unit cancels.
         young: f64 = number(POSITIVE) => 1.0;
@@ -87,6 +90,17 @@ choice! {
         InverseVolume = "inverse_volume",
         /// Each principal direction of an element stiffer the shorter the element is along it: for thin layers that cross.
         Directional = "directional",
+    }
+}
+
+choice! {
+    /// How the mesh follows the design.
+    pub enum MotionLaw {
+        /// All nodes move along the axis of the design, by a convex energy that keeps elements from being squeezed: the mesh is one
+        /// function of the design, without rounds. `poisson`, `motion`, `rounds` and `inversion_share` have no meaning.
+        Rails = "rails",
+        /// Linear elasticity on a reference mesh (Eq. 3), in rounds where that does not reach far enough.
+        Linear = "linear",
     }
 }
 

@@ -16,11 +16,20 @@ use crate::nlopt::Sample;
 use crate::problem::{Analysis, Derivatives, Measured, Stage};
 
 impl Run<'_> {
-    /// ±F/|F0| and the constraints of a design, with their gradients.
+    /// ±F/|F0| and the constraints of a design, with their gradients; where the mesh does not carry it, what the method is to
+    /// know of it (`carry`).
+    pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+        let Some(carried) = self.carry(p)? else { return self.sample_of(p, None) };
+        let best = self.best_evaluation();
+        let sample = self.sample_of(&carried.design, Some(&carried.moved))?;
+        self.answer(p, (&carried, best), sample)
+    }
+
+    /// ±F/|F0| and the constraints of a design, on its mesh where that is known.
     ///
     /// What is known of the best design in this round is not computed again, nor what was computed before the run was
     /// interrupted.
-    pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+    fn sample_of(&mut self, p: &[f64], moved: Option<&Moved>) -> Result<Sample, Stop> {
         let round = self.shape().motion().round();
         if let Some(best) = &self.best
             && best.round == round
@@ -37,19 +46,21 @@ impl Run<'_> {
                 // A design that the mesh refused has left no record.
                 let difference = self.difference(&record, p);
                 self.next = Some(record);
-                self.mesh(p)?;
+                if moved.is_none() {
+                    self.mesh(p)?;
+                }
                 Err(Stop::Error(Box::new(difference)))
             }
-            None => self.compute(p),
+            None => self.compute(p, moved),
         }
     }
 
-    /// Computes a design.
-    fn compute(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+    /// Computes a design, on its mesh where that is known.
+    fn compute(&mut self, p: &[f64], moved: Option<&Moved>) -> Result<Sample, Stop> {
         self.check_limits()?;
         let clock = Instant::now();
         self.observer.stage(Stage::Moving);
-        let moved = self.mesh(p)?;
+        let moved = moved.map_or_else(|| self.mesh(p), |moved| Ok(moved.clone()))?;
         let remesh = clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
@@ -97,16 +108,22 @@ impl Run<'_> {
                 limits.inversion_share
             )));
         }
-        if limits.least_quality > 0.0 {
-            let quality = self.problem.quality(&moved.mesh);
-            if quality.worst < limits.least_quality {
-                return Err(refused(format!(
-                    "element {} would have the quality {:.4e}, below the minimum of {:.4e}",
-                    quality.worst_element, quality.worst, limits.least_quality
-                )));
-            }
+        match self.poor_element(&moved) {
+            Some(cause) => Err(refused(cause)),
+            None => Ok(moved),
         }
-        Ok(moved)
+    }
+
+    /// Why a mesh is refused that has an element below the least quality.
+    pub(super) fn poor_element(&self, moved: &Moved) -> Option<String> {
+        let least = self.shape().limits.least_quality;
+        let quality = (least > 0.0).then(|| self.problem.quality(&moved.mesh))?;
+        (quality.worst < least).then(|| {
+            format!(
+                "element {} would have the quality {:.4e}, below the minimum of {least:.4e}",
+                quality.worst_element, quality.worst
+            )
+        })
     }
 
     /// Scale of the objective and bounds of the constraints, which the first design fixes.

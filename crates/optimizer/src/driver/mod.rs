@@ -20,6 +20,7 @@
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
 
+mod carry;
 mod compute;
 mod evaluation;
 mod incumbent;
@@ -85,6 +86,7 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
     let ended = search.minimise(run);
     match search.decide(run, ended)? {
         NextStep::Stop(reason) => return Ok(Some(reason)),
+        NextStep::SearchOn => {}
         NextStep::TightenTolerance => search.tighten_tolerance(run),
         NextStep::MoveTrustRegion => search.move_trust_region(run)?,
         NextStep::NewReference { cause } => search.begin_round(run, &cause)?,

@@ -33,6 +33,8 @@ pub(super) struct Run<'a> {
     pub(super) best: Option<Incumbent>,
     /// The mesh of the best design has changed: the next evaluation replaces it.
     pub(super) best_is_stale: bool,
+    /// On rails: whether the mesh holds the best design back.
+    pub(super) is_held_back: bool,
     worst_residual: f64,
     timings: Timings,
     rounds: Vec<RoundEvent>,
@@ -73,6 +75,7 @@ impl<'a> Run<'a> {
             next: None,
             best: None,
             best_is_stale: false,
+            is_held_back: false,
             worst_residual: 0.0,
             timings: Timings::default(),
             rounds: Vec::new(),
@@ -93,6 +96,16 @@ impl<'a> Run<'a> {
 
     pub(super) fn constraint_count(&self) -> usize {
         self.problem.constraints().len()
+    }
+
+    /// Constraints that the method sees: those of the problem, and the room of a mesh on rails.
+    pub(super) fn method_constraint_count(&self) -> usize {
+        let room = self.takes_constraints() && self.shape().motion().is_one_function();
+        self.constraint_count() + usize::from(room)
+    }
+
+    pub(super) fn takes_constraints(&self) -> bool {
+        self.settings.algorithm.takes_constraints()
     }
 
     pub(super) fn evaluations(&self) -> usize {
@@ -202,6 +215,9 @@ impl<'a> Run<'a> {
     /// Why there is no fallback left, for a message.
     pub(super) fn why_no_fallback(&self) -> String {
         match self.shape().limits.rounds {
+            _ if self.shape().motion().is_one_function() => {
+                "and there is one mesh for every design".to_owned()
+            }
             0 => "and no other reference mesh is allowed (rounds = 0)".to_owned(),
             rounds if !self.has_rounds_left() => format!("and all {rounds} rounds are used"),
             _ => "and no fallback of the mesh motion is left".to_owned(),

@@ -40,6 +40,8 @@ pub(super) enum Stop {
     Limit(StopReason),
     /// The round's mesh cannot carry a design.
     Mesh(Refusal),
+    /// The mesh carries a part of the step to a design, which is the best one now.
+    CutShort,
     Error(Box<Error>),
 }
 
@@ -69,6 +71,8 @@ pub(super) struct Ended {
 pub(super) enum NextStep {
     Stop(StopReason),
     TightenTolerance,
+    /// From the best design, where the mesh leaves little room.
+    SearchOn,
     /// Around the best design, on the same reference mesh.
     MoveTrustRegion,
     /// The best mesh becomes the reference of a new round.
@@ -117,7 +121,7 @@ impl<'a> Search<'a> {
             algorithm: self.settings.algorithm,
             lower,
             upper,
-            constraints: run.constraint_count(),
+            constraints: run.method_constraint_count(),
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
             first_step: self.settings.first_step,
@@ -146,6 +150,7 @@ impl<'a> Search<'a> {
                 Ok(NextStep::Stop(StopReason::MethodStalled))
             }
             Outcome::Failed(cause) => Err(Error::Optimisation { cause }),
+            Outcome::Interrupted(Stop::CutShort) => Ok(NextStep::SearchOn),
             Outcome::Interrupted(Stop::Limit(reason)) => Ok(NextStep::Stop(reason)),
             Outcome::Interrupted(Stop::Error(error)) if run.has_best() && error.is_numerical() => {
                 run.warn(&error.to_string());
@@ -179,7 +184,7 @@ impl<'a> Search<'a> {
             }
             _ => NextStep::Stop(match ending {
                 Ending::Roundoff => StopReason::RoundoffLimited,
-                _ if self.is_throttled(run) => StopReason::MeshLimited,
+                _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
                 Ending::Objective => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),

@@ -13,7 +13,7 @@
 
 use fluxmorph_geometry::tet4::{Point, Tet4, area_vector, centroid, cross, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
-use fluxmorph_remesh::RemeshError;
+use fluxmorph_remesh::{Moved, RemeshError};
 
 use super::GeometricError;
 use crate::problem::Shape;
@@ -91,9 +91,9 @@ impl Volume {
     ///
     /// # Errors
     /// [`RemeshError::NotConverged`].
-    pub fn evaluate(&self, mesh: &Mesh, shape: &Shape) -> Result<(f64, Vec<f64>), RemeshError> {
-        let nodal = self.node_derivative(mesh);
-        Ok((self.value(mesh), shape.surface().gradient(&shape.motion().map().gradient(&nodal)?)))
+    pub fn evaluate(&self, moved: &Moved, shape: &Shape) -> Result<(f64, Vec<f64>), RemeshError> {
+        let nodal = self.node_derivative(&moved.mesh);
+        Ok((self.value(&moved.mesh), shape.surface().gradient(&moved.pull_back(&nodal)?)))
     }
 
     /// Derivative with respect to every node's position, shape `(n_nodes, 3)`.

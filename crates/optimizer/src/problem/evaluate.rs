@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use fluxmorph_geometry::NodeId;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::linear::SolverEvent;
 use fluxmorph_solver::{FieldModel, FieldSolution};
@@ -75,8 +75,8 @@ impl Problem {
         cache: &mut SolverCache,
         progress: &mut dyn Progress,
     ) -> Result<Analysis, Error> {
-        let Moved { mesh, displacement, inversion } = moved;
-        let mut work = Work { mesh: &mesh, timings: Timings::default(), report: Worst::default(), progress };
+        let mut work =
+            Work { mesh: &moved.mesh, timings: Timings::default(), report: Worst::default(), progress };
         let shape = self.shape.as_ref().filter(|_| derivatives == Derivatives::First);
         let sums = self.sum_states(&mut work, cache, shape)?;
         let Work { mut timings, report, .. } = work;
@@ -85,11 +85,12 @@ impl Problem {
         let value = terms.iter().zip(&sums.objective.values).map(|(term, value)| term.weight * value).sum();
         let differentiated = shape.filter(|_| !terms.is_empty());
         let gradient = differentiated
-            .map(|shape| shape.pull_back("the objective", &sums.objective.nodal))
+            .map(|shape| shape.pull_back("the objective", &moved, &sums.objective.nodal))
             .transpose()?;
-        let constraints = self.measure_constraints(&mesh, shape, &sums)?;
+        let constraints = self.measure_constraints(&moved, shape, &sums)?;
         timings.remesh += clock.lap();
         let Sums { objective, solutions, events, .. } = sums;
+        let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
         let analysis = Analysis {
             displacement,
@@ -158,19 +159,20 @@ impl Problem {
     /// All constraints in their order, from the sums over the states and the mesh.
     fn measure_constraints(
         &self,
-        mesh: &Mesh,
+        moved: &Moved,
         differentiated: Option<&Shape>,
         sums: &Sums<'_>,
     ) -> Result<Vec<Measured>, Error> {
         let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let of = |(k, constraint): (usize, &Constraint)| {
-            if let Some((value, gradient)) = constraint.of_shape(mesh, shape)? {
+            if let Some((value, gradient)) = constraint.of_shape(moved, shape)? {
                 return Ok(Measured { value, gradient: differentiated.map(|_| gradient) });
             }
             let position = sums.fields.iter().position(|(number, _)| *number == k);
             let own = &sums.constrained[position.expect("every constraint of the field has a sum")];
             let name = format!("the constraint `{}`", constraint.name);
-            let gradient = differentiated.map(|shape| shape.pull_back(&name, &own.nodal)).transpose()?;
+            let gradient =
+                differentiated.map(|shape| shape.pull_back(&name, moved, &own.nodal)).transpose()?;
             Ok(Measured { value: own.values[0], gradient })
         };
         self.constraints.iter().enumerate().map(of).collect()

@@ -39,7 +39,7 @@ pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
 pub use round_event::{RoundEvent, RoundKind};
 pub use round_start::RoundStart;
-pub use shape::Shape;
+pub use shape::{Shape, between};
 pub use solver_cache::SolverCache;
 
 /// Objective, constraints, states and shape on a reference mesh.
@@ -152,6 +152,7 @@ impl Problem {
                 mesh: self.original.clone(),
                 displacement: vec![[0.0; 3]; self.original.points().len()],
                 inversion: StepToInversion::NEVER,
+                tangent: None,
             }),
         }
     }

@@ -2,12 +2,15 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Motion, RemeshError, StepLimits};
+use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError, Shortfall, StepLimits};
 
 use super::finite;
 use crate::design::DesignSurface;
 use crate::error::Error;
 use crate::geometric::WallThickness;
+
+/// Steps at most towards the carried designs; what is left then is cut off the way from a carried one.
+const MOST_PUSHES: usize = 20;
 
 /// What moves, how the mesh follows, and within which bounds.
 #[derive(Debug)]
@@ -32,6 +35,8 @@ impl Shape {
         let [lower, upper] = bounds;
         check_bounds(&surface, &lower, &upper);
         let initial = lower.iter().zip(&upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
+        let limits =
+            StepLimits { rounds: if motion.is_one_function() { 0 } else { limits.rounds }, ..limits };
         Self { surface, motion, limits, thickness: None, lower, upper, initial }
     }
 
@@ -113,6 +118,48 @@ impl Shape {
         self.surface.displacement(p)
     }
 
+    /// How far the mesh follows the straight way from a design to another one, and the room there by the variables; `None` where
+    /// the law is not that of rails.
+    ///
+    /// # Errors
+    /// As [`Motion::carried_along`].
+    ///
+    /// # Panics
+    /// If a design has another length than there are variables.
+    pub fn carried(&self, from: &[f64], to: &[f64]) -> Result<Option<Carried>, RemeshError> {
+        let path = |t: f64| self.displacement(&between(from, to, t));
+        self.motion.carried_along(&path)
+    }
+
+    /// A design near `p` and between the bounds that the mesh carries, or nearly does: every element that is squeezed too much
+    /// pushes the variables around it back, by subgradient steps of Polyak's length, which come nearer to *every* carried design.
+    ///
+    /// # Errors
+    /// As [`Motion::shortfall`].
+    ///
+    /// # Panics
+    /// If `p` has another length than there are variables.
+    pub fn pushed_back(&self, p: &[f64]) -> Result<Vec<f64>, RemeshError> {
+        let mut design = p.to_vec();
+        for _ in 0..MOST_PUSHES {
+            let Some(Shortfall { value, gradient }) = self.motion.shortfall(&self.displacement(&design))?
+            else {
+                break;
+            };
+            let gradient = self.surface.gradient(&gradient);
+            let square: f64 = gradient.iter().map(|g| g * g).sum();
+            if square == 0.0 {
+                break;
+            }
+            // Of the root of the shortfall, whose least value is known to be zero.
+            let length = 2.0 * value / square;
+            for (k, x) in design.iter_mut().enumerate() {
+                *x = (*x - length * gradient[k]).clamp(self.lower[k], self.upper[k]);
+            }
+        }
+        Ok(design)
+    }
+
     /// The round that begins at a design: `reference` is its mesh, `displacement` that of every node from the undeformed
     /// one [m].
     ///
@@ -127,11 +174,16 @@ impl Shape {
         self.motion.rebased(reference, displacement, self.displacement(p), self.motion.policy())
     }
 
-    /// dF/dp of `owner` from dF/dx at the nodes, shape `(n_nodes, 3)`.
-    pub(super) fn pull_back(&self, owner: &str, nodal: &[Point]) -> Result<Vec<f64>, Error> {
+    /// dF/dp of `owner` from dF/dx at the nodes of a mesh, shape `(n_nodes, 3)`.
+    pub(super) fn pull_back(&self, owner: &str, moved: &Moved, nodal: &[Point]) -> Result<Vec<f64>, Error> {
         finite::sensitivity(owner, nodal)?;
-        Ok(self.surface.gradient(&self.motion.map().gradient(nodal)?))
+        Ok(self.surface.gradient(&moved.pull_back(nodal)?))
     }
+}
+
+/// The design at a share `t` of the straight way from one to another; at 1 the other to the last bit.
+pub fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(from, to)| if t == 1.0 { *to } else { from + t * (to - from) }).collect()
 }
 
 fn check_bounds(surface: &DesignSurface, lower: &[f64], upper: &[f64]) {

@@ -1,0 +1,184 @@
+//! A design that the mesh does not carry: the step to it is cut short, and the method sees one smooth problem.
+//!
+//! On rails the carried designs form a convex set, and the *room* of a design ([`fluxmorph_remesh::Room`]) is smooth on both sides
+//! of its boundary. Where a design that is asked for is not carried, a carried one near it is evaluated in its place, and counts:
+//! squeezed elements push the variables around them back, and what is missing then is cut off the way from the best design. Where
+//! that is a gain, the method searches on from there. Else it is given the linear continuation of objective and constraints, and
+//! one more constraint on the room, which is violated: it knows that it has gone too far, and in which direction there is room.
+//! Its model goes on. Away from the boundary that constraint is flat, and has no say.
+//!
+//! Methods without constraints are stopped after such an evaluation, and search on around the best design.
+
+use fluxmorph_geometry::tet4::centroid;
+use fluxmorph_geometry::{ElementId, NodeId};
+use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
+
+use super::run::Run;
+use super::search::{Refusal, Stop};
+use crate::error::Error;
+use crate::nlopt::Sample;
+use crate::problem::between;
+
+/// Room over the least one within which the constraint is felt.
+const NEAR: f64 = 0.03;
+
+/// Scale of the constraint: its value where there is all the room. Large, as what the conservative methods first assume of its
+/// curvature is of order one, and would hold back a first step far away from the boundary.
+const SCALE: f64 = 1000.0;
+
+/// A design whose room is nearer than this to the least one is held back by the mesh.
+const HELD_BACK: f64 = 0.02;
+
+/// The mesh of a design that was asked for, or of one that is evaluated in its place.
+pub(super) struct Carriage {
+    /// The design that is evaluated.
+    pub(super) design: Vec<f64>,
+    /// Its mesh.
+    pub(super) moved: Moved,
+    /// What holds the mesh back, and what would help, where it does not carry what was asked for.
+    cut: Option<String>,
+    /// Room of the design asked for.
+    room: f64,
+    /// Derivatives of the room by the variables [1/m].
+    room_gradient: Vec<f64>,
+}
+
+impl Carriage {
+    /// Whether the mesh holds the evaluated design back.
+    pub(super) fn is_held_back(&self) -> bool {
+        self.cut.is_some() || self.room < LEAST_ROOM + HELD_BACK
+    }
+}
+
+impl Run<'_> {
+    /// The mesh of a design, or of the one that is evaluated in its place; `None` where it moves in rounds.
+    pub(super) fn carry(&mut self, p: &[f64]) -> Result<Option<Carriage>, Stop> {
+        // Before a first design, from no displacement at all.
+        let from = self.best.as_ref().map_or_else(|| vec![0.0; p.len()], |best| best.values.clone());
+        let shape = self.shape();
+        let carried_to = |p: &[f64]| shape.carried(&from, p).map_err(Error::from);
+        let Some(carried) = carried_to(p)? else { return Ok(None) };
+        let Carried { mut share, mut moved, room } = carried;
+        let room_gradient = shape.surface().gradient(&room.gradient);
+        let (mut goal, mut cut) = (p.to_vec(), None);
+        if share < 1.0 {
+            cut = Some(self.why_cut(p, room.element));
+            let pushed = shape.pushed_back(p).map_err(Error::from)?;
+            let nearer = carried_to(&pushed)?.expect("the law is that of rails");
+            let distance = |other: &[f64]| p.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            if distance(&between(&from, &pushed, nearer.share)) < distance(&between(&from, p, share)) {
+                (goal, share, moved) = (pushed, nearer.share, nearer.moved);
+            }
+        }
+        if let Some(cause) = self.poor_element(&moved) {
+            return Err(Stop::Mesh(Refusal { cause, wanted: p.to_vec() }));
+        }
+        let design = between(&from, &goal, share);
+        Ok(Some(Carriage { design, moved, cut, room: room.value, room_gradient }))
+    }
+
+    /// What the method is given for the design `p` that it asked for, from the sample of the one that was evaluated; `best` is
+    /// the evaluation of the best design before it.
+    pub(super) fn answer(
+        &mut self,
+        p: &[f64],
+        (carried, best): (&Carriage, Option<usize>),
+        mut sample: Sample,
+    ) -> Result<Sample, Stop> {
+        let has_gained = self.best_evaluation() != best;
+        if has_gained {
+            self.is_held_back = carried.is_held_back();
+        }
+        if let Some(cause) = &carried.cut {
+            self.observer.note(cause);
+            if !self.takes_constraints() {
+                return Err(Stop::Mesh(Refusal { cause: cause.clone(), wanted: p.to_vec() }));
+            }
+            if has_gained {
+                return Err(Stop::CutShort);
+            }
+        }
+        if !self.takes_constraints() {
+            return Ok(sample);
+        }
+        let step: Vec<f64> = p.iter().zip(&carried.design).map(|(p, own)| p - own).collect();
+        let along = |gradient: &[f64]| gradient.iter().zip(&step).map(|(g, s)| g * s).sum::<f64>();
+        sample.value += along(&sample.gradient);
+        for (value, gradient) in &mut sample.constraints {
+            *value += along(gradient);
+        }
+        let (c, slope) = excess(carried.room);
+        sample.constraints.push((c, carried.room_gradient.iter().map(|g| slope * g).collect()));
+        Ok(sample)
+    }
+
+    /// Which element a design asks too much of, why, and what would help.
+    fn why_cut(&self, p: &[f64], element: ElementId) -> String {
+        let (shape, mesh) = (self.shape(), self.problem.original());
+        let (surface, map) = (shape.surface(), shape.motion().map());
+        let displacements = surface.normal_displacements(p);
+        let nodes = mesh.topology().tet(element);
+        let moved: Vec<f64> = nodes
+            .iter()
+            .filter_map(|node| surface.nodes().binary_search(node).ok())
+            .map(|row| displacements[row])
+            .collect();
+        let is_held = |node: &NodeId| {
+            surface.nodes().binary_search(node).is_err() && (0..3).all(|c| !map.is_unknown(*node, c))
+        };
+        let (least, most) =
+            moved.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));
+        let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);
+        let (why, cure) = if !moved.is_empty() && nodes.iter().any(is_held) {
+            (
+                "nodes beside the design surface are held there".to_owned(),
+                "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)",
+            )
+        } else if most - least > 0.5 * most.abs().max(least.abs()) && moved.len() > 1 {
+            let step = 1e3 * (most - least);
+            (
+                format!("neighbouring nodes of the design lie {step:.1} mm apart"),
+                "a filter (design.filter_radius) or a control grid makes them smoother",
+            )
+        } else {
+            (
+                "there is no room between the design surface and where the mesh is held".to_owned(),
+                "a larger remesh region or narrower bounds give it",
+            )
+        };
+        let region = mesh.topology().region_name_at(element);
+        format!(
+            "the mesh carries a part of the step: element {element} of region `{region}` at ({x:.1}, {y:.1}, {z:.1}) mm would be \
+             squeezed, as {why}; {cure}"
+        )
+    }
+}
+
+/// `c` of a room and its derivative: `s (e^(−x/s) − 1)` of the room left, `x`, and linear where there is none; times a scale.
+fn excess(room: f64) -> (f64, f64) {
+    let left = room - LEAST_ROOM;
+    if left < 0.0 {
+        return (-SCALE / NEAR * left, -SCALE / NEAR);
+    }
+    let near = (-left / NEAR).exp();
+    (SCALE * (near - 1.0), -SCALE / NEAR * near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_constraint_binds_at_the_least_room_and_is_flat_far_away() {
+        assert_eq!(excess(LEAST_ROOM).0, 0.0);
+        assert!(excess(LEAST_ROOM - 0.1).0 > 0.0 && excess(0.9).0 < 0.0);
+        // Far away a change of the room by one changes the constraint by less than a thousandth of its value.
+        assert!(excess(0.9).1.abs() < 1e-3 * SCALE);
+        for room in [-0.4, 0.0, 0.05, 0.3] {
+            let h = 1e-6;
+            let difference = (excess(room + h).0 - excess(room - h).0) / (2.0 * h);
+            // Of second order in h / NEAR, and rounding of values of a thousand over h.
+            assert!((difference / excess(room).1 - 1.0).abs() < 1e-6, "{room}");
+        }
+    }
+}
