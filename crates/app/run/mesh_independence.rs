@@ -362,8 +362,10 @@ mod tests {
             terms: Vec::new(),
         };
         let mut recorded = Recorded::default();
-        let setup = set_up(config, source, Mode::Optimisation).expect("a sound problem");
-        let fresh = FreshMesh::of(config, &setup.problem).map(|fresh| FreshMesh { memory: 0, ..fresh });
+        // Another generator has not the shield's names, and no fresh mesh either.
+        let setup = set_up(config, source, Mode::Optimisation).ok();
+        let fresh = setup.and_then(|setup| FreshMesh::of(config, &setup.problem));
+        let fresh = fresh.map(|fresh| FreshMesh { memory: 0, ..fresh });
         let check =
             MeshIndependence { config, source, stop_reason, shapes, fresh: fresh.as_ref(), meshes: None };
         check.verify(&mut objective, &|| interrupted, &mut recorded);

@@ -142,6 +142,7 @@ impl Session<'_> {
             tets: mesh.tets().len(),
             unknowns: setup.problem.states().iter().map(|model| model.unknown_count()).sum(),
             directory: Some(directory.path()),
+            fields: config.output.fields,
         });
         for warning in &setup.warnings {
             observer.warning(warning);

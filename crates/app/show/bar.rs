@@ -164,7 +164,7 @@ mod tests {
 
     use super::super::tests::evaluation;
     use super::*;
-    use crate::config::Optimizer;
+    use crate::config::{FieldsKept, Optimizer};
 
     /// A terminal of 80 columns that keeps all that is written, and forgets what is cleared.
     #[derive(Debug, Clone, Default)]
@@ -245,6 +245,7 @@ mod tests {
             tets: 400,
             unknowns: 350,
             directory: None,
+            fields: FieldsKept::Every,
         }
     }
 

@@ -4,6 +4,7 @@ use super::styles::{Styles, styled};
 use super::summary::{self, Named};
 use super::table::{self, Columns};
 use super::{Evaluation, Started};
+use crate::config::FieldsKept;
 use crate::files::RunResult;
 use crate::printable::printable;
 
@@ -35,7 +36,9 @@ impl Lines {
             lines.push(format!("optimisation: {variables} design variables, {algorithm}"));
         }
         if let Some(directory) = started.directory {
-            lines.push(format!("writing to {}", printable(&directory.display().to_string())));
+            let is_part = started.optimizer.is_some() && started.fields == FieldsKept::Improved;
+            let part = if is_part { ", fields of evaluations that improve" } else { "" };
+            lines.push(format!("writing to {}{part}", printable(&directory.display().to_string())));
         }
         lines
     }

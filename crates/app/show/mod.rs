@@ -16,7 +16,7 @@ mod table;
 use std::io::Write;
 use std::path::Path;
 
-use crate::config::{Objective, Optimizer};
+use crate::config::{FieldsKept, Objective, Optimizer};
 use crate::files::RunResult;
 
 pub use fluxmorph_optimizer::driver::{Evaluation, Observer, Silent, column};
@@ -45,6 +45,8 @@ pub struct Started<'a> {
     pub unknowns: usize,
     /// The run directory; `None` when nothing is written.
     pub directory: Option<&'a Path>,
+    /// Of which evaluations it gets the fields.
+    pub fields: FieldsKept,
 }
 
 /// Shows a run from its start to its result; the optimiser reports to it as its [`Observer`].

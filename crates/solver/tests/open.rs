@@ -102,7 +102,7 @@ fn coil(elements: (ElementFamily, Order), in_box: bool, n: usize, layers: usize)
     let (radius, width) = (0.04, 0.02);
     let size = 1.5 * 0.05;
     let inside = if in_box {
-        let parameters = BlockParameters { size: [size; 3], cells: [n; 3], ..BlockParameters::default() };
+        let parameters = BlockParameters { size: [size; 3], cells: [n; 3] };
         with_shell(&block(&parameters).expect("a box"), &["x_max", "y_max", "z_max"], layers)
     } else {
         let parameters = SphereParameters {

@@ -160,6 +160,7 @@ impl Config {
             *path = source.directory.join(&*path);
         }
         let surfaces = self.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
-        self.output.complete(root, &source.directory, &source.stem, surfaces);
+        let most_evaluations = self.optimizer.max_evaluations;
+        self.output.complete(root, &source.directory, &source.stem, surfaces, most_evaluations);
     }
 }

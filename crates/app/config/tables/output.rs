@@ -9,6 +9,10 @@ use crate::config::table::table;
 use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
 
+/// Evaluations above which a run keeps the fields of those that improve, if nothing else is asked for: a field file of a
+/// small mesh has some megabytes.
+const LONG_RUN: usize = 20;
+
 /// Most parts of a cell of the fresh mesh along each axis: finer ones cost more than the run.
 const MOST_PARTS: f64 = 4.0;
 
@@ -20,10 +24,10 @@ table! {
     /// the size of the box, the far cells, materials, conditions, elements and their order, and the model of every region: an
     /// error of these is in both ratios. It is brought to the shapes in as many rounds as that takes, at least 20 if need be.
     /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
-    /// its triangles. Constraints are measured anew at both shapes, but for a thickness without a grid. A run that is interrupted or ends with
-    /// `max_time` is not checked; a signal during the check ends with 130 or 143 and the `status` `interrupted`, beside the
-    /// `stop_reason` of the search, and `fluxmorph resume` makes up for it; a check that fails is a warning, and changes
-    /// neither the status nor the rest of the result, which is on the disk before.
+    /// its triangles. Constraints are measured anew at both shapes. A run that is interrupted or ends with `max_time` is not
+    /// checked; a signal during the check ends with 130 or 143 and the `status` `interrupted`, beside the `stop_reason` of the
+    /// search, and `fluxmorph resume` makes up for it; a check that fails is a warning, and changes neither the status nor the
+    /// rest of the result, which is on the disk before.
     ///
     /// ```toml
     /// [output]
@@ -34,8 +38,9 @@ table! {
         /// The run directory, relative to the folder of the configuration. Default: `runs/` and the name of the file.
         #[serde(serialize_with = "as_text")]
         directory: PathBuf = TEXT, else PathBuf::from("runs");
-        /// Which evaluations leave a VTU file. A run has some tens of them.
-        fields: FieldsKept = WORD => FieldsKept::Every;
+        /// Which evaluations leave a VTU file. Default: `"every"`, and `"improved"` where `optimizer.max_evaluations` is above 20,
+        /// which the log says.
+        fields: FieldsKept = WORD, else FieldsKept::Every;
         /// Whether the mesh of the optimum is written as a Gmsh file, `optimum.msh`: it is what a user goes on with.
         mesh: bool = FLAG => true;
         /// Surfaces of the best design that are written as STL files; `[]`: none. Default: the surfaces of `[design]`.
@@ -66,8 +71,19 @@ choice! {
 }
 
 impl Output {
-    /// Completes what follows from the folder and the name of the configuration, and from its design surfaces.
-    pub(super) fn complete(&mut self, root: &Section<'_>, folder: &Path, stem: &str, surfaces: &[String]) {
+    /// Completes what follows from the folder and the name of the configuration, from its design surfaces and from the length
+    /// of its run.
+    pub(super) fn complete(
+        &mut self,
+        root: &Section<'_>,
+        folder: &Path,
+        stem: &str,
+        surfaces: &[String],
+        most_evaluations: usize,
+    ) {
+        if !root.has("output.fields") && most_evaluations > LONG_RUN {
+            self.fields = FieldsKept::Improved;
+        }
         if !root.has("output.directory") {
             self.directory = Path::new("runs").join(stem);
         }

@@ -7,6 +7,7 @@ use maud::{Markup, html};
 
 use super::data::RunData;
 use super::ticks::{duration, group_digits, number, threads, trim_zeros};
+use crate::config::Elements;
 use crate::files::{Manifest, shell_word};
 
 /// Names and values in their order.
@@ -42,8 +43,11 @@ pub(super) fn mesh(data: &RunData) -> Markup {
         facts.add("largest relative residual", number(result.linear_solver.worst_residual, 2));
     }
     let order = if u8::from(data.config.analysis.order) == 1 { "linear" } else { "quadratic" };
-    let penalty = trim_zeros(data.config.analysis.penalty, 4);
-    facts.add("elements", format!("{order} tetrahedra, nodal A–ψ, ν_p/ν = {penalty}"));
+    let family = match data.config.analysis.elements {
+        Elements::Edge => "edge A, nodal ψ".to_owned(),
+        Elements::Nodal => format!("nodal A–ψ, ν_p/ν = {}", trim_zeros(data.config.analysis.penalty, 4)),
+    };
+    facts.add("elements", format!("{order} tetrahedra, {family}"));
     if let Ok(outline) = &data.outline {
         facts.add("bounding box", bounding_box(&outline.full_mesh));
         if let Some(design) = &outline.design {

@@ -2,8 +2,9 @@
 
 use maud::Markup;
 
-use super::data::RunData;
+use super::data::{RunData, Snapshot};
 use super::markup::{Card, header};
+use super::observed;
 use super::plane::bounds;
 use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use super::words;
@@ -32,7 +33,10 @@ pub(super) fn head(data: &RunData) -> Markup {
     } else if let Some(mesh) = &data.manifest.mesh {
         cards.push(("tetrahedra", group_digits(mesh.tets), format!("{} nodes", group_digits(mesh.nodes))));
     }
-    cards.extend(data.outline.as_ref().ok().map(size_card));
+    if let Ok(outline) = &data.outline {
+        cards.extend(mean_card(data, outline));
+        cards.push(size_card(outline));
+    }
     header(kind, &data.config.title, (class, &status), &lead, &cards)
 }
 
@@ -122,6 +126,18 @@ fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
         _ => ("not checked".to_owned(), "see the messages at the end of the run".to_owned()),
     };
     ("on a fresh mesh", value, remark)
+}
+
+/// Mean |B| over what is observed, before and after, where the fields are there.
+fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
+    let mean = |field: &Result<Snapshot, String>| {
+        let mean = observed::mean_flux_density(data, outline, field.as_ref().ok()?)?;
+        Some(format!("{} mT", number(1e3 * mean, 4)))
+    };
+    let [before, after] = data.fields.each_ref().map(mean);
+    let regions = observed::region_names(data).join(", ");
+    let remark = before.map_or(regions.clone(), |before| format!("{before} before, in {regions}"));
+    Some(("mean |B|", after?, remark))
 }
 
 /// Extents of the design surface and of the mesh.

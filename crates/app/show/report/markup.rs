@@ -43,6 +43,11 @@ pub(super) fn json(id: &str, value: &serde_json::Value) -> Markup {
     html! { script type="application/json" id=(id) { (PreEscaped(text)) } }
 }
 
+/// Cards side by side: at most five, and never one alone in the last row.
+fn columns(cards: usize) -> usize {
+    if cards <= 5 { cards } else { cards.div_ceil(2).min(5) }
+}
+
 /// What stands above the sections: kind and title of the work, a class with the status in words, a sentence, key figures.
 pub(crate) fn header(
     kind: &str,
@@ -57,7 +62,7 @@ pub(crate) fn header(
             h1 { (title) }
             p class={ "status " (class) } { (status) }
             p class="lead" { (lead) }
-            div class="cards" {
+            div class={ "cards columns-" (columns(cards.len())) } {
                 @for (name, value, remark) in cards {
                     div class="card" {
                         span class="name" { (name) }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::colour::ColourMap;
 use super::plane::extremes;
-use super::ticks::{Count, labels, linear, logarithmic, number};
+use super::ticks::{Count, common_power, labels, linear, logarithmic, number, power_of_ten};
 
 /// Width of every figure: a phone shows it as it is, a larger screen larger.
 pub(crate) const WIDTH: f64 = 360.0;
@@ -63,17 +63,36 @@ impl Scale {
         self.pixels[0] + self.share(value).clamp(-1.0, 2.0) * (self.pixels[1] - self.pixels[0])
     }
 
-    /// Places and texts of the ticks, at most about `most`.
+    /// Places and texts of the ticks, at most about `most`; where all are very small or large, as multiples of a power of ten.
     pub(crate) fn ticks(&self, most: usize) -> Vec<(f64, String)> {
-        let values = match self.count {
-            Count::Linear => linear(self.low, self.high, most),
-            Count::Logarithmic => logarithmic(self.low, self.high, most),
-        };
-        let texts = match self.count {
-            Count::Linear => labels(&values),
-            Count::Logarithmic => values.iter().map(|v| number(*v, 1)).collect(),
+        let values = self.values(most);
+        let texts = match (self.count, common_power(&values)) {
+            (Count::Linear, None) => labels(&values),
+            (Count::Linear, Some(power)) => {
+                let unit = 10f64.powi(power);
+                labels(&values.iter().map(|value| value / unit).collect::<Vec<_>>())
+            }
+            (Count::Logarithmic, _) => values.iter().map(|v| number(*v, 1)).collect(),
         };
         values.into_iter().map(|v| self.at(v)).zip(texts).collect()
+    }
+
+    fn values(&self, most: usize) -> Vec<f64> {
+        match self.count {
+            Count::Linear => linear(self.low, self.high, most),
+            Count::Logarithmic => logarithmic(self.low, self.high, most),
+        }
+    }
+
+    /// A title with the power of ten of the ticks, in front of its unit where it has one.
+    pub(crate) fn titled(&self, title: &str, most: usize) -> String {
+        let power =
+            common_power(&self.values(most)).filter(|_| self.count == Count::Linear).map(power_of_ten);
+        match (power, title.rsplit_once('[')) {
+            (None, _) => title.to_owned(),
+            (Some(power), Some((name, unit))) => format!("{name}[{power} {unit}"),
+            (Some(power), None) => format!("{title} [{power}]"),
+        }
     }
 }
 
@@ -130,8 +149,8 @@ pub(crate) fn axes(x: &Scale, y: &Scale, titles: [&str; 2], ticks: [usize; 2]) -
         }
         (line("axis", [left, bottom], [right, bottom]))
         (line("axis", [left, bottom], [left, top]))
-        (text("title middle", 0.5 * (left + right), bottom + 30.0, titles[0]))
-        (text("title", 2.0, top - 9.0, titles[1]))
+        (text("title middle", 0.5 * (left + right), bottom + 30.0, &x.titled(titles[0], ticks[0])))
+        (text("title", 2.0, top - 9.0, &y.titled(titles[1], ticks[1])))
     }
 }
 
@@ -172,13 +191,16 @@ pub(super) fn colour_bar(id: &str, map: ColourMap, scale: &Scale, title: &str, t
             }
         }
         rect fill={ "url(#" (id) ")" } x=(px(left)) y=(px(top)) width=(px(right - left)) height="9" {}
-        @for (at, label) in scale.ticks(5) {
+        @for (at, label) in scale.ticks(BAR_TICKS) {
             (line("axis", [at, top + 9.0], [at, top + 12.0]))
             (text("tick middle", at, top + 23.0, &label))
         }
-        (text("title middle", 0.5 * (left + right), top + 38.0, title))
+        (text("title middle", 0.5 * (left + right), top + 38.0, &scale.titled(title, BAR_TICKS)))
     }
 }
+
+/// Ticks of a colour bar, at most about so many.
+const BAR_TICKS: usize = 5;
 
 /// Height that a colour bar takes.
 pub(super) const BAR: f64 = 50.0;
@@ -193,6 +215,25 @@ mod tests {
             (0..100_000).map(|i| [f64::from(i) * 1e-3, if i == 77_777 { 50.0 } else { 0.0 }]).collect();
         let drawn = polyline("curve", &points).into_string();
         assert!(drawn.len() < 10_000 && drawn.contains("77.8 50"), "{}", drawn.len());
+    }
+
+    #[test]
+    fn labels_of_the_vertical_axis_are_whole() {
+        // Characters of 11 pixels are up to 6.2 wide, and end 5 pixels before the axis.
+        let most = ((LEFT - 5.0) / 6.2) as usize;
+        for exponent in -12..12 {
+            for (low, high) in [(1.0, 1.9), (1.234, 1.238), (-3.0, 5.0), (0.0, 7.0), (2.0, 59.0)] {
+                let unit = 10f64.powi(exponent);
+                let scale = Scale::around([low * unit, high * unit].into_iter(), [174.0, 24.0]);
+                for (_, label) in scale.ticks(5) {
+                    assert!(label.chars().count() <= most, "{label} of {low} to {high} times 1e{exponent}");
+                }
+            }
+        }
+        let small = Scale::around([1.4e-7, 1.8e-7].into_iter(), [0.0, 1.0]);
+        assert_eq!(small.ticks(5)[0].1, "1.4");
+        assert_eq!(small.titled("loss [W]", 5), "loss [10⁻⁷ W]");
+        assert_eq!(small.titled("share", 5), "share [10⁻⁷]");
     }
 
     #[test]

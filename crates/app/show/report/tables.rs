@@ -8,7 +8,7 @@ use super::data::RunData;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use crate::build::{Audited, Outline};
-use crate::config::{Objective, RegionModel};
+use crate::config::{BodyKind, Constraint, Limit, Objective, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, TermResult};
 use crate::show::Evaluation;
 
@@ -40,7 +40,7 @@ fn titled_table(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -
 type Cell<'a> = Box<dyn Fn(&Evaluation) -> String + 'a>;
 
 /// The columns of the table of evaluations.
-fn columns(rows: &[Evaluation]) -> Vec<(&str, Cell<'_>)> {
+fn columns<'a>(rows: &'a [Evaluation], objective: &'a str) -> Vec<(&'a str, Cell<'a>)> {
     fn column<'a>(title: &'a str, cell: impl Fn(&Evaluation) -> String + 'a) -> (&'a str, Cell<'a>) {
         (title, Box::new(cell))
     }
@@ -51,7 +51,7 @@ fn columns(rows: &[Evaluation]) -> Vec<(&str, Cell<'_>)> {
     let mut all = vec![
         column("evaluation", |row| row.evaluation.to_string()),
         column("iteration", |row| row.iteration.to_string()),
-        column("F", |row| number(row.objective, 6)),
+        (objective, Box::new(|row| number(row.objective, 6))),
         column("F / F₀", |row| number(row.ratio, 4)),
         column("‖dF/dp‖ [F/m]", |row| number(row.gradient_norm, 3)),
         column("step [mm]", |row| number(1e3 * row.step_norm, 3)),
@@ -78,7 +78,9 @@ fn columns(rows: &[Evaluation]) -> Vec<(&str, Cell<'_>)> {
 /// The rows of the history.
 pub(super) fn evaluations(data: &RunData) -> Markup {
     let rows = &data.history;
-    let (titles, cells): (Vec<&str>, Vec<Cell<'_>>) = columns(rows).into_iter().unzip();
+    let unit = data.config.objective.as_ref().and_then(Objective::si_unit);
+    let objective = unit.map_or("F".to_owned(), |unit| format!("F [{unit}]"));
+    let (titles, cells): (Vec<&str>, Vec<Cell<'_>>) = columns(rows, &objective).into_iter().unzip();
     let kept: Vec<&Evaluation> = if rows.len() > MOST_ROWS {
         rows[..MOST_ROWS / 2].iter().chain(&rows[rows.len() - MOST_ROWS / 2..]).collect()
     } else {
@@ -117,21 +119,38 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         result.states.iter().map(|s| (s.frequency_hz, &s.losses_w, s.probes.as_slice())).collect()
     };
     html! {
-        (constraints(&result.constraints))
+        (constraints(&result.constraints, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (losses(&states))
         (probes(&states))
     }
 }
 
-fn constraints(constraints: &[ConstraintResult]) -> Markup {
+fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Markup {
     let row = |c: &ConstraintResult| {
         let verdict = if c.satisfied { "satisfied" } else { "violated" };
-        vec![c.name.clone(), number(c.value, 5), number(c.bound, 5), verdict.to_owned()]
+        let (unit, factor) = constraint_unit(&c.name, constraints);
+        let [value, bound] = [c.value, c.bound].map(|v| format!("{} {unit}", number(factor * v, 5)));
+        vec![c.name.clone(), value, bound, verdict.to_owned()]
     };
-    let rows: Vec<Vec<String>> = constraints.iter().map(row).collect();
-    let head = ["constraint", "value [SI]", "bound [SI]", ""];
+    let rows: Vec<Vec<String>> = results.iter().map(row).collect();
+    let head = ["constraint", "value", "bound", ""];
     titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
+}
+
+/// The unit that a constraint is shown in, and its number in one of SI.
+fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64) {
+    let is_own = |own: &&Constraint| {
+        let side = name.strip_prefix(own.name.as_str());
+        side.is_some_and(|side| ["", "_minimum", "_maximum"].contains(&side))
+    };
+    match constraints.iter().find(is_own).map(|constraint| &constraint.limit) {
+        Some(Limit::Field { functional, .. }) => (functional.dimension().si_unit(), 1.0),
+        Some(Limit::Body { kind: BodyKind::Volume, .. }) => ("cm³", 1e6),
+        Some(Limit::Body { kind: BodyKind::Mass, .. }) => ("kg", 1.0),
+        Some(Limit::Thickness { .. }) => ("mm", 1e3),
+        None => ("in SI", 1.0),
+    }
 }
 
 fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {

@@ -55,6 +55,20 @@ pub(crate) fn logarithmic(low: f64, high: f64, most: usize) -> Vec<f64> {
         .unwrap_or(decades)
 }
 
+/// The power of ten that all ticks of an axis are divided by, for texts that are short: none between a thousandth and a
+/// million.
+pub(crate) fn common_power(ticks: &[f64]) -> Option<i32> {
+    let step = ticks.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    let largest = ticks.iter().fold(0.0_f64, |largest, t| largest.max(t.abs()));
+    let is_plain = (1e-3..1e6).contains(&step) && largest < 1e6;
+    (step.is_finite() && step > 0.0 && !is_plain).then(|| largest.log10().floor() as i32)
+}
+
+/// A power of ten.
+pub(crate) fn power_of_ten(exponent: i32) -> String {
+    format!("10{}", superscript(exponent))
+}
+
 /// Ticks of an axis as text, all with as many decimals as their step needs.
 pub(crate) fn labels(ticks: &[f64]) -> Vec<String> {
     let step = ticks.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
@@ -82,8 +96,8 @@ pub(crate) fn number(value: f64, digits: usize) -> String {
             let decimals = (digits as i32 - 1 - exponent).max(0) as usize;
             minus(&format!("{value:.decimals$}"))
         }
-        _ if mantissa == "1" => format!("10{}", superscript(exponent)),
-        _ => format!("{} × 10{}", minus(mantissa), superscript(exponent)),
+        _ if mantissa == "1" => power_of_ten(exponent),
+        _ => format!("{} × {}", minus(mantissa), power_of_ten(exponent)),
     }
 }
 
