@@ -176,7 +176,7 @@ pub struct ForceResult {
 /// A nonlinear solution, and how far it goes into the curves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SaturationResult {
-    /// Steps of Newton's method.
+    /// Steps of Newton's method, its linear start included.
     pub newton_steps: usize,
     /// Every region with a B–H curve.
     pub regions: Vec<SaturatedRegion>,

@@ -59,9 +59,12 @@ impl Evaluation {
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
-        for solver in problem.states().iter().filter_map(FieldModel::linear_solver) {
-            let sizes =
-                (solver.matrix_bytes(), solver.preconditioner_bytes(solver.method()).unwrap_or_default());
+        for state in problem.states() {
+            let Some(solver) = state.linear_solver() else { continue };
+            // Newton's method holds the matrix of the linear parts beside that of the tangent.
+            let matrices = if state.is_linear() { 1 } else { 2 };
+            let preconditioner = solver.preconditioner_bytes(solver.method()).unwrap_or_default();
+            let sizes = (matrices * solver.matrix_bytes(), preconditioner);
             match solver.reuse() {
                 Reuse::WhileItPays => {
                     evaluation.matrices += sizes.0;

@@ -35,7 +35,7 @@ pub enum BhFault {
     #[error("the table has too few points: a curve takes two beside the origin")]
     TooFew,
     /// Infinite, or no number.
-    #[error("H = {h} A/m, B = {b} T: both must be finite")]
+    #[error("the point H = {h} A/m, B = {b} T is not finite")]
     NotFinite {
         /// `H` [A/m].
         h: f64,
@@ -43,7 +43,7 @@ pub enum BhFault {
         b: f64,
     },
     /// Only the first quadrant is given.
-    #[error("H = {h} A/m, B = {b} T: a table starts at the origin and has no negative numbers")]
+    #[error("the point H = {h} A/m, B = {b} T has a negative number: a table starts at the origin")]
     Negative {
         /// `H` [A/m].
         h: f64,
@@ -51,7 +51,7 @@ pub enum BhFault {
         b: f64,
     },
     /// `H` repeats or falls.
-    #[error("H = {h} A/m does not increase: the point before has {before} A/m")]
+    #[error("the field strength {h} A/m does not increase: the point before has {before} A/m")]
     FieldStrength {
         /// `H` [A/m].
         h: f64,
@@ -59,7 +59,7 @@ pub enum BhFault {
         before: f64,
     },
     /// `B` repeats or falls.
-    #[error("B = {b} T does not increase: the point before has {before} T")]
+    #[error("the flux density {b} T does not increase: the point before has {before} T")]
     FluxDensity {
         /// `B` [T].
         b: f64,
@@ -68,7 +68,7 @@ pub enum BhFault {
     },
     /// Less than in vacuum.
     #[error(
-        "B = {b} T at H = {h} A/m is less than in vacuum ({vacuum:.3e} T); a point is H [A/m], then B [T]"
+        "the flux density {b} T at {h} A/m is less than in vacuum ({vacuum:.3e} T): a point is H [A/m], then B [T]"
     )]
     BelowVacuum {
         /// `H` [A/m].
@@ -80,7 +80,8 @@ pub enum BhFault {
     },
     /// More than any material has.
     #[error(
-        "B = {b} T at H = {h} A/m: no material has a relative permeability of {relative:.1e}, or B − μ0 H above 10 T"
+        "the flux density {b} T at {h} A/m is beyond any material: a relative permeability of {relative:.1e}, or \
+         B − μ0 H above 10 T"
     )]
     BeyondIron {
         /// `H` [A/m].

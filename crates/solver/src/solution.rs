@@ -28,7 +28,7 @@ pub struct FieldSolution {
     values: Vec<c64>,
     role: Role,
     report: LinearSolverReport,
-    /// Of Newton's method; zero where all is linear.
+    /// Of Newton's method with its start; zero where all is linear.
     newton_steps: usize,
 }
 
@@ -51,7 +51,7 @@ impl FieldSolution {
         Self { newton_steps: steps, ..self }
     }
 
-    /// Steps of Newton's method; zero where all is linear.
+    /// Steps of Newton's method, its start included; zero where all is linear.
     pub fn newton_steps(&self) -> usize {
         self.newton_steps
     }

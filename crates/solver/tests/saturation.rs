@@ -81,7 +81,7 @@ fn a_straight_table_gives_the_field_of_the_linear_material() {
         };
         let (linear, _) = solved(steel, None);
         let (newton, steps) = solved(part, Some(straight.clone()));
-        assert!((1..=2).contains(&steps), "{steps}");
+        assert!((1..=3).contains(&steps), "{steps}");
         let largest = linear.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
         let off = linear.iter().flatten().zip(newton.iter().flatten()).map(|(a, b)| (a - b).norm());
         let worst = off.fold(0.0, f64::max) / largest;
@@ -90,7 +90,7 @@ fn a_straight_table_gives_the_field_of_the_linear_material() {
 }
 
 #[test]
-fn newton_converges_from_zero_to_the_same_field_whatever_the_linear_part() {
+fn newton_converges_to_the_same_field_whatever_the_linear_part() {
     let mesh = mesh();
     for elements in ALL {
         let solved = |relative_permeability: f64| {

@@ -11,5 +11,6 @@ mod plate;
 mod rows;
 mod shield;
 mod sphere;
+mod steel;
 mod team21a;
 mod team7;
