@@ -42,7 +42,10 @@ fn solve(out: &Path, overrides: &[&str]) -> String {
 fn steel_beyond_saturation_is_named_with_its_place() {
     let home = folder();
     let out = home.path().join("out");
-    let found = solve(&out, &MESHED);
+    let found = solve(
+        &out,
+        &[&MESHED[..], &["mesh.shield.skin=[\"0.4 mm\", \"1.2 mm\", \"2.5 mm\", \"5 mm\"]"]].concat(),
+    );
     for part in ["iron beyond saturation: |B| in `plate` reaches", "T at 60 Hz, at (", "beyond 2 T"] {
         assert!(found.contains(part), "no `{part}` in: {found}");
     }

@@ -2,6 +2,7 @@
 //!
 //! What cannot be meant is refused at its key; what is rarely meant is a warning.
 
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{self, Racetrack};
@@ -184,9 +185,9 @@ fn beside_iron(config: &Config, mesh: &Mesh) -> Option<String> {
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.
 pub(super) fn unit_hint(config: &Config, mesh: &Mesh) -> Option<String> {
     let size = size(mesh);
-    let unlike = |coil: &&Coil| widest(coil).is_some_and(|w| w < ALIKE[0] * size || w > ALIKE[1] * size);
-    let coil = config.coils.iter().find(unlike)?;
-    let width = widest(coil)?;
+    let unlike = |width: &f64| *width < ALIKE[0] * size || *width > ALIKE[1] * size;
+    let of = |coil| Some((coil, widest(coil, mesh).filter(unlike)?));
+    let (coil, width) = config.coils.iter().find_map(of)?;
     let unit = match &config.mesh {
         MeshConfig::File { .. } => "mesh.unit and the units of the coil",
         _ => "the units of the mesh and of the coil",
@@ -199,9 +200,14 @@ fn size(mesh: &Mesh) -> f64 {
     norm(sub(high, low))
 }
 
-/// Largest width of an analytic coil [m].
-fn widest(coil: &Coil) -> Option<f64> {
-    half_extent(coil).map(|[a, b, _]| 2.0 * a.max(b))
+/// Largest width of a coil [m]: that of its winding, or of the box around its region.
+fn widest(coil: &Coil, mesh: &Mesh) -> Option<f64> {
+    let CoilShape::Region(own) = &coil.shape else {
+        return half_extent(coil).map(|[a, b, _]| 2.0 * a.max(b));
+    };
+    let elements = mesh.topology().elements_of(mesh.topology().region(&own.region).ok()?);
+    let vertices: Vec<Point> = elements.into_iter().flat_map(|e| mesh.vertices(e)).collect();
+    (!vertices.is_empty()).then(|| AxisBox::around(&vertices).extent())
 }
 
 /// Half sizes of the box around an analytic coil, across its axis and along it [m].

@@ -1,4 +1,4 @@
-//! Skin-depth audits of the conductors: of the mesh as it is, at the bounds of the design, and of a design that was found.
+//! Skin-depth audits of the conductors: of the mesh as it is, of the thinnest design allowed, and of a design that was found.
 
 use fluxmorph_geometry::tet4::{Point, add};
 use fluxmorph_geometry::{Mesh, NodeId};
@@ -56,7 +56,7 @@ pub(super) fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
 }
 
-/// What the audits, without objection to the mesh as it is, have against the designs at the bounds.
+/// What the audits, without objection to the mesh as it is, have against the thinnest design that the bounds allow.
 pub(super) fn bound_warnings(
     config: &Config,
     audits: &[Audited],
@@ -64,19 +64,23 @@ pub(super) fn bound_warnings(
     body: Option<&str>,
 ) -> Vec<String> {
     let Some(shape) = problem.shape() else { return Vec::new() };
-    let mut warnings = Vec::new();
-    for (key, p) in [("design.lower", shape.lower()), ("design.upper", shape.upper())] {
-        let sound = audits.iter().filter(|audited| audited.warning().is_none());
-        let thinnest = thinnest(config, problem.original(), shape, p);
-        let walls = sound.filter(|own| Some(own.audit.region.as_str()) == body);
-        let thin = walls.filter_map(|own| wall_warning(own, thinnest?));
-        warnings.extend(thin.map(|text| {
+    let bounds = [("design.lower", shape.lower()), ("design.upper", shape.upper())];
+    let left = bounds.map(|(_, p)| thinnest(config, problem.original(), shape, p));
+    // The bound at which least is left of the body; without a thickness the lower one.
+    let (key, p) = if left[1] < left[0] { bounds[1] } else { bounds[0] };
+    let thinnest = left.into_iter().flatten().reduce(f64::min);
+    let sound = audits.iter().filter(|audited| audited.warning().is_none());
+    let walls = sound.filter(|own| Some(own.audit.region.as_str()) == body);
+    let thin = walls.filter_map(|own| wall_warning(own, thinnest?));
+    let mut warnings: Vec<String> = thin
+        .map(|text| {
             format!(
                 "at {key} {text}. Take a bound nearer to zero, or a constraint of kind = \"thickness\" with a minimum"
             )
-        }));
-        // Where the mesh does not come to a bound in one step, the audit of the result is the next one.
-        let Ok(moved) = problem.moved(p) else { continue };
+        })
+        .collect();
+    // Where the mesh does not come to a bound in one step, the audit of the result is the next one.
+    if let Ok(moved) = problem.moved(p) {
         warnings.extend(new_objections(config, audits, &moved.mesh).map(|text| format!("at {key}: {text}")));
     }
     warnings

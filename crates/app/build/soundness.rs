@@ -13,7 +13,7 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 
 use super::{material, millimetres};
-use crate::config::{Boundaries, Config, Diagnostic, MeshConfig, SourceMap};
+use crate::config::{self, Boundaries, Config, Diagnostic, MeshConfig, SourceMap};
 
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];
@@ -118,8 +118,11 @@ pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let whole: f64 = volumes.iter().sum();
     let (name, volume) =
         topology.region_names().iter().zip(volumes).max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    let written = config.regions.get(name).and_then(|region| config.materials.get(&region.material));
     let own = material(config, name);
-    let is_matter = own.relative_permeability != 1.0 || own.conductivity > 0.0;
+    let is_matter = own.relative_permeability != 1.0
+        || own.conductivity > 0.0
+        || written.is_some_and(config::Material::saturates);
     (is_matter && volume > MOSTLY * whole).then(|| {
         format!(
             "the region `{name}`, which is iron or conducts, fills {:.0} % of the mesh: are the groups of two regions swapped?",

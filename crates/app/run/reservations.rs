@@ -52,7 +52,8 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
                 format!(
                     "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz, at {}, and {:.1} % of it \
                      are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
-                     that of a material that does not exist. Lower the ampere-turns, or give the iron more section",
+                     that of a material that does not exist. At 0 Hz give the material its curve (bh); else lower the ampere-turns, or \
+                     give the iron more section",
                     millimetres(place),
                     100.0 * found.beyond / found.whole
                 )
@@ -70,7 +71,7 @@ fn saturated(
 ) -> BTreeMap<String, Saturated> {
     let mesh = &analysis.mesh;
     let topology = mesh.topology();
-    // The polarisation is B (1 − 1/µ): what the region adds to the field of air.
+    // The polarisation is B (1 − 1/µ): what the region adds to the field of air. A material with a curve has µ = 1 here.
     let share = |name: &String| 1.0 - 1.0 / material(config, name).relative_permeability;
     let shares: Vec<f64> = topology.region_names().iter().map(share).collect();
     let share_at = |e: &ElementId| shares[topology.region_of()[e.index()].index()];

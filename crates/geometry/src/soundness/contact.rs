@@ -1,6 +1,6 @@
 //! Parts of a mesh that overlap, or that touch without common nodes.
 //!
-//! In a sound mesh no outer face has an element before it, and no outer node lies in an element that it does not belong to.
+//! In a sound mesh no outer face has an element before it, or two behind it, and no outer node lies in an element that it does not belong to.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,6 +12,9 @@ use crate::tet4::{Point, add, centroid, norm, sub};
 /// How far before an outer face another element is looked for, as a share of the square root of its area: coordinates in
 /// files have six digits or more, and no gap that is meshed around is a thousandth of the triangles at it.
 const BEFORE: f64 = 1e-3;
+
+/// Barycentric coordinates above which a point lies inside an element and not on a face that it shares: rounding.
+const INSIDE: f64 = 1e-6;
 
 /// Nodes nearer than this share of the edges at them are one node twice: the same reasons.
 const SAME: f64 = 1e-4;
@@ -70,35 +73,41 @@ fn entry(found: &mut Found, meeting: Meeting, regions: [RegionId; 2], place: Poi
     found.entry((meeting, regions)).or_insert(none)
 }
 
-/// Elements before outer faces.
+/// Elements before outer faces, and elements behind them beside their own.
 fn at_faces(hull: &Hull<'_>, has_condition: &[bool], found: &mut Found) {
     let shifted = |face: usize, sign: f64| {
         let step = sign * BEFORE * hull.area(face).sqrt();
         add(centroid(hull.corners(face)), hull.normal(face).map(|n| step * n))
     };
-    let before: Vec<Point> = (0..hull.faces().len()).map(|face| shifted(face, 1.0)).collect();
-    let mut met: Vec<(usize, ElementId)> =
-        holders(hull.mesh(), &before).into_iter().map(|(face, (element, _))| (face, element)).collect();
-    met.sort_unstable();
-    met.dedup_by_key(|(face, _)| *face);
-    // Behind a face that only touches there is its own element alone.
-    let behind: Vec<Point> = met.iter().map(|&(face, _)| shifted(face, -1.0)).collect();
-    let mut covers = vec![0usize; met.len()];
-    for (i, _) in holders(hull.mesh(), &behind) {
-        covers[i] += 1;
+    let [before, behind] = [1.0, -1.0].map(|sign| {
+        let points: Vec<Point> = (0..hull.faces().len()).map(|face| shifted(face, sign)).collect();
+        holders(hull.mesh(), &points)
+    });
+    let mut met: BTreeMap<usize, (Meeting, ElementId)> = BTreeMap::new();
+    for (face, (element, _)) in before {
+        met.entry(face).or_insert((Meeting::Touching, element));
+    }
+    let mut covers: BTreeMap<usize, Vec<ElementId>> = BTreeMap::new();
+    for (face, (element, coordinates)) in behind {
+        if coordinates.iter().all(|&c| c > INSIDE) {
+            covers.entry(face).or_default().push(element);
+        }
+    }
+    for (face, elements) in covers.into_iter().filter(|(_, elements)| elements.len() > 1) {
+        let other = elements.into_iter().find(|e| *e != hull.faces()[face].inside);
+        met.insert(face, (Meeting::Overlapping, other.expect("one of two is another")));
     }
     let region_of = hull.mesh().topology().region_of();
     let conditioned: BTreeSet<ElementId> =
         hull.faces().iter().zip(has_condition).filter(|(_, own)| **own).map(|(f, _)| f.inside).collect();
     let mut largest = BTreeMap::new();
-    for (&(face, other), cover) in met.iter().zip(covers) {
-        let meeting = if cover > 1 { Meeting::Overlapping } else { Meeting::Touching };
+    for (face, (meeting, other)) in met {
         let is_sheet = has_condition[face] && conditioned.contains(&other);
         if is_sheet && meeting == Meeting::Touching {
             continue;
         }
         let regions = [hull.faces()[face].inside, other].map(|e| region_of[e.index()]);
-        let contact = entry(found, meeting, regions, before[face]);
+        let contact = entry(found, meeting, regions, centroid(hull.corners(face)));
         let area = hull.area(face);
         contact.faces += 1;
         contact.area += area;

@@ -149,7 +149,8 @@ fn open_patches_say_where_they_lie() {
     });
     let tets = kept.map(|e| cube.topology().tet(e)).collect();
     let l = mesh(cube.points().to_vec(), tets, |_| 0);
-    let notch = |x: Point| (x[0] == 2.0 && x[2] > 2.0) || (x[2] == 2.0 && x[0] > 2.0);
+    let at_two = |c: f64| (c - 2.0).abs() < 1e-9;
+    let notch = |x: Point| (at_two(x[0]) && x[2] > 2.0) || (at_two(x[2]) && x[0] > 2.0);
     assert_eq!(situations(&l, &notch), [(Situation::Inward, 8.0); 2]);
 }
 
