@@ -69,7 +69,7 @@ impl FinerProblem {
         let mesh =
             Mesh::new(original.topology().clone(), points).map_err(fluxmorph_optimizer::Error::from)?;
         let displacement = vec![[0.0; 3]; mesh.points().len()];
-        Ok(Moved { mesh, displacement, inversion: StepToInversion::NEVER })
+        Ok(Moved { mesh, displacement, inversion: StepToInversion::NEVER, tangent: None })
     }
 
     /// The analysis of a shape.

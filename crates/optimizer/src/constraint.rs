@@ -70,7 +70,7 @@ impl Constraint {
             Quantity::Thickness { measure, bound } => {
                 // Beyond a minimum is below it, beyond a maximum above.
                 let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
-                let (beyond, gradient) = measure.evaluate(shape, mesh)?;
+                let (beyond, gradient) = measure.evaluate(shape, moved)?;
                 Some((bound + sign * beyond, gradient.iter().map(|g| sign * g).collect()))
             }
         })

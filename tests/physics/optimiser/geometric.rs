@@ -53,13 +53,13 @@ fn a_quarter_plate_has_its_volume_and_grows_with_its_face() {
         let (problem, plate) = (&setup.problem, volume(&setup));
         let shape = problem.shape().expect("a shape");
         let uniform = vec![3e-3; shape.surface().variable_count()];
-        let mesh = problem.moved(&uniform).expect("inside the bounds").mesh;
-        let (value, gradient) = plate.evaluate(&mesh, shape).expect("a direct solve");
+        let moved = problem.moved(&uniform).expect("inside the bounds");
+        let (value, gradient) = plate.evaluate(&moved, shape).expect("a direct solve");
         // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
         assert!((value - 0.12 * 0.24 * 0.013).abs() < 1e-12 * value, "{value}");
         let swept: f64 = gradient.iter().sum();
         assert!((swept - 0.12 * 0.24).abs() < 1e-12, "{swept}");
-        let mass = plate.with_density(7850.0).value(&mesh);
+        let mass = plate.with_density(7850.0).value(&moved.mesh);
         assert!((mass - 7850.0 * value).abs() < 1e-12 * mass);
     }
 }
@@ -71,8 +71,8 @@ fn the_gradient_holds_in_both_models_and_both_agree() {
         let (problem, plate) = (&setup.problem, volume(&setup));
         let shape = problem.shape().expect("a shape");
         let at = |p: &[f64]| {
-            let mesh = problem.moved(p).expect("inside the bounds").mesh;
-            plate.evaluate(&mesh, shape).expect("a direct solve")
+            let moved = problem.moved(p).expect("inside the bounds");
+            plate.evaluate(&moved, shape).expect("a direct solve")
         };
         taylor(at, &wavy(problem), 1e-3);
         at(&wavy(problem)).0
@@ -87,8 +87,8 @@ fn bound_of(setup: &Setup, limit: ThicknessLimit) -> ThicknessBound {
 
 /// A bound and its gradient at a design.
 fn evaluate(setup: &Setup, bound: &ThicknessBound, p: &[f64]) -> (f64, Vec<f64>) {
-    let mesh = setup.problem.moved(p).expect("inside the bounds").mesh;
-    bound.evaluate(setup.problem.shape().expect("a shape"), &mesh).expect("a direct solve")
+    let moved = setup.problem.moved(p).expect("inside the bounds");
+    bound.evaluate(setup.problem.shape().expect("a shape"), &moved).expect("a direct solve")
 }
 
 /// Least and greatest thickness of a design.

@@ -10,8 +10,7 @@
 //! It is smooth and never below the largest `g_i`: what satisfies it satisfies every limit. `ρ` is chosen so that at most
 //! one per cent of the limit is given away.
 
-use fluxmorph_geometry::Mesh;
-use fluxmorph_remesh::RemeshError;
+use fluxmorph_remesh::{Moved, RemeshError};
 
 use super::GeometricError;
 use super::wall_thickness::{Wall, WallThickness};
@@ -62,12 +61,13 @@ impl ThicknessBound {
     ///
     /// # Panics
     /// If the shape is not the one that the bound was made for.
-    pub fn evaluate(&self, shape: &Shape, mesh: &Mesh) -> Result<(f64, Vec<f64>), RemeshError> {
+    pub fn evaluate(&self, shape: &Shape, moved: &Moved) -> Result<(f64, Vec<f64>), RemeshError> {
         let thickness = shape.thickness().expect("a bound is made for a shape with a thickness");
         let (sign, limit) = match self.bound {
             ThicknessLimit::Minimum(limit) => (-1.0, limit),
             ThicknessLimit::Maximum(limit) => (1.0, limit),
         };
+        let mesh = &moved.mesh;
         let excess: Vec<(Wall, f64)> = thickness
             .walls(shape.surface(), |n| mesh.point(n))
             .map(|(_, wall)| (wall, sign * (wall.thickness - limit)))
@@ -85,7 +85,7 @@ impl ThicknessBound {
             }
         }
         let at_design = if opposite_moves(shape, thickness) {
-            shape.motion().map().gradient(&nodal)?
+            moved.pull_back(&nodal)?
         } else {
             shape.surface().nodes().iter().map(|n| nodal[n.index()]).collect()
         };
