@@ -19,7 +19,7 @@ const THINNEST: f64 = 1e-6;
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
 
-/// Relative permeability above which edge elements of first order are coarse beside iron: 15 % in the energy norm at 1e5, 0.7 %
+/// Relative permeability above which edge elements of first order are coarse beside iron: 15 % in the energy norm at 1e5, 0.2 %
 /// in the gap of a C-core of 2000.
 const EDGE_DOUBTFUL: f64 = 1e3;
 
