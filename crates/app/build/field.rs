@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{Mesh, NodeId, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -11,7 +12,7 @@ use fluxmorph_solver::linear::{
 };
 use fluxmorph_solver::{
     BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError,
-    SurfaceLaw, UniformField,
+    SurfaceLaw, UniformField, Winding,
 };
 
 use super::curves::Curves;
@@ -186,6 +187,7 @@ fn field_model(
         bh,
         conductors,
         coils,
+        windings: config.coils.iter().map(winding).collect(),
         boundaries,
         open: open::region(config, mesh.topology())?,
         linear_solver,
@@ -290,6 +292,17 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
     Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
 }
 
+/// The winding of a coil that has turns.
+fn winding(coil: &config::Coil) -> Option<Winding> {
+    Some(Winding {
+        turns: coil.turns?,
+        resistance: coil.resistance,
+        series_inductance: coil.series_inductance,
+        series_capacitance: coil.series_capacitance,
+        voltage: coil.voltage.map(|voltage| c64::from_polar(voltage, coil.phase)),
+    })
+}
+
 /// Notices about the current of each coil region.
 pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     let notice = |coil: &coil::Coil| match &coil.shape {
@@ -326,6 +339,22 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
             faults.push(
                 fault.expected("no phase, or frequencies above 0 Hz; a reversed current is a negative one"),
             );
+        }
+        if coil.voltage.is_some() {
+            let (has_applied, path) =
+                (config.boundaries.uniform_field.is_some(), format!("coils[{i}].voltage"));
+            let message = match (is_static, has_applied) {
+                (_, true) => Some("the voltage that an applied field induces is not known to the circuit"),
+                (true, _) if coil.resistance == 0.0 => Some("at 0 Hz no resistance limits the current"),
+                (true, _) if coil.series_capacitance.is_some() => {
+                    Some("at 0 Hz a capacitance passes no current")
+                }
+                _ => None,
+            };
+            if let Some(message) = message {
+                let fault = source.diagnostic(&path, message);
+                faults.push(fault.expected("a resistance in series, and coils alone as sources"));
+            }
         }
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);

@@ -291,7 +291,7 @@ pub(crate) fn material(config: &Config, region: &str) -> Material {
 
 /// The peak phasor of a coil [A].
 fn phasor(coil: &config::Coil) -> c64 {
-    c64::from_polar(coil.ampere_turns, coil.phase)
+    c64::from_polar(coil.ampere_turns.unwrap_or_default(), coil.phase)
 }
 
 /// With more faults in the text of a configuration its names are not checked against the mesh as well.

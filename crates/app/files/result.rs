@@ -60,6 +60,15 @@ pub struct RunResult {
     /// Open space, where the mesh has a shell that stands for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub open: Option<OpenResult>,
+    /// What the terminals of the coils with `turns` see, at the first frequency.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coils: Vec<CoilResult>,
+    /// Inductances between them [H], in their order; in harmonics the real part.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inductance_h: Vec<Vec<f64>>,
+    /// Their coupling factors, `L_jk / √(L_jj L_kk)`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coupling: Vec<Vec<f64>>,
     /// The linear systems.
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
@@ -69,6 +78,31 @@ pub struct RunResult {
     pub warnings: Vec<String>,
     /// Most memory held [bytes].
     pub peak_memory_bytes: u64,
+}
+
+/// What the terminals of a coil see; of the meshed part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CoilResult {
+    /// Its name.
+    pub name: String,
+    /// Current [A].
+    pub current_a: Amplitude,
+    /// Flux linkage [Wb].
+    pub flux_linkage_wb: Amplitude,
+    /// Resistance of the wire, and of the losses that its current alone makes [Ω].
+    pub resistance_ohm: f64,
+    /// Voltage across it [V].
+    pub voltage_v: Amplitude,
+}
+
+/// A number in statics, the real and imaginary part of a peak phasor in harmonics.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Amplitude {
+    /// In statics.
+    Static(f64),
+    /// In harmonics.
+    Phasor([f64; 2]),
 }
 
 /// The part of open space in the field.
@@ -367,6 +401,9 @@ pub(crate) mod tests {
             saturation: None,
             states: vec![],
             open: None,
+            coils: vec![],
+            inductance_h: vec![],
+            coupling: vec![],
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],
                 worst_residual: 1e-11,

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shape, Timings};
+use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::{
     FieldModel, FieldSolution, Functional, RigidMotion, SolverError, recovery, saturation,
 };
@@ -17,9 +19,9 @@ use crate::build::force;
 use crate::config;
 use crate::error::Error;
 use crate::files::{
-    ConstraintResult, DesignResult, ForceResult, HomogeneityResult, LinearSolverResult, MeshResult,
-    OpenResult, ProbeResult, RunResult, SaturatedRegion, SaturationResult, StateResult, StopReason,
-    TermResult, peak_memory_bytes,
+    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HomogeneityResult,
+    LinearSolverResult, MeshResult, OpenResult, ProbeResult, RunResult, SaturatedRegion, SaturationResult,
+    StateResult, StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -45,6 +47,7 @@ impl Session<'_> {
         let design =
             problem.shape().zip(design).map(|(shape, (values, rounds))| design_result(shape, values, rounds));
         let topology = mesh.topology();
+        let terminals = circuit::terminals(&problem.states()[0], mesh, &analysis.solutions[0])?;
         let warnings = reservations(self.config, &self.setup, analysis);
         warnings.iter().for_each(|warning| observer.warning(warning));
         Ok(RunResult {
@@ -73,6 +76,9 @@ impl Session<'_> {
             saturation: saturation(problem, analysis),
             states: if states.len() > 1 { states } else { Vec::new() },
             open: open(problem, analysis)?,
+            coils: coils(&terminals, problem.states()[0].angular_frequency()),
+            coupling: coupling(&terminals.inductance),
+            inductance_h: terminals.inductance,
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             warnings,
@@ -178,6 +184,30 @@ fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult
         newton_steps: solution.newton_steps(),
         regions: saturation::by_region(model, &analysis.mesh, solution).into_iter().map(of).collect(),
     })
+}
+
+/// What the terminals of every coil see.
+fn coils(terminals: &Terminals, angular_frequency: f64) -> Vec<CoilResult> {
+    let amplitude = |c: c64| {
+        if angular_frequency == 0.0 { Amplitude::Static(c.re) } else { Amplitude::Phasor([c.re, c.im]) }
+    };
+    let of = |coil: &CoilTerminals| CoilResult {
+        name: coil.name.clone(),
+        current_a: amplitude(coil.current),
+        flux_linkage_wb: amplitude(coil.flux_linkage),
+        resistance_ohm: coil.resistance,
+        voltage_v: amplitude(coil.voltage),
+    };
+    terminals.coils.iter().map(of).collect()
+}
+
+/// Coupling factors of an inductance matrix.
+fn coupling(inductance: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let own = |k: usize| inductance[k][k];
+    let row = |(j, row): (usize, &Vec<f64>)| {
+        row.iter().enumerate().map(|(k, l)| l / (own(j) * own(k)).sqrt()).collect()
+    };
+    inductance.iter().enumerate().map(row).collect()
 }
 
 /// The share of the energy in open space, where there is some.

@@ -4,8 +4,8 @@ use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Goal, Objective};
 use crate::files::{
-    ConstraintResult, CrossCheck, ForceResult, ObjectiveResult, RunResult, RunStatus, SAFETY,
-    SaturatedRegion, Verdict,
+    Amplitude, CoilResult, ConstraintResult, CrossCheck, ForceResult, ObjectiveResult, RunResult, RunStatus,
+    SAFETY, SaturatedRegion, Verdict,
 };
 use crate::printable::printable;
 
@@ -64,6 +64,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     if let Some(saturation) = &result.saturation {
         rows.extend(saturation.regions.iter().map(saturated));
         rows.push(("Newton steps", saturation.newton_steps.to_string()));
+    }
+    for coil in &result.coils {
+        rows.push(("coil", coil_text(coil)));
     }
     if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
         rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
@@ -133,6 +136,22 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ("gain", styled(style, verdict.describe()))
     }));
     rows
+}
+
+/// What the terminals of a coil see.
+fn coil_text(coil: &CoilResult) -> String {
+    let text = |amplitude: Amplitude| match amplitude {
+        Amplitude::Static(value) => format!("{value:.6e}"),
+        Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
+    };
+    format!(
+        "{}: {} A, {} Wb, {:.6e} ohm, {} V",
+        printable(&coil.name),
+        text(coil.current_a),
+        text(coil.flux_linkage_wb),
+        coil.resistance_ohm,
+        text(coil.voltage_v)
+    )
 }
 
 /// How homogeneous the field is.

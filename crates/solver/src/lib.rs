@@ -11,6 +11,7 @@ pub mod adjoint;
 pub mod audit;
 pub mod bh;
 pub mod boundary;
+pub mod circuit;
 pub mod coil;
 mod discretisation;
 mod distributed;
@@ -43,6 +44,7 @@ mod weak_form;
 
 pub use bh::BhCurve;
 pub use boundary::{Boundary, UniformField};
+pub use circuit::Winding;
 pub use error::{NonConvergence, SolverError};
 pub use functional::{Functional, FunctionalValue, RigidMotion};
 pub use linear::{LinearSolver, LinearSolverReport};

@@ -44,6 +44,17 @@ impl Sources {
         self.coils.elements().into_iter()
     }
 
+    /// `fᵀu` of the load and the coefficients of a solution: of the load of 1 A, its flux linkage [Wb].
+    pub(crate) fn linkage(&self, space: &Space, mesh: &Mesh, field: impl Fn(ElementId) -> Local) -> c64 {
+        let mut sum = c64::default();
+        self.each_load(space, mesh, |e, local| {
+            let field = field(e);
+            let terms = local.values().iter().flatten().zip(field.values().iter().flatten());
+            sum += terms.map(|(f, u)| f * u).sum::<c64>();
+        });
+        sum
+    }
+
     /// Whether nothing is excited.
     pub(crate) fn is_empty(&self) -> bool {
         self.coils.moments.is_empty() && self.coils.currents.is_empty() && self.magnets.is_empty()
@@ -51,12 +62,17 @@ impl Sources {
 
     /// The load [A m; of edge elements A m²], added to `load`: element loads in parallel, then added in their order.
     pub(crate) fn add_load(&self, space: &Space, unknowns: &Unknowns, mesh: &Mesh, load: &mut [c64]) {
-        let elements = space.elements();
-        let mut add = |(e, local): (ElementId, Local)| {
+        self.each_load(space, mesh, |e, local| {
             for (&carrier, values) in space.carriers_of(e).iter().zip(local.values()) {
                 unknowns.scatter_add(load, carrier, *values);
             }
-        };
+        });
+    }
+
+    /// The load of every element with a source: computed in parallel, passed on in order.
+    fn each_load(&self, space: &Space, mesh: &Mesh, mut pass: impl FnMut(ElementId, &Local)) {
+        let elements = space.elements();
+        let mut add = |(e, local): (ElementId, Local)| pass(e, &local);
         let of_coil = |(e, moments): &(ElementId, [Complex3; 4])| {
             (*e, elements.curl_load(&space.cell(mesh, *e), moments))
         };

@@ -14,14 +14,15 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
 use crate::boundary::{self, Boundary};
+use crate::circuit::{self, Border, Excitation, Winding, Windings};
 use crate::coil::{Coil, Condition, ConditionedSurface, continuity, planes};
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::linear::{
-    DistributedSettings, FieldKind, LinearSolverCache, LinearSolverSettings, LocalSystem, PreparedSystem,
-    SystemAnalysis, SystemPattern,
+    DistributedSettings, FieldKind, FieldSystem, LinearSolverCache, LinearSolverSettings, LocalSystem,
+    PreparedSystem, SystemAnalysis, SystemPattern,
 };
 use crate::load::Sources;
 use crate::material::Material;
@@ -56,6 +57,8 @@ pub struct FieldModelSetup {
     pub conductors: Vec<Conductor>,
     /// Coils.
     pub coils: Vec<Coil>,
+    /// Windings of the coils, by their place in `coils`; shorter where the rest has none.
+    pub windings: Vec<Option<Winding>>,
     /// Conditions on named surfaces; outer faces without one are natural.
     pub boundaries: Vec<(String, Boundary)>,
     /// The region that stands for open space, if one does.
@@ -79,6 +82,7 @@ impl Default for FieldModelSetup {
             bh: Vec::new(),
             conductors: Vec::new(),
             coils: Vec::new(),
+            windings: Vec::new(),
             boundaries: Vec::new(),
             open: None,
             linear_solver: LinearSolverSettings::default(),
@@ -105,6 +109,7 @@ pub struct FieldModel {
 struct SharedParts {
     fine: Discretisation,
     sources: Sources,
+    windings: Arc<Windings>,
     /// Of one process.
     analysis: Option<Arc<SystemAnalysis>>,
 }
@@ -151,7 +156,10 @@ impl FieldModel {
             .zip(&setup.materials)
             .map(|(b, m)| b.map(|b| m.reluctivity() * b))
             .collect();
-        let sources = Sources::new(mesh, &setup.coils, &magnetisation)?;
+        let given = circuit::given_currents(&setup.coils, &setup.windings, angular_frequency);
+        let sources = Sources::new(mesh, &given, &magnetisation)?;
+        let windings = Windings::new(mesh, &setup.coils, &setup.windings, (&fine.space, &fine.unknowns))?;
+        let windings = Arc::new(windings);
         check_sources(mesh, &setup)?;
         let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
         let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
@@ -159,7 +167,7 @@ impl FieldModel {
         if let Some(shell) = weak_form.shell() {
             open::check_contents(shell, mesh, &setup, sources.fixed_elements())?;
         }
-        let shared = Arc::new(SharedParts { fine, sources, analysis: analysis.map(Arc::new) });
+        let shared = Arc::new(SharedParts { fine, sources, windings, analysis: analysis.map(Arc::new) });
         Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
     }
 
@@ -258,17 +266,19 @@ impl FieldModel {
         matrix: impl Into<AssembledMatrix>,
         cache: &mut LinearSolverCache,
     ) -> Result<PreparedSystem, SolverError> {
-        match (matrix.into(), &self.distributed, &self.shared.analysis) {
+        let field = match (matrix.into(), &self.distributed, &self.shared.analysis) {
             (AssembledMatrix::Local(matrix), _, Some(analysis)) => {
                 let system = LocalSystem::new(analysis, matrix, cache)?;
-                Ok(PreparedSystem::Local(Box::new(system)))
+                FieldSystem::Local(Box::new(system))
             }
             (AssembledMatrix::OnRanks(points), Some(distributed), _) => {
                 let system = distributed.prepare(&points, &self.setup.linear_solver)?;
-                Ok(PreparedSystem::Distributed(system))
+                FieldSystem::Distributed(system)
             }
             _ => panic!("a matrix belongs where its model is"),
-        }
+        };
+        let (windings, angular_frequency) = (self.windings(), self.angular_frequency);
+        PreparedSystem::new(field, |solve| Border::new(windings, angular_frequency, solve))
     }
 
     /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
@@ -311,8 +321,8 @@ impl FieldModel {
         system: &mut PreparedSystem,
         load: &[c64],
     ) -> Result<FieldSolution, SolverError> {
-        let (values, report) = system.solve(load)?;
-        Ok(FieldSolution::state(values, report))
+        let (values, report, currents) = system.solve_with(load, Excitation::Voltages)?;
+        Ok(FieldSolution::state(values, report).with_currents(currents))
     }
 
     /// What defines the problem.
@@ -389,12 +399,18 @@ impl FieldModel {
 
     /// Elements that a coil meets: these must not move.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.shared.sources.fixed_elements()
+        self.shared.sources.fixed_elements().chain(self.windings().fixed_elements())
     }
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
     pub fn is_unexcited(&self) -> bool {
-        self.shared.sources.is_empty() && self.unknowns().prescribed_carriers().next().is_none()
+        self.shared.sources.is_empty()
+            && !self.windings().is_driven()
+            && self.unknowns().prescribed_carriers().next().is_none()
+    }
+
+    pub(crate) fn windings(&self) -> &Arc<Windings> {
+        &self.shared.windings
     }
 
     /// How the linear systems of one process are solved, and what that takes; `None` where they are on several ranks.

@@ -30,11 +30,23 @@ pub struct FieldSolution {
     report: LinearSolverReport,
     /// Of Newton's method with its start; zero where all is linear.
     newton_steps: usize,
+    /// Of voltage-driven coils [A].
+    currents: Vec<c64>,
 }
 
 impl FieldSolution {
     pub(crate) fn state(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::State, report, newton_steps: 0 }
+        Self { values, role: Role::State, report, newton_steps: 0, currents: Vec::new() }
+    }
+
+    /// The same with the currents [A] that voltages drive.
+    pub(crate) fn with_currents(self, currents: Vec<c64>) -> Self {
+        Self { currents, ..self }
+    }
+
+    /// Currents [A] of the voltage-driven coils, in their order, in harmonics.
+    pub(crate) fn currents(&self) -> &[c64] {
+        &self.currents
     }
 
     /// The solution of a state of which nothing but its unknowns is known, one per equation.
@@ -43,7 +55,7 @@ impl FieldSolution {
     }
 
     pub(crate) fn adjoint(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::Adjoint, report, newton_steps: 0 }
+        Self { values, role: Role::Adjoint, report, newton_steps: 0, currents: Vec::new() }
     }
 
     /// The same, found in some steps of Newton's method.

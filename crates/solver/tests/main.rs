@@ -1,6 +1,7 @@
 //! Tests of the crate from outside: sources, grounding, and the ladder of linear solvers under injected failures.
 
 mod applied;
+mod circuits;
 mod coil_regions;
 mod edge;
 mod estimate;

@@ -239,7 +239,15 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
             CoilShape::Region(c) => format!("region {}", c.region),
         };
         let phase = format!("{}", (coil.phase.to_degrees() * 1e6).round() / 1e6 + 0.0);
-        table.row([coil.name.clone(), coil.ampere_turns.to_string(), phase, shape]);
+        table.row([
+            coil.name.clone(),
+            match (coil.ampere_turns, coil.voltage) {
+                (Some(current), _) => current.to_string(),
+                (None, voltage) => format!("{} V", voltage.unwrap_or_default()),
+            },
+            phase,
+            shape,
+        ]);
     }
     table
 }

@@ -1,4 +1,5 @@
-//! How far the walls of the mesh are from what makes and bends the field: what they cut off is not computed.
+//! How far the walls of the mesh are from what makes and bends the field: what they cut off is not computed. A flux-normal
+//! surface is taken for a symmetry plane, and so is one that coils or matter reach.
 
 use std::collections::HashSet;
 
@@ -6,12 +7,12 @@ use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_solver::{FieldModel, Material};
+use fluxmorph_solver::{Boundary, FieldModel, Material};
 use serde::Serialize;
 
 use crate::build::Setup;
 
-/// The nearest wall that no coil, magnet, conductor or iron reaches: those that they reach are symmetry planes.
+/// The nearest wall that no coil, magnet, conductor or iron reaches.
 #[derive(Debug, Serialize)]
 pub(super) struct Truncation {
     /// Its surface.
@@ -30,11 +31,19 @@ impl Truncation {
             return None;
         }
         let topology = mesh.topology();
-        let points: Vec<_> = sources(model).into_iter().flat_map(|e| mesh.vertices(e)).collect();
+        let mut points: Vec<_> = sources(model).into_iter().flat_map(|e| mesh.vertices(e)).collect();
+        // A conductor that its surface replaces is matter too.
+        let replaced = model.conductors().iter().flat_map(|conductor| conductor.surface.iter().flatten());
+        points.extend(replaced.map(|&n| mesh.point(n)));
         let sources = AxisBox::around(&points);
         let outer: HashSet<_> =
             topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
         let distance = |name: &str| -> Option<f64> {
+            let is_symmetry =
+                |(own, boundary): &(String, Boundary)| own == name && *boundary == Boundary::FluxNormal;
+            if model.setup().boundaries.iter().any(is_symmetry) {
+                return None;
+            }
             let triangles = topology.surface(name).ok()?;
             let is_wall = !triangles.is_empty() && triangles.iter().all(|t| outer.contains(&face_key(*t)));
             let nodes = triangles.iter().flatten();

@@ -42,17 +42,36 @@ table! {
     pub struct Coil {
         /// What the coil is called in messages and results; each name once.
         name: String = TEXT, need "\"coil\"";
-        /// Amplitude of current times turns [A], not 0; positive is counter-clockwise about the axis, or from the first terminal
-        /// to the second.
-        #[also(not_zero)]
-        ampere_turns: f64 = quantity(Current, FINITE), need "\"40 kA\"";
-        /// Phase of the current [rad].
+        /// Amplitude of current times turns [A]; positive is counter-clockwise about the axis, or from the first terminal to the
+        /// second. Not 0, but of a coil with `turns` that is open. Either this or `voltage`.
+        ampere_turns: Option<f64> = quantity(Current, FINITE);
+        /// Turns of the winding. With them the result has the coil's current, flux linkage, resistance and voltage, and the matrix of
+        /// inductances, all of the meshed part.
+        turns: Option<f64> = number(POSITIVE);
+        /// Amplitude of the voltage that drives the current [V], instead of `ampere_turns`: across the winding and what is in series
+        /// with it, of the meshed part.
+        voltage: Option<f64> = quantity(Voltage, FINITE);
+        /// Resistance of the wire and of what is in series [Ω]; of a voltage-driven coil at 0 Hz above zero.
+        resistance: f64 = quantity(Resistance, NOT_NEGATIVE) => 0.0;
+        /// Of a voltage-driven coil: an inductance in series [H].
+        series_inductance: f64 = quantity(Inductance, NOT_NEGATIVE) => 0.0;
+        /// Of a voltage-driven coil: a capacitance in series [F], at frequencies above 0.
+        series_capacitance: Option<f64> = quantity(Capacitance, POSITIVE);
+        /// Phase of the current or voltage [rad].
         phase: f64 = quantity(Angle, FINITE) => 0.0;
         /// Where the current flows.
         #[serde(flatten)]
         shape: CoilShape = KEYS;
     }
     check = Coil::check;
+    rules = keys_of_the_drive;
+}
+
+/// A current or a voltage, and windings for circuits.
+fn keys_of_the_drive(rules: Rules) -> Rules {
+    let rules = rules.exactly_one(&["ampere_turns", "voltage"]);
+    let rules = rules.needs("voltage", &["turns"]).needs("resistance", &["turns"]);
+    rules.needs("series_inductance", &["voltage"]).needs("series_capacitance", &["voltage"])
 }
 
 table! {
@@ -303,9 +322,27 @@ pub enum Corner {
 
 impl Coil {
     fn check(&mut self, section: &Section<'_>) {
-        if self.ampere_turns == 0.0 {
+        match ["ampere_turns", "voltage"].map(|key| section.has(key)) {
+            [false, false] => section.missing(&["ampere_turns"], "ampere_turns = \"40 kA\""),
+            [true, true] => {
+                let message = format!("`{}` has both `ampere_turns` and `voltage`", section.path());
+                section.clash(["ampere_turns", "voltage"], message, "one of them");
+            }
+            _ => {}
+        }
+        if self.ampere_turns == Some(0.0) && !section.has("turns") {
             let message = format!("`{}.ampere_turns` is 0 A: the coil makes no field", section.path());
-            section.wrong("ampere_turns", message, "any current but 0 A");
+            section.wrong("ampere_turns", message, "any current but 0 A, or turns of an open coil");
+        }
+        let needs = [
+            ("voltage", "turns"),
+            ("resistance", "turns"),
+            ("series_inductance", "voltage"),
+            ("series_capacitance", "voltage"),
+        ];
+        for (key, other) in needs.into_iter().filter(|(key, other)| section.has(key) && !section.has(other)) {
+            let message = format!("`{}.{key}` has no use without `{other}`", section.path());
+            section.wrong(key, message, format!("{other} beside it, or no such key"));
         }
     }
 }

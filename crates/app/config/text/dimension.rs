@@ -98,6 +98,18 @@ dimensions! {
     /// A torque [N m].
     Torque = "a torque", in "N m", such as "1.5 N m":
         decimal("N m", 0), decimal("Nm", 0), decimal("mN m", -3), decimal("mNm", -3), decimal("kN m", 3), decimal("kNm", 3);
+    /// A voltage [V].
+    Voltage = "a voltage", in "V", such as "230 V":
+        decimal("V", 0), decimal("mV", -3), decimal("kV", 3);
+    /// A resistance [Ω].
+    Resistance = "a resistance", in "\u{3a9}", such as "0.2 ohm":
+        decimal("\u{3a9}", 0), decimal("ohm", 0), decimal("mohm", -3), decimal("kohm", 3);
+    /// An inductance [H].
+    Inductance = "an inductance", in "H", such as "10 uH":
+        decimal("H", 0), decimal("mH", -3), decimal("uH", -6), decimal("\u{b5}H", -6), decimal("nH", -9);
+    /// A capacitance [F].
+    Capacitance = "a capacitance", in "F", such as "100 nF":
+        decimal("F", 0), decimal("uF", -6), decimal("\u{b5}F", -6), decimal("nF", -9), decimal("pF", -12);
     /// A ratio of like quantities [1].
     Ratio = "a ratio", in "1", such as "1e-8 1":
         decimal("1", 0);

@@ -95,7 +95,17 @@ mod tests {
     use crate::config::{AxisWord, Circular, Corner, CornerWord, Racetrack};
 
     fn coil(shape: CoilShape) -> Coil {
-        Coil { name: "coil".to_owned(), ampere_turns: 1.0, phase: 0.0, shape }
+        Coil {
+            name: "coil".to_owned(),
+            ampere_turns: Some(1.0),
+            phase: 0.0,
+            shape,
+            turns: None,
+            voltage: None,
+            resistance: 0.0,
+            series_inductance: 0.0,
+            series_capacitance: None,
+        }
     }
 
     #[test]

@@ -7,65 +7,117 @@ use super::distributed::DistributedSystem;
 use super::method::Method;
 use super::report::LinearSolverReport;
 use super::system::{LocalSystem, SolverEvent};
+use crate::circuit::{Border, Excitation};
 use crate::error::SolverError;
 
-/// A matrix ready to be solved with, for any number of right sides.
+/// The field's matrix ready to be solved with, wherever it is.
 #[derive(Debug)]
-pub enum PreparedSystem {
+pub(crate) enum FieldSystem {
     /// In this process.
     Local(Box<LocalSystem>),
     /// On several ranks.
     Distributed(DistributedSystem),
 }
 
+/// A matrix ready to be solved with, for any number of right sides, with the circuits that border it.
+#[derive(Debug)]
+pub struct PreparedSystem {
+    field: FieldSystem,
+    border: Option<Border>,
+}
+
 impl PreparedSystem {
-    /// The matrix; `None` where it is on several ranks.
+    /// Solves for what borders the field's matrix, if anything does.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub(crate) fn new(
+        mut field: FieldSystem,
+        border: impl FnOnce(
+            &mut dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError>,
+        ) -> Result<Option<Border>, SolverError>,
+    ) -> Result<Self, SolverError> {
+        let border = border(&mut |right_side| field.solve(right_side))?;
+        Ok(Self { field, border })
+    }
+
+    /// The matrix of the field; `None` where it is on several ranks.
     pub fn matrix(&self) -> Option<&CsrMatrix<c64>> {
-        match self {
-            Self::Local(system) => Some(system.matrix()),
-            Self::Distributed(_) => None,
+        match &self.field {
+            FieldSystem::Local(system) => Some(system.matrix()),
+            FieldSystem::Distributed(_) => None,
         }
     }
 
     /// The method in use; `None` where the matrix is on several ranks.
     pub fn method(&self) -> Option<Method> {
-        match self {
-            Self::Local(system) => Some(system.method()),
-            Self::Distributed(_) => None,
+        match &self.field {
+            FieldSystem::Local(system) => Some(system.method()),
+            FieldSystem::Distributed(_) => None,
         }
     }
 
     /// Bytes of the preconditioner in this process, as far as they are known.
     pub fn preconditioner_bytes(&self) -> usize {
-        match self {
-            Self::Local(system) => system.preconditioner_bytes(),
-            Self::Distributed(_) => 0,
+        match &self.field {
+            FieldSystem::Local(system) => system.preconditioner_bytes(),
+            FieldSystem::Distributed(_) => 0,
         }
     }
 
     /// What the solver did beside solving.
     pub fn events(&self) -> &[SolverEvent] {
-        match self {
-            Self::Local(system) => system.events(),
-            Self::Distributed(_) => &[],
+        match &self.field {
+            FieldSystem::Local(system) => system.events(),
+            FieldSystem::Distributed(_) => &[],
         }
     }
 
     /// What the next design may start from.
     pub fn into_cache(self) -> LinearSolverCache {
-        match self {
-            Self::Local(system) => system.into_cache(),
-            Self::Distributed(_) => LinearSolverCache::default(),
+        match self.field {
+            FieldSystem::Local(system) => system.into_cache(),
+            FieldSystem::Distributed(_) => LinearSolverCache::default(),
         }
     }
 
-    /// Solves `K x = b`.
+    /// Solves `K x = b` of the field alone.
     ///
     /// # Errors
     /// [`SolverError::NotConverged`] when the true residual stays above the required one, [`SolverError::Mesh`] and
     /// [`SolverError::Rank`] when no method has a factor, [`SolverError::NotFinite`] and [`SolverError::OutOfRange`] for a
     /// right side that cannot be solved for.
+    pub fn solve_field(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        self.field.solve(right_side)
+    }
+
+    /// Solves with the circuits' sources shorted, as adjoint problems are.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve_field`].
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let (values, report, _) = self.solve_with(right_side, Excitation::Shorted)?;
+        Ok((values, report))
+    }
+
+    /// Solves with what excites the circuits; the currents [A] that flow in them too.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve_field`].
+    pub(crate) fn solve_with(
+        &mut self,
+        right_side: &[c64],
+        excitation: Excitation,
+    ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
+        let (mut values, report) = self.field.solve(right_side)?;
+        let border = self.border.as_ref();
+        let currents = border.map(|border| border.complete(&mut values, excitation)).unwrap_or_default();
+        Ok((values, report, currents))
+    }
+}
+
+impl FieldSystem {
+    fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
         match self {
             Self::Local(system) => system.solve(right_side),
             Self::Distributed(system) => system.solve(right_side),

@@ -1,0 +1,243 @@
+//! Coils as parts of circuits: inductances against filaments, voltages against currents, and the gradient of what a voltage
+//! drives.
+
+use std::f64::consts::PI;
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::generate::{
+    BlockParameters, OpenShellParameters, ShieldParameters, block, open_shell, shield,
+};
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_solver::circuit::terminals;
+use fluxmorph_solver::coil::{Coil, Corner, Frame, Racetrack};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{
+    Boundary, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding,
+    adjoint,
+};
+
+use super::{OUTSIDE, flux_parallel};
+
+const NO_CIRCUIT: Winding =
+    Winding { turns: 1.0, resistance: 0.0, series_inductance: 0.0, series_capacitance: None, voltage: None };
+
+/// Complete elliptic integrals `K(m)` and `E(m)` by the arithmetic-geometric mean (Abramowitz and Stegun, 17.6).
+fn elliptic(m: f64) -> (f64, f64) {
+    let (mut a, mut b, mut sum, mut power) = (1.0f64, (1.0 - m).sqrt(), 0.5 * m, 0.5);
+    while (a - b).abs() > 1e-15 * a {
+        let c = 0.5 * (a - b);
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        power *= 2.0;
+        sum += power * c * c;
+    }
+    let k = 0.5 * PI / a;
+    (k, k * (1.0 - sum))
+}
+
+/// Maxwell's mutual inductance [H] of coaxial circles of radii `a` and `b` at the distance `d` [m].
+fn mutual(a: f64, b: f64, d: f64) -> f64 {
+    let m = 4.0 * a * b / ((a + b).powi(2) + d * d);
+    let (k, e) = elliptic(m);
+    VACUUM_PERMEABILITY * (a * b).sqrt() * ((2.0 / m.sqrt() - m.sqrt()) * k - 2.0 / m.sqrt() * e)
+}
+
+/// Inductance [H] per turn squared of two windings of square section, filament by filament; a filament with itself as a wire of
+/// the geometric mean distance of its square, 0.44705 of the side (Grover, Inductance Calculations, 1946).
+fn of_sections([a, b]: [f64; 2], side: f64, d: f64) -> f64 {
+    let n = 12;
+    let place = |i: usize| ((i as f64 + 0.5) / n as f64 - 0.5) * side;
+    let cells = || (0..n).flat_map(|i| (0..n).map(move |j| (place(i), place(j))));
+    let pair = |(r, z): (f64, f64), (s, y): (f64, f64)| {
+        let (distance, radius) = (d + z - y, a + r);
+        if distance == 0.0 && radius == b + s {
+            VACUUM_PERMEABILITY * radius * ((8.0 * radius / (0.44705 * side / n as f64)).ln() - 2.0)
+        } else {
+            mutual(radius, b + s, distance)
+        }
+    };
+    cells().flat_map(|p| cells().map(move |q| (p, q))).map(|(p, q)| pair(p, q)).sum::<f64>()
+        / (n * n * n * n) as f64
+}
+
+/// A quarter of two coaxial coils of square section at `z = ±d/2`, in open space.
+fn two_coils(radii: [f64; 2], side: f64, d: f64, cells: usize) -> (Mesh, FieldModel) {
+    let size = [0.075, 0.075, 0.12];
+    let parameters = BlockParameters { size, cells: [cells, cells, 2 * cells] };
+    let half = block(&parameters).expect("a box");
+    // The block stands on z = 0: its middle is the centre.
+    let centre = [0.0, 0.0, 0.5 * size[2]];
+    let surfaces = ["x_max", "y_max", "z_min", "z_max"].map(str::to_owned).to_vec();
+    let shell =
+        OpenShellParameters { surfaces, centre, layers: 4, region: "open".into(), outer: "infinity".into() };
+    let mesh = open_shell(&half, &shell).expect("a shell");
+    let coil = |(name, radius, sign): (&str, f64, f64)| {
+        let place: Point = [0.0, 0.0, centre[2] + sign * 0.5 * d];
+        let frame = Frame::new(place, [0.0, 0.0, 1.0], None).expect("a frame");
+        let shape = Racetrack::circular(frame, radius - 0.5 * side, side, side).expect("a coil").into();
+        Coil { name: name.to_owned(), ampere_turns: c64::from(if sign > 0.0 { 7.0 } else { 3.0 }), shape }
+    };
+    let setup = FieldModelSetup {
+        family: ElementFamily::Edge,
+        order: Order::Quadratic,
+        materials: vec![Material::AIR; 2],
+        coils: [("one", radii[0], 1.0), ("two", radii[1], -1.0)].map(coil).to_vec(),
+        windings: [10.0, 4.0].map(|turns| Some(Winding { turns, ..NO_CIRCUIT })).to_vec(),
+        boundaries: flux_parallel(&["x_min", "y_min", "infinity"]),
+        open: Some(OpenRegion { region: mesh.topology().region("open").expect("the shell"), centre }),
+        ..FieldModelSetup::default()
+    };
+    let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+    (mesh, model)
+}
+
+/// `L` and `M` of coaxial coils to 1 %, the matrix symmetric to 1e-9, `½ I L I` the energy of the field to 1e-8, and the flux
+/// linkages of the state those of the matrix.
+#[test]
+fn inductances_of_coaxial_coils_are_those_of_their_filaments() {
+    let (radii, side, d) = ([0.045, 0.035], 0.014, 0.04);
+    let (mesh, model) = two_coils(radii, side, d, 8);
+    let (solution, _) = model.solve(&mesh).expect("it is solved");
+    let seen = terminals(&model, &mesh, &solution).expect("they are solved for");
+    let matrix = &seen.inductance;
+    let turns = [10.0, 4.0];
+    // A quarter is meshed.
+    for (j, k, distance) in [(0, 0, 0.0), (1, 1, 0.0), (0, 1, d)] {
+        let exact = 0.25 * turns[j] * turns[k] * of_sections([radii[j], radii[k]], side, distance);
+        let deviation = matrix[j][k] / exact - 1.0;
+        assert!(deviation.abs() < 0.01, "{j} {k}: {} and {exact}", matrix[j][k]);
+    }
+    assert!((matrix[0][1] / matrix[1][0] - 1.0).abs() < 1e-9);
+    let currents: Vec<f64> = seen.coils.iter().map(|coil| coil.current.re).collect();
+    let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    let energy: f64 = pairs.iter().map(|&(j, k)| 0.5 * currents[j] * matrix[j][k] * currents[k]).sum();
+    let field = Functional::energy(&model, None).expect("an energy");
+    let field = field.evaluate(&model, &mesh, &solution).expect("finite").value;
+    assert!((energy / field - 1.0).abs() < 1e-8, "{energy} {field}");
+    let linkage = matrix[0][0] * currents[0] + matrix[0][1] * currents[1];
+    assert!((seen.coils[0].flux_linkage.re / linkage - 1.0).abs() < 1e-9);
+}
+
+fn over_a_plate(mesh: &Mesh, winding: Winding, ampere_turns: f64) -> FieldModel {
+    let plate = Material { relative_permeability: 1.0, conductivity: 3e7 };
+    let racetrack =
+        Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a coil");
+    let names = mesh.topology().region_names();
+    let setup = FieldModelSetup {
+        frequency: 60.0,
+        family: ElementFamily::Edge,
+        order: Order::Linear,
+        materials: names.iter().map(|n| if n == "plate" { plate } else { Material::AIR }).collect(),
+        coils: vec![Coil {
+            name: "coil".to_owned(),
+            ampere_turns: ampere_turns.into(),
+            shape: racetrack.into(),
+        }],
+        windings: vec![Some(winding)],
+        boundaries: OUTSIDE.map(|name| (name.to_owned(), Boundary::FluxParallel)).to_vec(),
+        ..FieldModelSetup::default()
+    };
+    FieldModel::new(mesh, setup).expect("a sound problem")
+}
+
+fn coarse() -> Mesh {
+    let parameters = ShieldParameters {
+        refinement: 0.3,
+        skin: vec![1e-3],
+        side_skin: Vec::new(),
+        ..ShieldParameters::default()
+    };
+    shield(&parameters).expect("a coarse shield")
+}
+
+/// The voltage that a current needs over a conducting plate drives that current, its field and its losses, to 1e-9; the power
+/// that goes in is what is lost.
+#[test]
+fn a_voltage_drives_the_current_that_needs_it() {
+    let mesh = coarse();
+    let winding = Winding { turns: 50.0, resistance: 0.02, ..NO_CIRCUIT };
+    let given = over_a_plate(&mesh, winding, 1000.0);
+    let (state, _) = given.solve(&mesh).expect("it is solved");
+    let by_current = terminals(&given, &mesh, &state).expect("solved").coils[0].clone();
+    let series = Winding { series_inductance: 3e-5, series_capacitance: Some(0.1), ..winding };
+    let omega = given.angular_frequency();
+    let source = by_current.voltage + (series.impedance(omega) - winding.resistance) * by_current.current;
+    let driven = over_a_plate(&mesh, Winding { voltage: Some(source), ..series }, 0.0);
+    let (by_voltage_state, _) = driven.solve(&mesh).expect("it is solved");
+    let by_voltage = terminals(&driven, &mesh, &by_voltage_state).expect("solved").coils[0].clone();
+    for (a, b) in [
+        (by_current.current, by_voltage.current),
+        (by_current.flux_linkage, by_voltage.flux_linkage),
+        (by_current.voltage, by_voltage.voltage),
+    ] {
+        assert!((a - b).norm() < 1e-9 * a.norm(), "{a} {b}");
+    }
+    let losses = [&given, &driven].map(|model| {
+        let solution = if std::ptr::eq(model, &given) { &state } else { &by_voltage_state };
+        solution.losses(model, &mesh)[0].1
+    });
+    assert!((losses[0] / losses[1] - 1.0).abs() < 1e-9);
+    // ½ Re(V I*) = losses in the plate and in the wire; the solver's residual is 1e-9 or better.
+    let power = 0.5 * (by_voltage.voltage * by_voltage.current.conj()).re;
+    let wire = 0.5 * winding.resistance * by_voltage.current.norm_sqr();
+    assert!((power / (losses[1] + wire) - 1.0).abs() < 1e-7, "{power} {losses:?} {wire}");
+    assert!(
+        (by_voltage.resistance / (2.0 * (losses[1] + wire) / by_voltage.current.norm_sqr()) - 1.0).abs()
+            < 1e-7
+    );
+}
+
+/// The loss at a fixed voltage: the current follows the shape, and the gradient knows.
+#[test]
+fn the_gradient_at_a_fixed_voltage_matches_central_differences() {
+    let mesh = coarse();
+    let winding = Winding { turns: 50.0, resistance: 0.02, voltage: Some(c64::new(3.0, 1.0)), ..NO_CIRCUIT };
+    let model = over_a_plate(&mesh, winding, 0.0);
+    let region = mesh.topology().region("plate").expect("the plate");
+    let mut moving: Vec<_> = mesh
+        .topology()
+        .elements_of(region)
+        .into_iter()
+        .flat_map(|e| mesh.topology().tet(e))
+        .flat_map(|n| mesh.topology().elements_around(n).iter().copied())
+        .collect();
+    moving.sort_unstable();
+    moving.dedup();
+    // The plate's nodes sway; those on the symmetry planes stay on them.
+    let inside = |n: fluxmorph_geometry::NodeId| {
+        mesh.topology().elements_around(n).iter().any(|e| mesh.topology().region_of()[e.index()] == region)
+    };
+    let direction: Vec<Point> = mesh
+        .topology()
+        .nodes()
+        .map(|n| {
+            let [x, y, z] = mesh.point(n);
+            let sway = if inside(n) {
+                (20.0 * x + 1.0).sin() * (13.0 * y + 2.0).cos() * (1.0 + 30.0 * z)
+            } else {
+                0.0
+            };
+            [0.0, 0.0, sway]
+        })
+        .collect();
+    let loss = Functional::loss(&model, "plate").expect("it conducts");
+    let at = |step: f64| {
+        let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
+        let mesh = mesh.moved(&moved).expect("small");
+        let (state, system) = model.solve(&mesh).expect("it is solved");
+        let value = loss.evaluate(&model, &mesh, &state).expect("finite");
+        (mesh, state, system, value)
+    };
+    let (mesh_0, state, mut system, value) = at(0.0);
+    let adjoint_state = adjoint::solve(&mut system, &value.derivative).expect("it is solved");
+    let field =
+        adjoint::node_gradient(&model, &mesh_0, &state, &adjoint_state, &moving).expect("in one process");
+    let explicit = value.explicit.expect("the plate moves");
+    let exact: f64 = (0..direction.len())
+        .map(|n| (0..3).map(|d| (field[n][d] + explicit[n][d]) * direction[n][d]).sum::<f64>())
+        .sum();
+    // A hundredth of a millimetre: the truncation of the difference is below 1e-6, the solver's error over it too.
+    let h = 1e-5;
+    let difference = (at(h).3.value - at(-h).3.value) / (2.0 * h);
+    assert!((difference / exact - 1.0).abs() < 1e-5, "{difference} {exact}");
+}
