@@ -149,9 +149,10 @@ fn problem_on(
     group: Option<&RankGroup>,
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
+    // Regions without common nodes have no interface that a name could stand for: first things first.
+    source.check(soundness::contact_faults(config, source, &full_mesh))?;
     check_names(config, source, &full_mesh, &warnings)?;
     warnings.extend_from_slice(source.notices());
-    source.check(soundness::contact_faults(config, source, &full_mesh))?;
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     let mut open_patches = Vec::new();
     if !motion_alone {
