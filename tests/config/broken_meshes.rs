@@ -86,7 +86,7 @@ const KINDS: &[Kind] = &[
     ("a cut through the air", Mesh::cut, &["its two sides touch without common nodes"]),
     ("one doubled node", Mesh::double_one, &["touch without common nodes"]),
     ("a body turned in its seat", Mesh::turn_body, &["overlap", "touch without common nodes"]),
-    ("a body shrunk in its seat", Mesh::shrink_body, &["parts that share no node"]),
+    ("a body shrunk in its seat", Mesh::shrink_body, &["have no face in common"]),
     ("a body meshed twice at one place", |m| m.copy_body(0.0), &["overlap"]),
     ("a body meshed twice, shifted", |m| m.copy_body(0.5), &["overlap"]),
     ("a body that was not cut out of the air", Mesh::fill_body, &["overlap"]),
@@ -361,9 +361,9 @@ impl Mesh {
             })
             .collect();
         for (new, old) in old {
-            for tet in &mut self.device.tets {
-                tet.1.iter_mut().filter(|n| **n == new).for_each(|n| *n = old);
-            }
+            let tets = self.device.tets.iter_mut().flat_map(|t| &mut t.1);
+            let triangles = self.device.triangles.iter_mut().flat_map(|t| &mut t.1);
+            tets.chain(triangles).filter(|n| **n == new).for_each(|n| *n = old);
         }
     }
 

@@ -149,9 +149,10 @@ fn problem_on(
     group: Option<&RankGroup>,
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
+    // Regions without common nodes have no interface that a name could stand for: first things first.
+    source.check(soundness::contact_faults(config, source, &full_mesh))?;
     check_names(config, source, &full_mesh, &warnings)?;
     warnings.extend_from_slice(source.notices());
-    source.check(soundness::contact_faults(config, source, &full_mesh))?;
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     let mut open_patches = Vec::new();
     if !motion_alone {
@@ -280,11 +281,14 @@ pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Erro
     Ok(design::surface(config, source, design, &mesh)?.variable_count())
 }
 
+/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron.
+const OF_A_CURVE: f64 = 1000.0;
+
 /// The material of a region; air where the configuration says nothing.
 pub(crate) fn material(config: &Config, region: &str) -> Material {
     let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
     entry.map_or(Material::AIR, |m| Material {
-        relative_permeability: m.relative_permeability,
+        relative_permeability: if m.saturates() { OF_A_CURVE } else { m.relative_permeability },
         conductivity: m.conductivity,
     })
 }

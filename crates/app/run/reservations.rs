@@ -75,7 +75,9 @@ fn saturated(
     let share = |name: &String| 1.0 - 1.0 / material(config, name).relative_permeability;
     let shares: Vec<f64> = topology.region_names().iter().map(share).collect();
     let share_at = |e: &ElementId| shares[topology.region_of()[e.index()].index()];
-    let iron: Vec<ElementId> = topology.elements().filter(|e| share_at(e) > 0.0).collect();
+    // With a B–H curve the polarisation is that of the steel.
+    let is_iron = |e: &ElementId| share_at(e) > 0.0 && model.curve_of(*e).is_none();
+    let iron: Vec<ElementId> = topology.elements().filter(is_iron).collect();
     let mut found: BTreeMap<String, Saturated> = BTreeMap::new();
     for (&e, b) in iron.iter().zip(solution.flux_densities_of(model, mesh, &iron)) {
         let magnitude = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();

@@ -16,9 +16,9 @@ fn corners() -> [Prism; 3] {
 }
 
 /// In the energy norm off the winding: of first order B is constant in an element, of second linear. The exact H is constant there,
-/// so that what is left came from the winding, whose T has kinks within cells: half an order is lost at most.
+/// so that what is left came from the winding; half an order may be lost to the kinks of its T within cells.
 #[test]
-#[ignore = "some ten seconds of CPU time: a table to read"]
+#[ignore = "half a minute of CPU time"]
 fn edge_elements_keep_their_order_at_corners() {
     for prism in corners() {
         for (discretisation, least) in ALL.into_iter().zip([None, None, Some(0.9), Some(1.5)]) {

@@ -26,8 +26,7 @@ table! {
         /// The part of the mesh that moves.
         #[serde(flatten)]
         extent: RemeshExtent = KEYS;
-        /// How the mesh follows the design. Default: `"rails"` for a run whose design moves along x, y or z and whose body has no
-        /// `force`; `"linear"` otherwise, and for `morph`.
+        /// How the mesh follows the design; `"rails"` for one that moves along x, y or z, without `force`. Default `"linear"`.
         law: Option<MotionLaw> = WORD;
         /// Poisson's ratio of the body, with the law `"linear"`. The default is the paper's.
         poisson: f64 = number(POISSON) => 0.3;

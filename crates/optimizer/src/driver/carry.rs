@@ -9,6 +9,8 @@
 //!
 //! Methods without constraints are stopped after such an evaluation, and search on around the best design.
 
+use std::time::Instant;
+
 use fluxmorph_geometry::tet4::centroid;
 use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
@@ -41,6 +43,8 @@ pub(super) struct Carriage {
     room: f64,
     /// Derivatives of the room by the variables [1/m].
     room_gradient: Vec<f64>,
+    /// Wall time of all meshes that were tried [s].
+    pub(super) seconds: f64,
 }
 
 impl Carriage {
@@ -53,6 +57,7 @@ impl Carriage {
 impl Run<'_> {
     /// The mesh of a design, or of the one that is evaluated in its place; `None` where it moves in rounds.
     pub(super) fn carry(&mut self, p: &[f64]) -> Result<Option<Carriage>, Stop> {
+        let clock = Instant::now();
         // Before a first design, from no displacement at all.
         let from = self.best.as_ref().map_or_else(|| vec![0.0; p.len()], |best| best.values.clone());
         let shape = self.shape();
@@ -74,7 +79,8 @@ impl Run<'_> {
             return Err(Stop::Mesh(Refusal { cause, wanted: p.to_vec() }));
         }
         let design = between(&from, &goal, share);
-        Ok(Some(Carriage { design, moved, cut, room: room.value, room_gradient }))
+        let seconds = clock.elapsed().as_secs_f64();
+        Ok(Some(Carriage { design, moved, cut, room: room.value, room_gradient, seconds }))
     }
 
     /// What the method is given for the design `p` that it asked for, from the sample of the one that was evaluated; `best` is

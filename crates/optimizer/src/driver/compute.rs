@@ -21,15 +21,15 @@ impl Run<'_> {
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         let Some(carried) = self.carry(p)? else { return self.sample_of(p, None) };
         let best = self.best_evaluation();
-        let sample = self.sample_of(&carried.design, Some(&carried.moved))?;
+        let sample = self.sample_of(&carried.design, Some((&carried.moved, carried.seconds)))?;
         self.answer(p, (&carried, best), sample)
     }
 
-    /// ±F/|F0| and the constraints of a design, on its mesh where that is known.
+    /// ±F/|F0| and the constraints of a design, on its mesh where that is known, and the seconds that it took.
     ///
     /// What is known of the best design in this round is not computed again, nor what was computed before the run was
     /// interrupted.
-    fn sample_of(&mut self, p: &[f64], moved: Option<&Moved>) -> Result<Sample, Stop> {
+    fn sample_of(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
         let round = self.shape().motion().round();
         if let Some(best) = &self.best
             && best.round == round
@@ -55,13 +55,16 @@ impl Run<'_> {
         }
     }
 
-    /// Computes a design, on its mesh where that is known.
-    fn compute(&mut self, p: &[f64], moved: Option<&Moved>) -> Result<Sample, Stop> {
+    /// Computes a design, on its mesh where that is known, and the seconds that it took.
+    fn compute(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
         self.check_limits()?;
         let clock = Instant::now();
         self.observer.stage(Stage::Moving);
-        let moved = moved.map_or_else(|| self.mesh(p), |moved| Ok(moved.clone()))?;
-        let remesh = clock.elapsed().as_secs_f64();
+        let (moved, before) = match moved {
+            Some((moved, seconds)) => (moved.clone(), seconds),
+            None => (self.mesh(p)?, 0.0),
+        };
+        let remesh = before + clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
         let mut analysis = problem.analyse(moved, Derivatives::First, cache, progress)?;
@@ -78,7 +81,7 @@ impl Run<'_> {
         record.row.iteration = self.iterations_after(comparison);
         let names = self.problem.constraints().iter().map(|constraint| column(&constraint.name));
         record.row.constraints = names.zip(sample.constraints.iter().map(|(c, _)| *c)).collect();
-        record.row.seconds = clock.elapsed().as_secs_f64();
+        record.row.seconds = before + clock.elapsed().as_secs_f64();
         for event in &analysis.solver_events {
             self.observer.notice(&event.to_string());
         }

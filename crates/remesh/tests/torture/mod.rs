@@ -6,6 +6,7 @@
 mod case;
 mod cases;
 mod page;
+mod rails;
 mod skin;
 
 use case::{Case, Outcome};
