@@ -296,8 +296,8 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
 fn winding(coil: &config::Coil) -> Option<Winding> {
     Some(Winding {
         turns: coil.turns?,
-        resistance: coil.resistance,
-        series_inductance: coil.series_inductance,
+        resistance: coil.resistance.unwrap_or(0.0),
+        series_inductance: coil.series_inductance.unwrap_or(0.0),
         series_capacitance: coil.series_capacitance,
         voltage: coil.voltage.map(|voltage| c64::from_polar(voltage, coil.phase)),
     })
@@ -345,7 +345,9 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
                 (config.boundaries.uniform_field.is_some(), format!("coils[{i}].voltage"));
             let message = match (is_static, has_applied) {
                 (_, true) => Some("the voltage that an applied field induces is not known to the circuit"),
-                (true, _) if coil.resistance == 0.0 => Some("at 0 Hz no resistance limits the current"),
+                (true, _) if coil.resistance.unwrap_or(0.0) == 0.0 => {
+                    Some("at 0 Hz no resistance limits the current")
+                }
                 (true, _) if coil.series_capacitance.is_some() => {
                     Some("at 0 Hz a capacitance passes no current")
                 }

@@ -51,10 +51,10 @@ table! {
         /// Amplitude of the voltage that drives the current [V], instead of `ampere_turns`: across the winding and what is in series
         /// with it, of the meshed part.
         voltage: Option<f64> = quantity(Voltage, FINITE);
-        /// Resistance of the wire and of what is in series [Ω]; of a voltage-driven coil at 0 Hz above zero.
-        resistance: f64 = quantity(Resistance, NOT_NEGATIVE) => 0.0;
-        /// Of a voltage-driven coil: an inductance in series [H].
-        series_inductance: f64 = quantity(Inductance, NOT_NEGATIVE) => 0.0;
+        /// Resistance of the wire and of what is in series [Ω]; of a voltage-driven coil at 0 Hz above zero. Default 0.
+        resistance: Option<f64> = quantity(Resistance, NOT_NEGATIVE);
+        /// Of a voltage-driven coil: an inductance in series [H]. Default 0.
+        series_inductance: Option<f64> = quantity(Inductance, NOT_NEGATIVE);
         /// Of a voltage-driven coil: a capacitance in series [F], at frequencies above 0.
         series_capacitance: Option<f64> = quantity(Capacitance, POSITIVE);
         /// Phase of the current or voltage [rad].

@@ -102,8 +102,8 @@ mod tests {
             shape,
             turns: None,
             voltage: None,
-            resistance: 0.0,
-            series_inductance: 0.0,
+            resistance: None,
+            series_inductance: None,
             series_capacitance: None,
         }
     }
