@@ -33,7 +33,8 @@ fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
     // The best design of that run again, on halved edges.
     let out = home.path().join("finer");
     let path = edge.join("result.json");
-    fluxmorph(&[&"solve", &path, &"--refine", &"1", &"--out", &out]).completed();
+    let always = "accuracy.estimate=true";
+    fluxmorph(&[&"solve", &path, &"--refine", &"1", &"--set", &always, &"--out", &out]).completed();
     let finer = read_json(&out.join("result.json"));
     assert_eq!(count(&finer, "/mesh/tets"), 8 * count(&result, "/mesh/tets"));
     assert!(out.join("optimum_refined.msh").exists());

@@ -7,8 +7,11 @@
 //! the run nothing else.
 
 use fluxmorph_geometry::Mesh;
+use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
+use fluxmorph_solver::SolverError;
+use fluxmorph_solver::enrichment::Effort;
 
 use super::Session;
 use super::finer::{Cut, FinerProblem};
@@ -40,7 +43,7 @@ impl Session<'_> {
     ) -> Option<ErrorEstimate> {
         let problem = &self.setup.problem;
         let analysed = &self.config.analysis;
-        let is_wanted = self.config.accuracy.estimate && problem.objective().is_some();
+        let is_wanted = self.config.accuracy.estimate != Some(false) && problem.objective().is_some();
         if !is_wanted || problem.share().is_some() || analysed.order == ElementOrder::Quadratic {
             return None;
         }
@@ -50,8 +53,16 @@ impl Session<'_> {
             return None;
         }
         observer.phase("estimating the error of the mesh");
-        match problem.estimate_error(analysis) {
+        let effort = self.config.accuracy.estimate.map_or(Effort::Affordable, |_| Effort::Any);
+        match problem.estimate_error(analysis, effort) {
             Ok(estimate) => Some(estimate),
+            Err(OptimizerError::Solver(SolverError::NotConverged { .. })) if effort == Effort::Affordable => {
+                observer.notice(
+                    "the error of the mesh is not estimated: that would cost more than three evaluations; \
+                     accuracy.estimate = true has the time",
+                );
+                None
+            }
             Err(error) => {
                 observer.notice(&format!("the error of the mesh is not estimated: {error}"));
                 None

@@ -34,6 +34,21 @@ const REQUIRED: f64 = 1e-2;
 /// Iterations after which the corrections are given up. A dozen or two are usual.
 const MOST_ITERATIONS: usize = 300;
 
+/// Evaluations that an affordable estimate may cost.
+const MOST_EVALUATIONS: f64 = 3.0;
+
+/// Counted work that is affordable whatever an evaluation costs [ns]: two seconds.
+const ALWAYS_AFFORDABLE: f64 = 2e9;
+
+/// How much an estimate may cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// As much as three evaluations, or two seconds.
+    Affordable,
+    /// As much as it takes.
+    Any,
+}
+
 /// The second-order system near a first-order field.
 #[derive(Debug)]
 pub struct Enrichment {
@@ -56,11 +71,11 @@ pub struct WeightedResidual {
 }
 
 impl FieldModel {
-    /// The same problem in second order, to be solved roughly.
+    /// The same problem in second order, to be solved roughly and with so much effort.
     ///
     /// # Errors
     /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks.
-    pub fn enriched(&self, mesh: &Mesh) -> Result<Self, SolverError> {
+    pub fn enriched(&self, mesh: &Mesh, effort: Effort) -> Result<Self, SolverError> {
         let refuse = |what: &str, value: &str, expected: &str| SolverError::Parameter {
             what: what.to_owned(),
             value: value.to_owned(),
@@ -79,7 +94,15 @@ impl FieldModel {
         if self.setup().ownership.is_some() {
             return Err(refuse("ranks", "several", "one process for an error estimate"));
         }
+        let most_work = match (effort, self.linear_solver()) {
+            // Half for each of the two corrections.
+            (Effort::Affordable, Some(own)) => {
+                0.5 * (MOST_EVALUATIONS * own.work_of_design()?).max(ALWAYS_AFFORDABLE)
+            }
+            _ => f64::INFINITY,
+        };
         let linear_solver = LinearSolverSettings {
+            most_work,
             method: LinearSolver::Fixed(Method::TwoLevel),
             tolerance: TOLERANCE,
             required: REQUIRED,

@@ -8,7 +8,7 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::refine::{RefineLimits, uniform};
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::enrichment::Enrichment;
+use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
@@ -51,7 +51,7 @@ fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f
     let coarse = FieldModel::new(mesh, setup.clone()).expect("a sound problem");
     let (state, _) = coarse.solve(mesh).expect("it converges");
     let value = functional.evaluate(&coarse, mesh, &state).expect("a number").value;
-    let fine = coarse.enriched(mesh).expect("a sound problem");
+    let fine = coarse.enriched(mesh, Effort::Any).expect("a sound problem");
     let mut enriched = Enrichment::new(&coarse, fine, mesh, &state).expect("it converges");
     let at = |enriched: &Enrichment, share: f64| {
         functional.evaluate(enriched.model(), mesh, &enriched.state(share)).expect("a number")
@@ -141,6 +141,6 @@ fn second_order_has_no_estimate_and_says_so() {
     let mesh = square();
     let setup = setup((ElementFamily::Edge, Order::Quadratic), 0.0);
     let model = FieldModel::new(&mesh, setup).expect("a sound problem");
-    let error = model.enriched(&mesh).expect_err("there is no third order");
+    let error = model.enriched(&mesh, Effort::Any).expect_err("there is no third order");
     assert!(error.to_string().contains("first order"), "{error}");
 }

@@ -4,7 +4,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_solver::FieldModel;
-use fluxmorph_solver::enrichment::Enrichment;
+use fluxmorph_solver::enrichment::{Effort, Enrichment};
 
 use super::{Analysis, Problem};
 use crate::error::Error;
@@ -24,11 +24,11 @@ pub struct ErrorEstimate {
 }
 
 impl Problem {
-    /// The errors of an analysed design's values.
+    /// The errors of an analysed design's values, with so much effort.
     ///
     /// # Errors
     /// [`fluxmorph_solver::SolverError::Parameter`] for second order and for several ranks; what a linear solver fails with.
-    pub fn estimate_error(&self, analysis: &Analysis) -> Result<ErrorEstimate, Error> {
+    pub fn estimate_error(&self, analysis: &Analysis, effort: Effort) -> Result<ErrorEstimate, Error> {
         let mut estimate = ErrorEstimate {
             objective: 0.0,
             constraints: self.field_constraints().map(|(k, _)| (k, 0.0)).collect(),
@@ -39,7 +39,7 @@ impl Problem {
         for (index, coarse) in self.states().iter().enumerate() {
             let fine = match &harmonic {
                 Some(model) => model.at_frequency(&analysis.mesh, coarse.setup().frequency)?,
-                None => coarse.enriched(&analysis.mesh)?,
+                None => coarse.enriched(&analysis.mesh, effort)?,
             };
             if fine.angular_frequency() > 0.0 {
                 harmonic = Some(fine.clone());

@@ -168,6 +168,14 @@ impl SystemAnalysis {
         Ok(best)
     }
 
+    /// Counted work of a design with state and adjoint by the method that solutions begin with [ns].
+    ///
+    /// # Errors
+    /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
+    pub(crate) fn work_of_design(&self) -> Result<f64, MeshError> {
+        self.cost_of_design(self.method)
+    }
+
     fn cost_of_design(&self, method: Method) -> Result<f64, MeshError> {
         let service =
             Service::typical(method, self.settings.reuse, self.typical_iterations(method), self.field);

@@ -103,6 +103,8 @@ pub struct LinearSolverSettings {
     pub required: f64,
     /// Iterations after which the method gives up. Default: ten times what a sound system needs.
     pub max_iterations: Option<usize>,
+    /// Counted work of a solution after which the method gives up [ns]. Default: no limit.
+    pub most_work: f64,
     /// Bytes of the largest factor that is chosen or fallen back to by the program. Default 4 GiB: a laptop with 8 GiB
     /// holds it beside matrix, mesh and fields.
     pub factor_bytes: usize,
@@ -117,6 +119,7 @@ impl Default for LinearSolverSettings {
             tolerance: 1e-11,
             required: 1e-9,
             max_iterations: None,
+            most_work: f64::INFINITY,
             factor_bytes: 4 << 30,
             reuse: Reuse::default(),
         }

@@ -232,6 +232,8 @@ impl LocalSystem {
             let single = method == Method::DirectSingle && next(&self.analysis, method).is_some();
             10 * if single { typical.max(LEAST_SINGLE) } else { typical.max(30) }
         });
+        let affordable = (settings.most_work / preconditioner.costs.iteration) as usize;
+        let most = most.min(affordable.max(1));
         let target = settings.tolerance * scale;
         let (mut done, mut residual) = (0, f64::INFINITY);
         let (mut least, mut is_slow) = (f64::INFINITY, false);
