@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 const LEAST_SHARE: f64 = 0.5;
 
 /// What an estimate is multiplied by for an error bar: on meshes that show the device, estimates of 0.5 to 1.2 times the error
-/// have been measured (docs/verification.md, 2.11).
+/// have been measured (docs/verification.md, 2.12).
 pub const SAFETY: f64 = 2.0;
 
 /// How exact the objective is.
