@@ -124,7 +124,7 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         add("boundaries.uniform_field.surfaces", &field.surfaces);
     }
     if let Some(open) = &config.open {
-        add("open.surfaces", &open.surfaces);
+        add("open.surfaces", open.surfaces());
     }
     for (i, coil) in config.coils.iter().enumerate() {
         if let CoilShape::Region(region) = &coil.shape

@@ -24,11 +24,11 @@ fn region_of(open: &Open) -> &str {
 /// The mesh with the shell of the configuration around it; one that names no such surface is refused later, with all other names.
 pub(super) fn with_shell(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
     let Some(open) = config.open.as_ref().filter(|open| open.region.is_none()) else { return Ok(mesh) };
-    if open.surfaces.iter().any(|name| mesh.topology().surface(name).is_err()) {
+    if open.surfaces().iter().any(|name| mesh.topology().surface(name).is_err()) {
         return Ok(mesh);
     }
     let parameters = OpenShellParameters {
-        surfaces: open.surfaces.clone(),
+        surfaces: open.surfaces().to_vec(),
         centre: open.center,
         layers: open.layers,
         region: REGION.to_owned(),
@@ -59,7 +59,7 @@ pub(super) fn condition(config: &Config) -> Option<(String, Boundary)> {
 pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let Some(open) = &config.open else { return Vec::new() };
     let twice = |(path, name): (String, &str)| {
-        let is_open = path.starts_with("boundaries.") && open.surfaces.iter().any(|own| own == name);
+        let is_open = path.starts_with("boundaries.") && open.surfaces().iter().any(|own| own == name);
         is_open.then(|| {
             source
                 .diagnostic(&path, format!("`{name}` has a condition, but space is open beyond it"))

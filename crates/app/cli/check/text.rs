@@ -76,7 +76,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         row("uniform field", format!("({x}, {y}, {z}) T on {}", field.surfaces.join(", ")));
     }
     if let Some(open) = summary.open {
-        let beyond = open.region.as_deref().map_or_else(|| open.surfaces.join(", "), str::to_owned);
+        let beyond = open.region.as_deref().map_or_else(|| open.surfaces().join(", "), str::to_owned);
         row("open space", format!("beyond {beyond}"));
     }
     if let Some(wall) = &summary.truncation {

@@ -18,7 +18,7 @@ table! {
     pub struct Open {
         /// Outer surfaces beyond which space is open: all but symmetry planes. They take no condition; the shell adds the
         /// region `open` and, where it ends, the surface `infinity` with A = 0.
-        surfaces: Vec<String> = NAMES => Vec::new();
+        surfaces: Option<Vec<String>> = NAMES;
         /// A region of a mesh file that is such a shell already, instead of `surfaces`. It lies between two surfaces that every ray
         /// from the center meets once, at best of twice the size of each other.
         region: Option<String> = TEXT;
@@ -29,17 +29,23 @@ table! {
         layers: usize = integer(1, MOST_LAYERS) => 4;
     }
     check = Open::check;
+    rules = |rules| rules.exactly_one(&["surfaces", "region"]);
 }
 
 impl Open {
+    /// Outer surfaces beyond which space is open; none where the shell is a region.
+    pub fn surfaces(&self) -> &[String] {
+        self.surfaces.as_deref().unwrap_or_default()
+    }
+
     /// One of the two forms.
     fn check(&mut self, section: &Section<'_>) {
-        match (&self.region, self.surfaces.is_empty()) {
-            (None, true) => section.missing(
+        match ["region", "surfaces"].map(|key| section.has(key)) {
+            [false, false] => section.missing(
                 &["surfaces"],
                 "surfaces = [\"outer\"]: the outer surfaces beyond which space is open, or region = \"shell\"",
             ),
-            (Some(_), false) => section.clash(
+            [true, true] => section.clash(
                 ["region", "surfaces"],
                 "the shell is a region of the mesh and put around it at once".to_owned(),
                 "one of the two",
