@@ -13,7 +13,7 @@ cells = [2, 4, 3]
 [analysis]
 frequency = "50 Hz"
 [boundaries]
-flux_parallel = ["y_min", "y_max"]
+flux_parallel = ["y_min", "y_max", "x_min"]
 [[coils]]
 name = "bar"
 region = "block"

@@ -231,7 +231,7 @@ mod tests {
             }
         }
         let small = Scale::around([1.4e-7, 1.8e-7].into_iter(), [0.0, 1.0]);
-        assert_eq!(small.ticks(5)[0].1, "1.4");
+        assert_eq!(small.ticks(5)[0].1, "1.40");
         assert_eq!(small.titled("loss [W]", 5), "loss [10⁻⁷ W]");
         assert_eq!(small.titled("share", 5), "share [10⁻⁷]");
     }

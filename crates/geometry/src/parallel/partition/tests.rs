@@ -139,7 +139,7 @@ fn without_metis_ranks_own_ranges_of_nodes_of_the_same_weight() {
 
 #[test]
 fn a_mesh_too_small_for_metis_is_distributed_to_the_last_node() {
-    let tets = vec![[0, 1, 2, 3], [4, 1, 3, 2], [5, 4, 3, 1]].into_iter().map(|t| t.map(NodeId)).collect();
+    let tets = vec![[0, 1, 2, 3], [4, 1, 3, 2], [5, 4, 1, 3]].into_iter().map(|t| t.map(NodeId)).collect();
     let regions = vec![crate::RegionId(0); 3];
     let topology = Topology::new(6, tets, vec!["all".into()], regions).expect("three tets");
     // All weight at one node: without repair five ranks had none.
