@@ -126,6 +126,9 @@ pub(crate) fn given_currents(
     coils
 }
 
+/// Solves the field's system for a right side.
+type Solve<'a> = dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> + 'a;
+
 /// The elimination of the field for the currents of voltage-driven coils, on one mesh.
 #[derive(Debug)]
 pub struct Border {
@@ -145,7 +148,7 @@ impl Border {
     pub(crate) fn new(
         windings: &Arc<Windings>,
         angular_frequency: f64,
-        solve: &mut dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError>,
+        solve: &mut Solve<'_>,
     ) -> Result<Option<Self>, SolverError> {
         if angular_frequency == 0.0 || windings.with_source().next().is_none() {
             return Ok(None);
