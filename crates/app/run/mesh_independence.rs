@@ -2,7 +2,7 @@
 //!
 //! An optimiser sees the discrete objective: the field's, and the error of a mesh that moves along with the design. What it
 //! gains from that error shrinks where the cells do. So the run's mesh is generated anew with every cell that moves or is
-//! observed divided ([`DividedMesh`]), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
+//! observed divided (`DividedMesh`), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
 //! constraints are measured there too. Variables of a control grid mean the same on any mesh; where the nodes are the
 //! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]). A check
 //! that cannot be done is reported, and costs a run nothing else. A mesh that cannot be generated anew has all its elements

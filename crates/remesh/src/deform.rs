@@ -51,7 +51,7 @@ pub enum MotionLaw {
     /// By linear elasticity (Eq. 3), frozen on the reference mesh of a round.
     #[default]
     Linear,
-    /// All nodes along one coordinate axis (0, 1, 2), by a convex energy on the undeformed mesh ([`crate::rails`]): for
+    /// All nodes along one coordinate axis (0, 1, 2), by a convex energy on the undeformed mesh (`rails`): for
     /// designs that move along that axis. There are no rounds, and all in one process.
     Rails(usize),
 }

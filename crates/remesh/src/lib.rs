@@ -3,7 +3,7 @@
 //! The design nodes move by `Δx_b`; a fictitious elastic body, frozen on the reference mesh, carries the motion to all
 //! other nodes of the remesh region: `K_dd Δx_d = f_d − K_db Δx_b`. [`ElasticMap`] is that affine map and its
 //! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. For designs along one axis there is another law, which
-//! is one function of the design however far it goes: [`rails`], with the energy of [`barrier`]; [`carried`] says how far that
+//! is one function of the design however far it goes: `rails`, with the energy of `barrier`; `carried` says how far that
 //! is. Who moves freely, slides or stays is decided
 //! in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
 //! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,

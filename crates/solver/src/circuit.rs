@@ -9,7 +9,7 @@
 //! complex symmetric as `K` is, so that the adjoint has the same matrix, and as `F` does not move with the design, the
 //! derivative of `K` remains all there is. It is solved by eliminating `u`: one further solution a coil. All values are those
 //! of the meshed part. At 0 Hz a voltage drives `V/R`.
-//! Lives here: windings, the elimination, what the terminals see. Does not live here: the loads ([`crate::load`]).
+//! Lives here: windings, the elimination, what the terminals see. Does not live here: the loads (`crate::load`).
 
 use std::sync::Arc;
 
