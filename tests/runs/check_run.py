@@ -15,7 +15,9 @@ import numpy as np
 import pyvista
 
 # Name: number of components.
-POINT_ARRAYS = {"A_re": 3, "A_im": 3, "psi_re": 1, "psi_im": 1, "displacement": 3, "sensitivity": 3}
+POINT_ARRAYS = {
+    "A_re": 3, "A_im": 3, "psi_re": 1, "psi_im": 1, "displacement": 3, "sensitivity": 3, "thickness": 1,
+}
 CELL_ARRAYS = {"B_re": 3, "B_im": 3, "B_abs": 1, "J_re": 3, "J_im": 3, "loss_density": 1, "region": 1, "quality": 1}
 
 # Rounding of coordinates below 1 m and of the interpolation [m], with room.
@@ -79,6 +81,8 @@ def check_thickness(initial, final, design):
     require((end[on_plate, :2] == start[on_plate, :2]).all(), "nodes of the far face have left their place in x, y")
     difference = abs(end - start - final.point_data["displacement"]).max()
     require(difference < LENGTH_ROUNDING, f"the displacement differs from the moved points by {difference} m")
+    measured = final.point_data["thickness"][on_plate]
+    require(abs(measured - thickness).max() < LENGTH_ROUNDING, "the thickness is not that of the moved points")
     return thickness
 
 

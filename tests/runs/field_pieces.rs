@@ -32,6 +32,12 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
     (problem, analysis)
 }
 
+/// Thickness of the plate at all nodes.
+fn thickness(problem: &Problem, analysis: &Analysis) -> Vec<f64> {
+    let shape = problem.shape().unwrap();
+    shape.thickness().unwrap().over_nodes(shape.surface(), &analysis.mesh)
+}
+
 /// The elements of every rank; the last one owns none.
 fn parts(analysis: &Analysis) -> Vec<Vec<ElementId>> {
     let topology = analysis.mesh.topology();
@@ -42,7 +48,8 @@ fn parts(analysis: &Analysis) -> Vec<Vec<ElementId>> {
 }
 
 fn write_pieces(directory: &RunDirectory, problem: &Problem, analysis: &Analysis) {
-    let data = FieldData::of(analysis);
+    let thickness = thickness(problem, analysis);
+    let data = FieldData { thickness: Some(&thickness), ..FieldData::of(analysis) };
     directory.begin_pieces(0).unwrap();
     for (rank, elements) in parts(analysis).iter().enumerate() {
         let bytes = fields::piece(problem.states(), &data, elements).unwrap();
@@ -75,7 +82,9 @@ fn fields_in_pieces_are_those_of_the_whole_and_are_reported_alike() {
     };
 
     let whole = std::fs::read(directory.field(0)).unwrap();
-    assert!(whole == fields::vtu(problem.states(), &FieldData::of(&analysis)).unwrap(), "the run's file");
+    let thickness = thickness(&problem, &analysis);
+    let data = FieldData { thickness: Some(&thickness), ..FieldData::of(&analysis) };
+    assert!(whole == fields::vtu(problem.states(), &data).unwrap(), "the run's file");
     let whole = vtu_contents(&whole).unwrap();
     let of_whole = report().unwrap();
     write_pieces(&directory, &problem, &analysis);

@@ -166,7 +166,7 @@ fn every_field_file_holds_the_arrays_of_its_contract(run: &RunFolder, result: &V
         let (nodes, tets) = (field.points.len(), field.tets.len());
         let counts = ["/mesh/nodes", "/mesh/tets"].map(|pointer| count(result, pointer));
         assert_eq!([nodes as u64, tets as u64], counts);
-        assert_eq!((field.point_data.len(), field.cell_data.len()), (6, 8));
+        assert_eq!((field.point_data.len(), field.cell_data.len()), (7, 8));
         assert_eq!(field.cell_data["region"].len(), tets);
         let (points, cells) = (&field.point_data, &field.cell_data);
         let mut zero = Vec::new();
@@ -180,7 +180,7 @@ fn every_field_file_holds_the_arrays_of_its_contract(run: &RunFolder, result: &V
             }
         }
         for (names, data, length) in
-            [("psi_re psi_im", points, nodes), ("B_abs loss_density quality", cells, tets)]
+            [("psi_re psi_im thickness", points, nodes), ("B_abs loss_density quality", cells, tets)]
         {
             for name in names.split(' ') {
                 let values = scalars(&data[name]);

@@ -1,14 +1,16 @@
 //! The mesh of a configuration with its cells divided where the device is.
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::generate::{
     BoxesParameters, Division, ShieldParameters, SphereParameters, boxes, shield, sphere,
 };
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_optimizer::problem::Problem;
 
 use super::mesh::named_interfaces;
-use crate::config::{Config, MeshConfig};
+use super::open;
+use crate::config::{Config, MeshConfig, SourceMap};
+use crate::error::Error;
 
 /// Parameters of a generated mesh whose cells are divided.
 #[derive(Clone, Debug)]
@@ -52,17 +54,17 @@ impl DividedMesh {
         .ok()
     }
 
-    /// The mesh, with the interfaces that the configuration names.
+    /// The mesh, with the interfaces that the configuration names and its shell of open space.
     ///
     /// # Errors
-    /// Of the generator.
-    pub(crate) fn build(&self, config: &Config) -> Result<Mesh, MeshError> {
+    /// Of the generator, and of the shell.
+    pub(crate) fn build(&self, config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
         let mesh = match self {
             Self::Shield(parameters) => shield(parameters),
             Self::Boxes(parameters) => boxes(parameters),
             Self::Sphere(parameters) => sphere(parameters),
         }?;
-        named_interfaces(mesh, config)
+        open::with_shell(named_interfaces(mesh, config)?, config, source)
     }
 }
 

@@ -19,6 +19,8 @@ pub struct FieldData<'a> {
     pub displacement: &'a [Point],
     /// dF/dx at the nodes [unit of F per m], shape `(n_nodes, 3)`; `None` is written as zeros.
     pub sensitivity: Option<&'a [Point]>,
+    /// Thickness of the designed body at its design nodes [m], zero at others, shape `(n_nodes,)`; `None`: no such array.
+    pub thickness: Option<&'a [f64]>,
     /// What every element adds to the estimated error of the objective [unit of F], shape `(n_tets,)`; `None`: no such array.
     pub error: Option<&'a [f64]>,
     /// One solution per state. For a piece only the potentials at its nodes matter.
@@ -32,6 +34,7 @@ impl<'a> FieldData<'a> {
             mesh: &analysis.mesh,
             displacement: &analysis.displacement,
             sensitivity: analysis.sensitivity.as_deref(),
+            thickness: None,
             error: None,
             solutions: &analysis.solutions,
         }
@@ -78,6 +81,7 @@ struct Arrays {
     states: Vec<StateArrays>,
     displacement: Vec<Point>,
     sensitivity: Vec<Point>,
+    thickness: Option<Vec<f64>>,
     region: Vec<i32>,
     quality: Vec<f64>,
     error: Option<Vec<f64>>,
@@ -96,6 +100,7 @@ impl Arrays {
                 .collect(),
             displacement: at(data.displacement),
             sensitivity: data.sensitivity.map_or_else(|| vec![[0.0; 3]; nodes.len()], at),
+            thickness: data.thickness.map(|all| nodes.iter().map(|n| all[n.index()]).collect()),
             region: elements.iter().map(|e| regions[e.index()].0 as i32).collect(),
             quality: qualities_of(data.mesh, elements),
             error: data.error.map(|error| elements.iter().map(|e| error[e.index()]).collect()),
@@ -107,6 +112,8 @@ impl Arrays {
         let mut fields: Vec<Field<'_>> = first.at_nodes().into();
         fields.push(Field { name: "displacement", data: ArrayData::Vector(&self.displacement) });
         fields.push(Field { name: "sensitivity", data: ArrayData::Vector(&self.sensitivity) });
+        let thickness = self.thickness.as_ref();
+        fields.extend(thickness.map(|values| Field { name: "thickness", data: ArrayData::Scalar(values) }));
         fields.extend(others.iter().flat_map(StateArrays::at_nodes));
         fields
     }

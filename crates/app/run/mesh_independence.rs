@@ -226,7 +226,7 @@ impl MeshIndependence<'_> {
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
         let config = fresh_configuration(self.config);
-        let setup = set_up_on(fresh.mesh.build(&config)?, &config, self.source)?;
+        let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
         if interrupted() {
             return Ok(None);
         }
@@ -441,7 +441,7 @@ mod tests {
         let (config, source) = quick(false);
         let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
         let fresh = FreshMesh::of(&config, &setup.problem).expect("a generated mesh");
-        let mesh = fresh.mesh.build(&config).expect("sound parameters");
+        let mesh = fresh.mesh.build(&config, &source).expect("sound parameters");
         let lines = |mesh: &fluxmorph_geometry::Mesh, axis: usize| {
             let mut all: Vec<f64> = mesh.points().iter().map(|x| x[axis]).collect();
             all.sort_by(f64::total_cmp);

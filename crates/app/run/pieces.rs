@@ -13,6 +13,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
+use super::recorder::thickness;
 use crate::error::Error;
 use crate::files::fields::{self, FieldData};
 use crate::files::{RunDirectory, system_disk};
@@ -29,8 +30,9 @@ impl SharedPieces {
     pub(super) fn of(problem: &Problem, directory: PathBuf) -> Option<Self> {
         let share = problem.share()?;
         let states = problem.states().iter().map(FieldModel::of_one_process).collect();
-        let writer =
-            PieceWriter { states, share: share.clone(), mesh: problem.original().clone(), directory };
+        let has_thickness = problem.shape().is_some_and(|shape| shape.thickness().is_some());
+        let mesh = problem.original().clone();
+        let writer = PieceWriter { states, share: share.clone(), mesh, has_thickness, directory };
         Some(Self { channel: share.group.register(Box::new(writer)), ranks: share.group.size() })
     }
 
@@ -45,7 +47,8 @@ impl SharedPieces {
         problem: &Problem,
         analysis: &Analysis,
     ) -> Result<(), Error> {
-        let data = FieldData::of(analysis);
+        let thickness = thickness(problem, analysis);
+        let data = FieldData { thickness: thickness.as_deref(), ..FieldData::of(analysis) };
         directory.begin_pieces(evaluation)?;
         let mut numbers = vec![evaluation as f64];
         numbers.extend_from_slice(analysis.mesh.points().as_flattened());
@@ -54,6 +57,7 @@ impl SharedPieces {
             Some(sensitivity) => numbers.extend_from_slice(sensitivity.as_flattened()),
             None => numbers.resize(numbers.len() + 3 * data.displacement.len(), 0.0),
         }
+        numbers.extend_from_slice(data.thickness.unwrap_or_default());
         for solution in data.solutions {
             numbers.extend(numbers_of(solution.values()));
         }
@@ -70,6 +74,8 @@ struct PieceWriter {
     share: Ownership,
     /// Of the topology that all designs have.
     mesh: Mesh,
+    /// Whether the fields come with the thickness of a designed body.
+    has_thickness: bool,
     directory: PathBuf,
 }
 
@@ -86,6 +92,7 @@ impl CommandHandler for PieceWriter {
         let mut points = || take(3 * nodes).map(|numbers| numbers.as_chunks::<3>().0.to_vec());
         let (places, displacement, sensitivity): (Vec<Point>, Vec<Point>, Vec<Point>) =
             (points()?, points()?, points()?);
+        let thickness = if self.has_thickness { Some(take(nodes)?) } else { None };
         let mut solutions = Vec::with_capacity(self.states.len());
         for state in &self.states {
             let values = complex_of(take(2 * state.unknown_count())?);
@@ -97,6 +104,7 @@ impl CommandHandler for PieceWriter {
             mesh: &mesh,
             displacement: &displacement,
             sensitivity: Some(&sensitivity),
+            thickness,
             error: None,
             solutions: &solutions,
         };

@@ -64,6 +64,21 @@ fn the_header_says_how_arrays_are_stored() {
 }
 
 #[test]
+fn regions_are_named_by_their_numbers() {
+    let mesh = shield(&ShieldParameters { refinement: 0.5, ..ShieldParameters::default() }).expect("valid");
+    let text = String::from_utf8(vtu_bytes(&mesh, &[], &[]).expect("no arrays")).expect("XML in UTF-8");
+    let (_, rest) = text.split_once("Name=\"region_names\"").expect("an array of texts");
+    let (attributes, rest) = rest.split_once('>').expect("the end of a tag");
+    let (bytes, _) = rest.split_once('<').expect("the end of an element");
+    let bytes: Vec<u8> = bytes.split_whitespace().map(|byte| byte.parse().expect("a byte")).collect();
+    let names: Vec<&[u8]> =
+        bytes.strip_suffix(&[0]).expect("each name ends with a zero").split(|&b| b == 0).collect();
+    let expected: Vec<&[u8]> = mesh.topology().region_names().iter().map(|name| name.as_bytes()).collect();
+    assert_eq!(names, expected);
+    assert!(attributes.contains(&format!("NumberOfTuples=\"{}\"", expected.len())), "{attributes}");
+}
+
+#[test]
 fn the_bytes_do_not_depend_on_the_number_of_threads() {
     let mesh = shield(&ShieldParameters { refinement: 0.5, ..ShieldParameters::default() }).expect("valid");
     let qualities = quality::qualities(&mesh);

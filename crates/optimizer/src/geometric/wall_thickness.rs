@@ -110,6 +110,15 @@ impl WallThickness {
         })
     }
 
+    /// Thickness [m] at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
+    pub fn over_nodes(&self, surface: &DesignSurface, mesh: &Mesh) -> Vec<f64> {
+        let mut thickness = vec![0.0; mesh.points().len()];
+        for (i, wall) in self.walls(surface, |n| mesh.point(n)) {
+            thickness[surface.nodes()[i].index()] = wall.thickness;
+        }
+        thickness
+    }
+
     /// Least and greatest thickness [m] on a moved mesh.
     pub fn range(&self, surface: &DesignSurface, mesh: &Mesh) -> (f64, f64) {
         self.walls(surface, |n| mesh.point(n))

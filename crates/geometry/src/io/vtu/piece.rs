@@ -18,6 +18,8 @@ pub struct VtuPiece {
     elements: Vec<ElementId>,
     /// Nodes of every element by their places in `nodes`.
     tets: Vec<[NodeId; 4]>,
+    /// Of the whole mesh.
+    region_names: Vec<String>,
 }
 
 impl VtuPiece {
@@ -42,7 +44,7 @@ impl VtuPiece {
         }
         let local = |n: NodeId| place[n.index()].expect("the nodes of its elements are in the piece");
         let tets = elements.iter().map(|&e| topology.tet(e).map(local)).collect();
-        Self { nodes, elements, tets }
+        Self { nodes, elements, tets, region_names: topology.region_names().to_vec() }
     }
 
     /// Its nodes in the whole mesh, ascending.
@@ -73,7 +75,7 @@ impl VtuPiece {
         let nodes: Vec<u32> = self.nodes.iter().map(|n| n.0).collect();
         let elements: Vec<u32> = self.elements.iter().map(|e| e.0).collect();
         let [point_data, cell_data] = with_global_ids(point_data, cell_data, [&nodes, &elements]);
-        file_bytes(&self.tets, &points, &point_data, &cell_data)
+        file_bytes(&self.region_names, &self.tets, &points, &point_data, &cell_data)
     }
 }
 

@@ -55,11 +55,12 @@ pub fn vtu_bytes_at(
     if length != expected {
         return Err(MeshError::ArrayLength { array: "points".to_owned(), length, expected });
     }
-    file_bytes(topology.tets(), points, point_data, cell_data)
+    file_bytes(topology.region_names(), topology.tets(), points, point_data, cell_data)
 }
 
-/// The bytes of a file of tetrahedra between points.
+/// The bytes of a file of tetrahedra between points, with the names of the regions, by their numbers.
 pub(super) fn file_bytes(
+    region_names: &[String],
     tets: &[[NodeId; 4]],
     points: &[Point],
     point_data: &[Field<'_>],
@@ -88,6 +89,7 @@ pub(super) fn file_bytes(
     let mut text = String::with_capacity(length + 1024);
     text += "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" ";
     text += "header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n";
+    push_region_names(&mut text, region_names);
     let (n_nodes, n_tets) = (points.len(), tets.len());
     writeln!(text, "<Piece NumberOfPoints=\"{n_nodes}\" NumberOfCells=\"{n_tets}\">").map_err(refused)?;
     for (tag, elements, fields) in [
@@ -102,6 +104,23 @@ pub(super) fn file_bytes(
     }
     text += "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
     Ok(text.into_bytes())
+}
+
+/// The names of the regions as an array of texts over the whole file: entry `i` names the elements whose `region` is `i`.
+///
+/// VTK writes such an array in ASCII as the bytes of its texts, each followed by a zero.
+fn push_region_names(text: &mut String, names: &[String]) {
+    if names.is_empty() {
+        return;
+    }
+    *text += "<FieldData><DataArray type=\"String\" Name=\"region_names\" NumberOfTuples=\"";
+    *text += &names.len().to_string();
+    *text += "\" format=\"ascii\">";
+    for byte in names.iter().flat_map(|name| name.bytes().chain([0])) {
+        *text += &byte.to_string();
+        text.push(' ');
+    }
+    *text += "</DataArray></FieldData>\n";
 }
 
 /// The start of an element with arrays, which says which of them holds global numbers.
