@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod cli;
+mod coils;
 mod commands;
 mod designs;
 mod examples;

@@ -8,11 +8,11 @@ use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_optimizer::{Error as OptimizerError, geometric};
-use fluxmorph_solver::functional::{self, Observed, Weighting};
+use fluxmorph_solver::functional::{self, AtTerminals, Inductive, Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use crate::config::{
-    self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, UpperBound,
+    self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, ValueBound,
 };
 use crate::error::Error;
 
@@ -33,7 +33,7 @@ pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
 pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     let fields = functionals(config)
         .into_iter()
-        .filter(|(_, f)| !f.kind.is_of_a_body())
+        .filter(|(_, f)| f.kind.is_of_a_region())
         .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
     let forces = config.forces.iter().enumerate().flat_map(|(k, force)| {
         let path = move |(i, name): (usize, &'a String)| (format!("forces[{k}].regions[{i}]"), name.as_str());
@@ -67,7 +67,9 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
     let mut faults = Vec::new();
     let known = |name: &&str| topology.region(name).is_ok();
     faults.extend(body_faults(config, source));
-    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| !f.kind.is_of_a_body()) {
+    faults.extend(coil_faults(config, source));
+    faults.extend(super::multipole::faults(config, source));
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_region()) {
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
         let entry = config.regions.get(region);
         if functional.kind == ObjectiveKind::Loss {
@@ -134,6 +136,45 @@ fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     faults
 }
 
+/// Coils that are not there, have no winding, or are asked for what they do not have.
+fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known: Vec<&str> = config.coils.iter().map(|coil| coil.name.as_str()).collect();
+    for (path, functional) in functionals(config) {
+        let kind = functional.kind.name();
+        for (k, name) in functional.coils.iter().flatten().enumerate() {
+            let path = format!("{path}.coils[{k}]");
+            let Some(index) = known.iter().position(|known| known == name) else {
+                faults.push(source.unknown_name(&path, "coil", name, &known));
+                continue;
+            };
+            let coil = &config.coils[index];
+            if coil.turns.is_none() {
+                let message = format!("the coil `{name}` has no turns, so there is no {kind} of it");
+                let help = format!("add a line like: turns = 10 to coils[{index}]");
+                faults.push(source.diagnostic(&path, message).help(help));
+            } else if functional.kind == ObjectiveKind::Current && coil.voltage.is_none() {
+                let message = format!("the current of the coil `{name}` is given: no shape changes it");
+                faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
+            }
+        }
+        let is_of_inductances = functional.coils.is_some()
+            && !matches!(functional.kind, ObjectiveKind::FluxLinkage)
+            && functional.kind.may_be_static();
+        let saturates = |region: &config::Region| {
+            config.materials.get(&region.material).is_some_and(config::Material::saturates)
+        };
+        if is_of_inductances && config.regions.values().any(saturates) {
+            let message = format!(
+                "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
+            );
+            let fault = source.diagnostic(&format!("{path}.kind"), message);
+            faults.push(fault.expected("flux_linkage, or materials with a permeability"));
+        }
+    }
+    faults
+}
+
 /// Mass density [kg/m³] of a region's material, if it is given.
 fn density(config: &Config, region: &str) -> Option<f64> {
     config.materials.get(&config.regions.get(region)?.material)?.density
@@ -171,8 +212,9 @@ fn term(
     };
     let name = functional.region.as_deref().unwrap_or_default();
     let region = || mesh.topology().region(name);
-    // All states have the regions, conductors and node numbers of the first.
-    let model = &states[0];
+    // All states have the regions, conductors, windings and node numbers of the first that takes part.
+    let model = (0..states.len()).find(taken).map_or(&states[0], |k| &states[k]);
+    let coils: Vec<&str> = functional.coils.iter().flatten().map(String::as_str).collect();
     let measured = match functional.kind {
         ObjectiveKind::FluxDensitySquared => {
             Functional::observation(mesh, region()?, Observed::Deviation { target: [0.0; 3], weighting })?
@@ -208,6 +250,24 @@ fn term(
             };
             force(body, mesh, model, motion)?
         }
+        ObjectiveKind::Inductance => Functional::of_inductances(model, &coils, Inductive::Inductance)?,
+        ObjectiveKind::MutualInductance => {
+            Functional::of_inductances(model, &coils, Inductive::MutualInductance)?
+        }
+        ObjectiveKind::Coupling => Functional::of_inductances(model, &coils, Inductive::Coupling)?,
+        ObjectiveKind::Resistance => Functional::of_inductances(model, &coils, Inductive::Resistance)?,
+        ObjectiveKind::QualityFactor => Functional::of_inductances(model, &coils, Inductive::QualityFactor)?,
+        ObjectiveKind::LinkEfficiency => {
+            Functional::of_inductances(model, &coils, Inductive::LinkEfficiency)?
+        }
+        ObjectiveKind::Multipole | ObjectiveKind::MultipoleContent => {
+            super::multipole::functional(config, functional, mesh, model)?
+        }
+        ObjectiveKind::FluxLinkage => at_terminals(model, &coils, AtTerminals::FluxLinkage)?,
+        ObjectiveKind::Current => at_terminals(model, &coils, AtTerminals::Current)?,
+        ObjectiveKind::Voltage => at_terminals(model, &coils, AtTerminals::Voltage)?,
+        ObjectiveKind::Power => at_terminals(model, &coils, AtTerminals::Power)?,
+        ObjectiveKind::PowerFactor => at_terminals(model, &coils, AtTerminals::PowerFactor)?,
     };
     Ok(Term {
         functional: measured,
@@ -216,9 +276,15 @@ fn term(
         label: Label {
             kind: functional.kind.name(),
             region: functional.region.clone(),
+            coils: functional.coils.clone().unwrap_or_default(),
             frequency: functional.frequency,
         },
     })
+}
+
+/// A quantity of the one coil that is named.
+fn at_terminals(model: &FieldModel, coils: &[&str], of: AtTerminals) -> Result<Functional, Error> {
+    Ok(Functional::at_terminals(model, coils.first().copied().unwrap_or_default(), of)?)
 }
 
 /// A component of the force or torque on a body.
@@ -264,7 +330,7 @@ pub(super) fn constraints(
         match &written.limit {
             Written::Field { functional, bound } => {
                 let term = term(config, functional, mesh, states)?;
-                add(written.name.clone(), Quantity::Field(term), upper(*bound));
+                add(written.name.clone(), Quantity::Field(term), limit(*bound));
             }
             Written::Body { kind, region, bound } => {
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);
@@ -275,7 +341,7 @@ pub(super) fn constraints(
                     (BodyKind::Mass, Some(density)) => body.with_density(density),
                     _ => body,
                 };
-                add(written.name.clone(), Quantity::Volume(body), upper(*bound));
+                add(written.name.clone(), Quantity::Volume(body), limit(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
                 use geometric::ThicknessLimit::{Maximum, Minimum};
@@ -307,9 +373,11 @@ pub(super) fn constraints(
     Ok(constraints)
 }
 
-fn upper(bound: UpperBound) -> Limit {
+fn limit(bound: ValueBound) -> Limit {
     match bound {
-        UpperBound::Value(value) => Limit::AtMost(value),
-        UpperBound::Ratio(ratio) => Limit::AtMostRatio(ratio),
+        ValueBound::AtMost(value) => Limit::AtMost(value),
+        ValueBound::AtMostRatio(ratio) => Limit::AtMostRatio(ratio),
+        ValueBound::AtLeast(value) => Limit::AtLeast(value),
+        ValueBound::AtLeastRatio(ratio) => Limit::AtLeastRatio(ratio),
     }
 }

@@ -14,6 +14,7 @@ pub(crate) mod locate_error;
 pub(crate) mod memory_limit;
 pub(crate) mod mesh;
 mod motion;
+pub(crate) mod multipole;
 mod open;
 mod outline;
 mod plausible;

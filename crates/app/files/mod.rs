@@ -34,9 +34,9 @@ pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
 pub(crate) use result::to_json;
 pub use result::{
-    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HomogeneityResult,
-    LinearSolverResult, MeshResult, ObjectiveResult, OpenResult, ProbeResult, RunResult, SaturatedRegion,
-    SaturationResult, StateResult, TermResult, Verification,
+    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HarmonicResult, HomogeneityResult,
+    LinearSolverResult, MeshResult, MultipoleResult, ObjectiveResult, OpenResult, ProbeResult, RunResult,
+    SaturatedRegion, SaturationResult, StateResult, TermResult, Verification,
 };
 pub(crate) use run_directory::LOCK;
 pub use run_directory::{OverwritePolicy, RunDirectory};

@@ -69,6 +69,9 @@ pub struct RunResult {
     /// Their coupling factors, `L_jk / √(L_jj L_kk)`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coupling: Vec<Vec<f64>>,
+    /// The field expanded in circles and balls, at the first frequency.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub multipoles: Vec<MultipoleResult>,
     /// The linear systems.
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
@@ -78,6 +81,28 @@ pub struct RunResult {
     pub warnings: Vec<String>,
     /// Most memory held [bytes].
     pub peak_memory_bytes: u64,
+}
+
+/// An expansion of the flux density.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MultipoleResult {
+    /// Its name.
+    pub name: String,
+    /// Reference radius [m].
+    pub radius_m: f64,
+    /// Its terms.
+    pub terms: Vec<HarmonicResult>,
+}
+
+/// One term of an expansion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HarmonicResult {
+    /// Its name, such as `b3` or `c2_0`.
+    pub name: String,
+    /// The coefficient [T].
+    pub value_t: Amplitude,
+    /// Its magnitude relative to that of the main order, in units of 1e-4; `null` where there is no main field.
+    pub units: Option<f64>,
 }
 
 /// What the terminals of a coil see; of the meshed part.
@@ -175,6 +200,9 @@ pub struct TermResult {
     pub kind: String,
     /// Its region; `null` for everything that is meshed.
     pub region: Option<String>,
+    /// Its coils, where it is a quantity of these.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coils: Vec<String>,
     /// Its frequency [Hz]; `null` for the sum over all.
     pub frequency: Option<f64>,
     /// Its factor in the objective.
@@ -352,6 +380,7 @@ pub(crate) mod tests {
                 terms: vec![TermResult {
                     kind: "loss".to_owned(),
                     region: Some("plate".to_owned()),
+                    coils: Vec::new(),
                     frequency: None,
                     weight: 1.0,
                     value: 1.0,
@@ -404,6 +433,7 @@ pub(crate) mod tests {
             coils: vec![],
             inductance_h: vec![],
             coupling: vec![],
+            multipoles: vec![],
             linear_solver: LinearSolverResult {
                 methods: vec!["direct_single".to_owned()],
                 worst_residual: 1e-11,

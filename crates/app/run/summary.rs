@@ -9,19 +9,20 @@ use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shape, Timings};
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
+use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{
     FieldModel, FieldSolution, Functional, RigidMotion, SolverError, recovery, saturation,
 };
 
 use super::Session;
 use super::reservations::reservations;
-use crate::build::force;
+use crate::build::{force, multipole};
 use crate::config;
 use crate::error::Error;
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HomogeneityResult,
-    LinearSolverResult, MeshResult, OpenResult, ProbeResult, RunResult, SaturatedRegion, SaturationResult,
-    StateResult, StopReason, TermResult, peak_memory_bytes,
+    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HarmonicResult, HomogeneityResult,
+    LinearSolverResult, MeshResult, MultipoleResult, OpenResult, ProbeResult, RunResult, SaturatedRegion,
+    SaturationResult, StateResult, StopReason, TermResult, peak_memory_bytes,
 };
 use crate::show::RunObserver;
 
@@ -79,6 +80,7 @@ impl Session<'_> {
             coils: coils(&terminals, problem.states()[0].angular_frequency()),
             coupling: coupling(&terminals.inductance),
             inductance_h: terminals.inductance,
+            multipoles: self.multipoles(analysis)?,
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             warnings,
@@ -106,6 +108,26 @@ impl Session<'_> {
             })
         };
         self.config.forces.iter().map(of).collect()
+    }
+
+    /// The terms of every expansion.
+    fn multipoles(&self, analysis: &Analysis) -> Result<Vec<MultipoleResult>, Error> {
+        let (model, mesh) = (&self.setup.problem.states()[0], &analysis.mesh);
+        let of = |set: &config::MultipoleSet| {
+            let multipoles = multipole::multipoles(self.config, set, mesh, model)?;
+            let coefficients = multipoles.coefficients(model, mesh, &analysis.solutions[0]);
+            let main = multipole::main_terms(set);
+            let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
+            let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();
+            let term = |(term, c): &(Harmonic, c64)| HarmonicResult {
+                name: multipole::name(*term),
+                value_t: amplitude(*c, model.angular_frequency()),
+                units: (reference > 0.0).then(|| 1e4 * c.norm() / reference),
+            };
+            let terms = coefficients.iter().map(term).collect();
+            Ok(MultipoleResult { name: set.name.clone(), radius_m: set.radius, terms })
+        };
+        self.config.multipoles.iter().map(of).collect()
     }
 
     /// Seconds of every stage.
@@ -186,11 +208,14 @@ fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult
     })
 }
 
+/// A value in statics, a peak phasor in harmonics.
+fn amplitude(c: c64, angular_frequency: f64) -> Amplitude {
+    if angular_frequency == 0.0 { Amplitude::Static(c.re) } else { Amplitude::Phasor([c.re, c.im]) }
+}
+
 /// What the terminals of every coil see.
 fn coils(terminals: &Terminals, angular_frequency: f64) -> Vec<CoilResult> {
-    let amplitude = |c: c64| {
-        if angular_frequency == 0.0 { Amplitude::Static(c.re) } else { Amplitude::Phasor([c.re, c.im]) }
-    };
+    let amplitude = |c: c64| amplitude(c, angular_frequency);
     let of = |coil: &CoilTerminals| CoilResult {
         name: coil.name.clone(),
         current_a: amplitude(coil.current),
@@ -243,6 +268,7 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
     let of = |(term, &value): (&Term, &f64)| TermResult {
         kind: term.label.kind.to_owned(),
         region: term.label.region.clone(),
+        coils: term.label.coils.clone(),
         frequency: term.label.frequency,
         weight: term.weight,
         value,

@@ -47,6 +47,8 @@ pub enum Limit {
     AtMostRatio(f64),
     /// At least this, in SI.
     AtLeast(f64),
+    /// At least this multiple of the initial design's value.
+    AtLeastRatio(f64),
 }
 
 /// A limit whose number is known.
@@ -83,8 +85,8 @@ impl Constraint {
     pub fn bound(&self, initial: f64) -> Result<Bound, Error> {
         let value = match self.limit {
             Limit::AtMost(value) | Limit::AtLeast(value) => value,
-            Limit::AtMostRatio(ratio) if initial > 0.0 => ratio * initial,
-            Limit::AtMostRatio(_) => {
+            Limit::AtMostRatio(ratio) | Limit::AtLeastRatio(ratio) if initial > 0.0 => ratio * initial,
+            Limit::AtMostRatio(_) | Limit::AtLeastRatio(_) => {
                 return Err(Error::Constraint {
                     name: self.name.clone(),
                     value: initial,
@@ -93,7 +95,7 @@ impl Constraint {
             }
         };
         let scale = [value, initial].into_iter().map(f64::abs).find(|&s| s > 0.0).unwrap_or(1.0);
-        let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };
+        let sign = if matches!(self.limit, Limit::AtLeast(_) | Limit::AtLeastRatio(_)) { -1.0 } else { 1.0 };
         Ok(Bound { value, slope: sign / scale })
     }
 }
@@ -128,7 +130,7 @@ mod tests {
         let mesh = block(&BlockParameters::default()).expect("defaults are valid");
         let observed = Observed::Component { direction: [0.0, 0.0, 1.0] };
         let functional = Functional::observation(&mesh, RegionId::new(0), observed).expect("it has elements");
-        let label = Label { kind: "field_component", region: None, frequency: None };
+        let label = Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None };
         let term = Term { functional, states: vec![0], weight: 1.0, label };
         Constraint { name: "field".to_owned(), quantity: Quantity::Field(term), limit }
     }
@@ -142,6 +144,8 @@ mod tests {
         assert_eq!(lower.gradient(&[2.0, -4.0]), [-0.5, 1.0]);
         let ratio = constraint(Limit::AtMostRatio(0.5)).bound(8.0).expect("a positive value");
         assert_eq!(ratio, upper);
+        let lower_ratio = constraint(Limit::AtLeastRatio(0.5)).bound(8.0).expect("a positive value");
+        assert_eq!((lower_ratio.excess(5.0), lower_ratio.excess(3.0)), (-0.25, 0.25));
         assert!(
             upper.is_satisfied(4.0) && upper.is_satisfied(4.0 * (1.0 + 1e-7)) && !upper.is_satisfied(4.001)
         );

@@ -32,6 +32,8 @@ pub struct Label {
     pub kind: &'static str,
     /// The region; `None` for everything that is meshed.
     pub region: Option<String>,
+    /// The coils, where it is a quantity of these.
+    pub coils: Vec<String>,
     /// The one frequency [Hz]; `None` for the sum over all.
     pub frequency: Option<f64>,
 }

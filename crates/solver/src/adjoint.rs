@@ -5,7 +5,10 @@
 //! `dF/dx = −2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )`;
 //!
 //! `∂f/∂x` is that of magnets alone: elements that meet a coil do not move. The part of `dF/dx` at fixed potentials
-//! comes with the functional itself.
+//! comes with the functional itself. A functional of inductances `L_jk = F_jᵀ K⁻¹ F_k` needs no adjoint: the responses `K⁻¹F` to
+//! 1 A are state and adjoint in one.
+
+use std::collections::BTreeMap;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
@@ -49,6 +52,37 @@ pub fn node_gradient(
     }
 }
 
+/// `dF/dx` at every node [unit of F per m], shape `(n_nodes, 3)`, of a function of inductances by its derivatives
+/// ([`crate::FunctionalValue::inductances`]): `−2 Re Σ ∂F/∂L_jk W_jᵀ ∂K/∂x W_k` with the responses `W` that the state holds.
+///
+/// # Errors
+/// As [`node_gradient`].
+///
+/// # Panics
+/// Where the state lacks a response, which the functional's value needs too.
+pub fn inductance_gradient(
+    model: &FieldModel,
+    mesh: &Mesh,
+    state: &FieldSolution,
+    derivatives: &[(usize, usize, c64)],
+    moving: &[ElementId],
+) -> Result<Vec<Point>, SolverError> {
+    let response = |k: usize| state.response(k).expect("the value was computed from it");
+    let mut by_second: BTreeMap<usize, Vec<c64>> = BTreeMap::new();
+    for &(j, k, derivative) in derivatives {
+        let first = response(j);
+        let sum = by_second.entry(k).or_insert_with(|| vec![c64::default(); first.values().len()]);
+        sum.iter_mut().zip(first.values()).for_each(|(sum, w)| *sum += derivative * w);
+    }
+    let mut gradient = vec![[0.0; 3]; mesh.points().len()];
+    for (k, sum) in by_second {
+        let weighted = FieldSolution::adjoint(sum, response(k).report());
+        let own = node_gradient(model, mesh, response(k), &weighted, moving)?;
+        gradient.iter_mut().zip(own).for_each(|(sum, own)| (0..3).for_each(|d| sum[d] += own[d]));
+    }
+    Ok(gradient)
+}
+
 /// What contributes to a gradient.
 pub(crate) struct Extent<'a> {
     /// Elements, ascending.
@@ -90,9 +124,11 @@ pub(crate) fn gradient_of(
             }
         }
     };
-    let magnets = model.sources().shape_derivatives(space, mesh, moving, |e| adjoint.element(model, e));
-    for (e, terms) in magnets {
-        add(&topology.tet(e), &scale(2.0, &terms));
+    if state.is_state() {
+        let magnets = model.sources().shape_derivatives(space, mesh, moving, |e| adjoint.element(model, e));
+        for (e, terms) in magnets {
+            add(&topology.tet(e), &scale(2.0, &terms));
+        }
     }
     let all = model.surface();
     let surface: Vec<([NodeId; 3], SurfaceTerm)> = match triangles {

@@ -29,6 +29,11 @@ const MOVING: u32 = 3;
 /// The command to differentiate, for the given state and adjoint.
 const DIFFERENTIATE: u32 = 4;
 
+/// First number of [`DIFFERENTIATE`]: sources and prescribed values act in the state.
+const STATE: f64 = 0.0;
+/// First number of [`DIFFERENTIATE`]: it is the response to 1 A.
+const RESPONSE: f64 = 1.0;
+
 /// Iterations after which an iteration gives up: ten times what thin elements were seen to take (docs/scale.md).
 const MAX_ITERATIONS: usize = 3000;
 
@@ -81,7 +86,9 @@ impl Distributed {
             self.channel.execute(MOVING, moving.iter().map(|e| f64::from(e.0)).collect())?;
             *known = Some(moving.to_vec());
         }
-        let numbers = numbers_of(state.values()).chain(numbers_of(adjoint.values())).collect();
+        let role = if state.is_state() { STATE } else { RESPONSE };
+        let fields = numbers_of(state.values()).chain(numbers_of(adjoint.values()));
+        let numbers = std::iter::once(role).chain(fields).collect();
         let sum = self.channel.execute(DIFFERENTIATE, numbers)?;
         Ok(sum.as_chunks::<3>().0.to_vec())
     }
@@ -114,8 +121,12 @@ impl FieldHandler {
     fn differentiate(&self, numbers: &[f64], ranks: &dyn Communicator) -> Result<Vec<f64>, String> {
         let mesh = self.mesh.as_ref().ok_or("there is no mesh yet")?;
         let report = LinearSolverReport { iterations: 0, residual: 0.0 };
+        let (role, numbers) = numbers.split_first().ok_or("there is no state")?;
         let (state, lambda) = numbers.split_at(numbers.len() / 2);
-        let state = FieldSolution::state(complex_of(state), report);
+        let state = match *role {
+            STATE => FieldSolution::state(complex_of(state), report),
+            _ => FieldSolution::adjoint(complex_of(state), report),
+        };
         let lambda = FieldSolution::adjoint(complex_of(lambda), report);
         let local = self.model.discretisation().local.as_ref();
         let triangles = local.map(|local| local.owned_triangles.as_slice());

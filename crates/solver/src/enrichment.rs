@@ -13,9 +13,12 @@
 //!
 //! Does not live here: sums over terms and frequencies, and what is done with the number.
 
+use std::collections::BTreeMap;
+
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 
+use crate::circuit::Excitation;
 use crate::error::SolverError;
 use crate::linear::{LinearSolver, LinearSolverSettings, Method, PreparedSystem, Reuse};
 use crate::model::{FieldModel, FieldModelSetup};
@@ -58,7 +61,20 @@ pub struct Enrichment {
     field: Vec<c64>,
     residual: Vec<c64>,
     correction: Vec<c64>,
+    /// Currents that voltages drive [A]: of the first order, and their corrections.
+    currents: [Vec<c64>; 2],
+    /// By the place of a winding.
+    responses: BTreeMap<usize, Response>,
     iterations: usize,
+}
+
+/// The response to 1 A in a winding.
+#[derive(Debug)]
+struct Response {
+    /// Of the first order.
+    field: Vec<c64>,
+    residual: Vec<c64>,
+    correction: Vec<c64>,
 }
 
 /// What the dual problem says.
@@ -135,11 +151,63 @@ impl Enrichment {
         prolongation.mul(state.values(), &mut field);
         let matrix = model.assemble(mesh);
         let mut residual = model.load(mesh);
+        let currents = state.currents().to_vec();
+        model.windings().add_driven_load(&currents, &mut residual);
         subtract_product(&matrix, &field, &mut residual);
         let mut system = model.prepare(matrix)?;
-        let (correction, report) = system.solve(&residual)?;
-        let iterations = report.iterations;
-        Ok(Self { model, system, prolongation, field, residual, correction, iterations })
+        // First-order functions are second-order ones, so that the circuits' equations hold as they did.
+        let (correction, report, driven) = system.solve_with(&residual, Excitation::Given(&[]))?;
+        Ok(Self {
+            model,
+            system,
+            prolongation,
+            field,
+            residual,
+            correction,
+            currents: [currents, driven],
+            responses: BTreeMap::new(),
+            iterations: report.iterations,
+        })
+    }
+
+    /// The correction of the response to 1 A in a winding; again only where it is not known yet.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    ///
+    /// # Panics
+    /// If several ranks solve.
+    pub fn respond(&mut self, winding: usize, coarse: &FieldSolution) -> Result<(), SolverError> {
+        if self.responses.contains_key(&winding) {
+            return Ok(());
+        }
+        let mut field = vec![c64::default(); self.field.len()];
+        self.prolongation.mul(coarse.values(), &mut field);
+        let mut residual = self.model.windings().load(winding).to_vec();
+        let matrix = self.system.matrix().expect("an estimate is made in one process");
+        subtract_product(matrix, &field, &mut residual);
+        let (correction, report) = self.system.solve_field(&residual)?;
+        self.iterations += report.iterations;
+        self.responses.insert(winding, Response { field, residual, correction });
+        Ok(())
+    }
+
+    /// What each element adds to the error of a function of inductances with these derivatives
+    /// ([`crate::FunctionalValue::inductances`]): `2 Re Σ ∂F/∂L_jk (W_j⁺ − W_j)ᵀ r_k`, by the functions that only the second order has.
+    pub fn weigh_inductances(&self, coarse: &FieldModel, derivatives: &[(usize, usize, c64)]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.model.space().element_count()];
+        for (j, k, derivative) in derivatives {
+            let (Some(first), Some(second)) = (self.responses.get(j), self.responses.get(k)) else {
+                continue;
+            };
+            let with = |(u, e): (&c64, &c64)| u + e;
+            let dual = first.field.iter().zip(&first.correction).map(with).collect();
+            let surplus = self.without_first_order(coarse.unknowns(), dual);
+            let terms = surplus.iter().zip(&second.residual);
+            let weighted: Vec<f64> = terms.map(|(z, r)| 2.0 * (derivative * z * r).re).collect();
+            sum.iter_mut().zip(self.by_element(&weighted)).for_each(|(sum, own)| *sum += own);
+        }
+        sum
     }
 
     /// The second-order model.
@@ -154,8 +222,15 @@ impl Enrichment {
 
     /// The state with a share of its correction: 0 is the first-order field, 1 nearly that of second order.
     pub fn state(&self, share: f64) -> FieldSolution {
-        let with = |(u, e): (&c64, &c64)| u + share * e;
-        FieldSolution::of_state(self.field.iter().zip(&self.correction).map(with).collect())
+        let sum =
+            |u: &[c64], e: &[c64]| -> Vec<c64> { u.iter().zip(e).map(|(u, e)| u + share * e).collect() };
+        let currents = sum(&self.currents[0], &self.currents[1]);
+        let mut state = FieldSolution::of_state(sum(&self.field, &self.correction)).with_currents(currents);
+        for (winding, response) in &self.responses {
+            let values = sum(&response.field, &response.correction);
+            state.respond(*winding, FieldSolution::adjoint(values, state.report()));
+        }
+        state
     }
 
     /// Weighs the residual with the solution of the dual problem for `∂F/∂u` at half the correction.
@@ -170,6 +245,7 @@ impl Enrichment {
         let (dual, report) = self.system.solve(derivative)?;
         self.iterations += report.iterations;
         let mut rest = self.residual.clone();
+        self.model.windings().add_driven_load(&self.currents[1], &mut rest);
         let matrix = self.system.matrix().expect("an estimate is made in one process");
         subtract_product(matrix, &self.correction, &mut rest);
         let remainder = dual.iter().zip(&rest).map(|(z, r)| 2.0 * (z * r).re).sum();

@@ -28,6 +28,7 @@ mod load;
 mod local_entities;
 pub mod material;
 pub mod model;
+pub mod multipole;
 pub mod newton;
 mod nonlinear;
 pub mod open;

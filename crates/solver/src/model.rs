@@ -325,6 +325,23 @@ impl FieldModel {
         Ok(FieldSolution::state(values, report).with_currents(currents))
     }
 
+    /// Solves for 1 A in a winding by its place, which the state then holds as its response; again only where it does not yet.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve_field`].
+    pub fn respond(
+        &self,
+        system: &mut PreparedSystem,
+        winding: usize,
+        state: &mut FieldSolution,
+    ) -> Result<(), SolverError> {
+        if state.response(winding).is_none() {
+            let (values, report) = system.solve_field(self.windings().load(winding))?;
+            state.respond(winding, FieldSolution::adjoint(values, report));
+        }
+        Ok(())
+    }
+
     /// What defines the problem.
     pub fn setup(&self) -> &FieldModelSetup {
         &self.setup

@@ -1,5 +1,8 @@
 //! The solved field: potentials at nodes; B, J and loss in elements.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::volume;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
@@ -18,7 +21,7 @@ use crate::surface::SurfaceTerm;
 enum Role {
     /// The field: fixed components have their prescribed values.
     State,
-    /// The adjoint: fixed components are zero.
+    /// The adjoint, or the response to 1 A in a coil: fixed components are zero, and no magnet acts.
     Adjoint,
 }
 
@@ -32,11 +35,13 @@ pub struct FieldSolution {
     newton_steps: usize,
     /// Of voltage-driven coils [A].
     currents: Vec<c64>,
+    /// `K⁻¹F` by the place of a winding, where it was asked for.
+    responses: BTreeMap<usize, Arc<FieldSolution>>,
 }
 
 impl FieldSolution {
     pub(crate) fn state(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::State, report, newton_steps: 0, currents: Vec::new() }
+        Self::new(values, Role::State, report)
     }
 
     /// The same with the currents [A] that voltages drive.
@@ -55,7 +60,26 @@ impl FieldSolution {
     }
 
     pub(crate) fn adjoint(values: Vec<c64>, report: LinearSolverReport) -> Self {
-        Self { values, role: Role::Adjoint, report, newton_steps: 0, currents: Vec::new() }
+        Self::new(values, Role::Adjoint, report)
+    }
+
+    fn new(values: Vec<c64>, role: Role, report: LinearSolverReport) -> Self {
+        Self { values, role, report, newton_steps: 0, currents: Vec::new(), responses: BTreeMap::new() }
+    }
+
+    /// Whether sources and prescribed values act in it: not in an adjoint, nor in the response to 1 A.
+    pub(crate) fn is_state(&self) -> bool {
+        self.role == Role::State
+    }
+
+    /// The response to 1 A in a winding by its place; `None` where it was not solved for.
+    pub fn response(&self, winding: usize) -> Option<&Self> {
+        self.responses.get(&winding).map(Arc::as_ref)
+    }
+
+    /// The same with the response of a winding.
+    pub(crate) fn respond(&mut self, winding: usize, response: Self) {
+        self.responses.insert(winding, Arc::new(response));
     }
 
     /// The same, found in some steps of Newton's method.

@@ -11,7 +11,9 @@ use fluxmorph_geometry::generate::{
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::circuit::terminals;
 use fluxmorph_solver::coil::{Coil, Corner, Frame, Racetrack};
+use fluxmorph_solver::functional::{MirrorPlane, Multipoles};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{
     Boundary, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding,
     adjoint,
@@ -116,6 +118,49 @@ fn inductances_of_coaxial_coils_are_those_of_their_filaments() {
     assert!((energy / field - 1.0).abs() < 1e-8, "{energy} {field}");
     let linkage = matrix[0][0] * currents[0] + matrix[0][1] * currents[1];
     assert!((seen.coils[0].flux_linkage.re / linkage - 1.0).abs() < 1e-9);
+}
+
+/// The field along the axis of two coils in a ball between them, against the Gegenbauer series of their filaments.
+#[test]
+fn spherical_harmonics_between_two_coils_are_those_of_their_filaments() {
+    let (radii, side, d) = ([0.045, 0.035], 0.014, 0.04);
+    let (mesh, model) = two_coils(radii, side, d, 8);
+    let (solution, _) = model.solve(&mesh).expect("it is solved");
+    let (centre, radius, order) = ([0.0, 0.0, 0.06], 0.012, 3);
+    let frame = Frame::new(centre, [0.0, 0.0, 1.0], None).expect("a frame");
+    let planes = [0, 1].map(|axis| MirrorPlane { axis, at: 0.0, across: -1.0 });
+    let expansion = Expansion::ball(&frame, radius, order);
+    let multipoles = Multipoles::new(&model, &mesh, "ball", &expansion, &planes).expect("inside");
+    // B_z on the axis of a circle of radius a at the distance h: μ0 I a²/(2 s³) Σ (z/s)^n C_n(h/s), s² = a² + h².
+    let series = |n: usize, a: f64, h: f64| {
+        let s = a.hypot(h);
+        let x = h / s;
+        let (mut before, mut value) = (0.0, 1.0);
+        for k in 1..=n {
+            let next = ((2 * k + 1) as f64 * x * value - (k + 1) as f64 * before) / k as f64;
+            (before, value) = (value, next);
+        }
+        0.5 * VACUUM_PERMEABILITY * a * a / s.powi(3) * (radius / s).powi(n as i32) * value
+    };
+    let parts = 20;
+    let place = |i: usize| ((i as f64 + 0.5) / f64::from(parts) - 0.5) * side;
+    let winding = |n: usize, a: f64, h: f64| {
+        let cells = (0..parts as usize).flat_map(|i| (0..parts as usize).map(move |j| (i, j)));
+        cells.map(|(i, j)| series(n, a + place(i), h + place(j))).sum::<f64>() / f64::from(parts * parts)
+    };
+    let found = multipoles.coefficients(&model, &mesh, &solution);
+    let main = found[0].1.re;
+    for (term, value) in found {
+        let exact = match term {
+            Harmonic::Cosine(n, 0) => {
+                7.0 * winding(n, radii[0], 0.5 * d) + 3.0 * winding(n, radii[1], -0.5 * d)
+            }
+            _ => 0.0,
+        };
+        println!("{term:?}: {:.6e}, exact {exact:.6e}", value.re);
+        // Half a percent of the main field: the mesh has four cells between the coils.
+        assert!((value.re - exact).abs() < 0.005 * main, "{term:?}: {value} {exact}");
+    }
 }
 
 fn over_a_plate(mesh: &Mesh, winding: Winding, ampere_turns: f64) -> FieldModel {

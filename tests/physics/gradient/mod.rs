@@ -11,6 +11,7 @@ use crate::support::folder::read_text;
 use crate::support::shield::quick;
 use crate::support::{changed, setup, setup_of};
 
+mod circuits;
 mod functionals;
 mod saturation;
 mod sources;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::summary::{FieldProblem, Summary};
 use super::table::{Align, Table};
-use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, UpperBound};
+use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, ValueBound};
 use crate::files::shell_word;
 
 /// Names stand in a column of this width: the longest is `design variables`.
@@ -152,12 +152,14 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 
 /// A constraint in words.
 fn bound_of(constraint: &Constraint) -> String {
-    let upper = |bound: &UpperBound| match bound {
-        UpperBound::Value(upper) => format!("at most {upper:e} in SI"),
-        UpperBound::Ratio(upper_ratio) => format!("at most {upper_ratio} times that of the initial design"),
+    let value = |bound: &ValueBound| match bound {
+        ValueBound::AtMost(upper) => format!("at most {upper:e} in SI"),
+        ValueBound::AtMostRatio(ratio) => format!("at most {ratio} times that of the initial design"),
+        ValueBound::AtLeast(lower) => format!("at least {lower:e} in SI"),
+        ValueBound::AtLeastRatio(ratio) => format!("at least {ratio} times that of the initial design"),
     };
     let bounds = match &constraint.limit {
-        Limit::Field { bound, .. } | Limit::Body { bound, .. } => upper(bound),
+        Limit::Field { bound, .. } | Limit::Body { bound, .. } => value(bound),
         Limit::Thickness { minimum, maximum, .. } => {
             let side =
                 |word: &str, value: &Option<f64>| value.map(|t| format!("{word} {} mm", millimetre(t)));

@@ -14,6 +14,7 @@ use super::force::ForceBody;
 use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
+use super::multipole::MultipoleSet;
 use super::objective::{Objective, Probe};
 use super::open::Open;
 use super::optimizer::Optimizer;
@@ -25,8 +26,17 @@ use crate::config::table::table;
 use crate::config::text::source::SourceMap;
 
 /// The tables that only mean something to a field problem.
-const OF_THE_FIELD: [&str; 8] =
-    ["coils", "forces", "objective", "boundaries", "open", "constraints", "materials", "regions"];
+const OF_THE_FIELD: [&str; 9] = [
+    "coils",
+    "forces",
+    "multipoles",
+    "objective",
+    "boundaries",
+    "open",
+    "constraints",
+    "materials",
+    "regions",
+];
 
 table! {
     /// The configuration of a run of Fluxmorph. A quantity is a text with a unit, such as "10 mm", or a bare number in SI.
@@ -47,6 +57,8 @@ table! {
         boundaries: Boundaries = TABLE => Boundaries::default();
         /// Bodies on which the force is reported.
         forces: Vec<ForceBody> = TABLES => Vec::new();
+        /// Circles and balls in which the field is expanded.
+        multipoles: Vec<MultipoleSet> = TABLES => Vec::new();
         /// Open space around the mesh.
         open: Option<Open> = TABLE;
         /// What is optimised; needed by `run` and `gradient`.
@@ -93,6 +105,8 @@ impl Config {
         root.named_twice("coils", coils, "coils", "a different name for each coil");
         let forces = self.forces.iter().map(|force| &force.name);
         root.named_twice("forces", forces, "forces", "a different name for each body");
+        let multipoles = self.multipoles.iter().map(|set| &set.name);
+        root.named_twice("multipoles", multipoles, "multipoles", "a different name for each expansion");
         self.check_functionals(root, frequencies);
         let constraints = self.constraints.iter().map(|constraint| &constraint.name);
         root.named_twice("constraints", constraints, "constraints", "a different `name` for each constraint");

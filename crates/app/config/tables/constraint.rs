@@ -55,8 +55,12 @@ table! {
     pub(in crate::config) struct LimitKeys {
         /// What is limited: a quantity of the field, a volume or mass, or the thickness of the body.
         kind: Kind = WORD, need "\"volume\"";
-        /// The region it is measured in. Required, but for `energy` and `thickness`.
+        /// The region it is measured in. Required, but for `energy`, `thickness` and quantities of `coils`.
         region: Option<String> = TEXT;
+        /// As in `[objective]`.
+        coils: Option<Vec<String>> = not_empty(NAMES);
+        /// As in `[objective]`.
+        harmonics: Option<Vec<String>> = not_empty(NAMES);
         /// As in `[objective]`.
         weighting: Option<Weighting> = WORD;
         /// As in `[objective]`.
@@ -68,10 +72,15 @@ table! {
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// As in `[objective]`.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
-        /// The greatest value, in the unit of the kind: `"20 W"`, `"2.5 kg"`. Either this or `upper_ratio`.
+        /// The greatest value, in the unit of the kind: `"20 W"`, `"2.5 kg"`. One of this, `upper_ratio`, `lower` and
+        /// `lower_ratio`.
         upper: Option<Unread> = SOME_QUANTITY;
         /// The greatest value as a multiple of that of the initial design, which must be positive.
         upper_ratio: Option<f64> = number(POSITIVE);
+        /// The least value, in the unit of the kind: `"15 uH"`.
+        lower: Option<Unread> = SOME_QUANTITY;
+        /// The least value as a multiple of that of the initial design, which must be positive.
+        lower_ratio: Option<f64> = number(POSITIVE);
         /// For `thickness`: the least thickness at every place [m]. At least one of `minimum` and `maximum` is needed.
         minimum: Option<f64> = length(POSITIVE);
         /// For `thickness`: the greatest thickness [m].
@@ -82,16 +91,34 @@ table! {
 }
 
 /// The keys of a functional of the field.
-const OF_A_FIELD: [&str; 5] = ["weighting", "target", "compare", "direction", "frequency"];
+const OF_A_FIELD: [&str; 7] =
+    ["coils", "harmonics", "weighting", "target", "compare", "direction", "frequency"];
 /// The keys of a bound on a value.
-const BOUNDS: [&str; 2] = ["upper", "upper_ratio"];
+const BOUNDS: [&str; 4] = ["upper", "upper_ratio", "lower", "lower_ratio"];
 /// The keys of a bound on a thickness.
 const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
 /// The keys that a thickness does not have.
-const NOT_OF_A_THICKNESS: [&str; 8] =
-    ["region", "weighting", "target", "compare", "direction", "frequency", "upper", "upper_ratio"];
+const NOT_OF_A_THICKNESS: [&str; 12] = [
+    "region",
+    "coils",
+    "harmonics",
+    "weighting",
+    "target",
+    "compare",
+    "direction",
+    "frequency",
+    "upper",
+    "upper_ratio",
+    "lower",
+    "lower_ratio",
+];
 
 impl LimitKeys {
+    /// `upper_ratio` and `lower_ratio`.
+    fn ratios(&self) -> [Option<f64>; 2] {
+        [self.upper_ratio, self.lower_ratio]
+    }
+
     /// The keys that go with other kinds.
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("kind", &WORD) {
@@ -132,12 +159,27 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
         (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
         (is("kind", &["force"]), Dimension::Force, Range::FINITE),
         (is("kind", &["torque"]), Dimension::Torque, Range::FINITE),
+        (is("kind", &["inductance"]), Dimension::Inductance, Range::POSITIVE),
+        (is("kind", &["mutual_inductance"]), Dimension::Inductance, Range::FINITE),
+        (is("kind", &["coupling", "power_factor"]), Dimension::Ratio, Range::FINITE),
+        (
+            is("kind", &["quality_factor", "link_efficiency", "multipole_content"]),
+            Dimension::Ratio,
+            Range::POSITIVE,
+        ),
+        (is("kind", &["multipole"]), Dimension::FluxDensity, Range::FINITE),
+        (is("kind", &["resistance"]), Dimension::Resistance, Range::POSITIVE),
+        (is("kind", &["flux_linkage"]), Dimension::FluxLinkage, Range::FINITE),
+        (is("kind", &["current"]), Dimension::Current, Range::POSITIVE),
+        (is("kind", &["voltage"]), Dimension::Voltage, Range::POSITIVE),
+        (is("kind", &["power"]), Dimension::Power, Range::FINITE),
         (is("kind", &["volume"]), Dimension::Volume, Range::POSITIVE),
         (is("kind", &["mass"]), Dimension::Mass, Range::POSITIVE),
     ];
     for (condition, dimension, range) in units {
-        let upper = rules.definitions.quantity(dimension, range);
-        rules = rules.add(json!({ "if": condition, "then": { "properties": { "upper": upper } } }));
+        let bound = rules.definitions.quantity(dimension, range);
+        let bounds = json!({ "upper": bound, "lower": bound });
+        rules = rules.add(json!({ "if": condition, "then": { "properties": bounds } }));
     }
     rules
 }
@@ -146,16 +188,16 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Limit {
-    /// A functional of the field, from above.
+    /// A functional of the field, from one side.
     Field {
         /// What is measured.
         #[serde(flatten)]
         functional: Functional,
         /// Its bound.
         #[serde(flatten)]
-        bound: UpperBound,
+        bound: ValueBound,
     },
-    /// Volume or mass of a region, from above.
+    /// Volume or mass of a region, from one side.
     Body {
         /// Which of them.
         kind: BodyKind,
@@ -163,7 +205,7 @@ pub enum Limit {
         region: String,
         /// Its bound.
         #[serde(flatten)]
-        bound: UpperBound,
+        bound: ValueBound,
     },
     /// Thickness of the designed body along the direction of the design; at least one bound.
     Thickness {
@@ -209,10 +251,36 @@ choice! {
         Loss = "loss",
         /// As in `[objective]`.
         Energy = "energy",
-        /// As in `[objective]`; a least force is a bound on the force in the opposite `direction`.
+        /// As in `[objective]`.
         Force = "force",
         /// As in `[objective]`.
         Torque = "torque",
+        /// As in `[objective]`.
+        Inductance = "inductance",
+        /// As in `[objective]`.
+        MutualInductance = "mutual_inductance",
+        /// As in `[objective]`.
+        Coupling = "coupling",
+        /// As in `[objective]`.
+        Resistance = "resistance",
+        /// As in `[objective]`.
+        QualityFactor = "quality_factor",
+        /// As in `[objective]`.
+        LinkEfficiency = "link_efficiency",
+        /// As in `[objective]`.
+        FluxLinkage = "flux_linkage",
+        /// As in `[objective]`.
+        Current = "current",
+        /// As in `[objective]`.
+        Voltage = "voltage",
+        /// As in `[objective]`.
+        Power = "power",
+        /// As in `[objective]`.
+        PowerFactor = "power_factor",
+        /// As in `[objective]`.
+        Multipole = "multipole",
+        /// As in `[objective]`.
+        MultipoleContent = "multipole_content",
         /// Volume of a region [m³], meshed or replaced by its impedance surface.
         Volume = "volume",
         /// Mass of a region [kg], by the `density` of its material.
@@ -222,15 +290,21 @@ choice! {
     }
 }
 
-/// An upper bound.
+/// A bound on a value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub enum UpperBound {
-    /// In SI.
+pub enum ValueBound {
+    /// From above, in SI.
     #[serde(rename = "upper")]
-    Value(f64),
-    /// As a multiple of the initial design's value.
+    AtMost(f64),
+    /// From above, as a multiple of the initial design's value.
     #[serde(rename = "upper_ratio")]
-    Ratio(f64),
+    AtMostRatio(f64),
+    /// From below, in SI.
+    #[serde(rename = "lower")]
+    AtLeast(f64),
+    /// From below, as a multiple of the initial design's value.
+    #[serde(rename = "lower_ratio")]
+    AtLeastRatio(f64),
 }
 
 impl Constraint {
@@ -241,12 +315,14 @@ impl Constraint {
         if !self.name.is_empty() {
             return;
         }
-        let region = match &self.limit {
-            Limit::Field { functional, .. } => functional.region.as_deref(),
-            Limit::Body { region, .. } => Some(region.as_str()),
+        let of = match &self.limit {
+            Limit::Field { functional, .. } => {
+                functional.coils.as_ref().map(|coils| coils.join("_")).or_else(|| functional.region.clone())
+            }
+            Limit::Body { region, .. } => Some(region.clone()),
             Limit::Thickness { .. } => None,
         };
-        self.name = Column::of(&region.map_or(kind.name().to_owned(), |r| format!("{}_{r}", kind.name())));
+        self.name = Column::of(&of.map_or(kind.name().to_owned(), |of| format!("{}_{of}", kind.name())));
     }
 }
 
@@ -266,6 +342,19 @@ impl Group for Limit {
             Kind::Energy => ObjectiveKind::Energy,
             Kind::Force => ObjectiveKind::Force,
             Kind::Torque => ObjectiveKind::Torque,
+            Kind::Inductance => ObjectiveKind::Inductance,
+            Kind::MutualInductance => ObjectiveKind::MutualInductance,
+            Kind::Coupling => ObjectiveKind::Coupling,
+            Kind::Resistance => ObjectiveKind::Resistance,
+            Kind::QualityFactor => ObjectiveKind::QualityFactor,
+            Kind::LinkEfficiency => ObjectiveKind::LinkEfficiency,
+            Kind::FluxLinkage => ObjectiveKind::FluxLinkage,
+            Kind::Current => ObjectiveKind::Current,
+            Kind::Voltage => ObjectiveKind::Voltage,
+            Kind::Power => ObjectiveKind::Power,
+            Kind::PowerFactor => ObjectiveKind::PowerFactor,
+            Kind::Multipole => ObjectiveKind::Multipole,
+            Kind::MultipoleContent => ObjectiveKind::MultipoleContent,
             Kind::Volume => return Self::body(BodyKind::Volume, Dimension::Volume, written, section),
             Kind::Mass => return Self::body(BodyKind::Mass, Dimension::Mass, written, section),
             Kind::Thickness => return Self::thickness(&written, section),
@@ -276,14 +365,14 @@ impl Group for Limit {
 
 impl Limit {
     fn field(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
-        let LimitKeys { region, weighting, target, compare, direction, frequency, upper_ratio, .. } = written;
-        let mut functional = Functional { kind, region, weighting, target, compare, direction, frequency };
+        let ratios = written.ratios();
+        let LimitKeys { region, coils, harmonics, weighting, target, compare, direction, frequency, .. } =
+            written;
+        let mut functional =
+            Functional { kind, region, coils, harmonics, weighting, target, compare, direction, frequency };
         functional.check(section);
-        let range = match kind {
-            ObjectiveKind::FieldComponent | ObjectiveKind::Force | ObjectiveKind::Torque => Range::FINITE,
-            _ => Range::POSITIVE,
-        };
-        let bound = UpperBound::of(upper_ratio, section, functional.dimension(), range);
+        let range = if kind.may_be_negative() { Range::FINITE } else { Range::POSITIVE };
+        let bound = ValueBound::of(ratios, section, functional.dimension(), range);
         Self::Field { functional, bound }
     }
 
@@ -291,7 +380,7 @@ impl Limit {
         if !section.has("region") {
             section.missing(&["region"], "region = \"plate\"");
         }
-        let bound = UpperBound::of(written.upper_ratio, section, dimension, Range::POSITIVE);
+        let bound = ValueBound::of(written.ratios(), section, dimension, Range::POSITIVE);
         Self::Body { kind, region: written.region.unwrap_or_default(), bound }
     }
 
@@ -310,20 +399,26 @@ impl Limit {
     }
 }
 
-impl UpperBound {
-    fn of(ratio: Option<f64>, section: &Section<'_>, dimension: Dimension, range: Range) -> Self {
-        let value = section.read("upper", &quantity(dimension, range));
-        match BOUNDS.map(|key| section.has(key)) {
-            [true, true] => {
-                let message = format!("`{}` has both `upper` and `upper_ratio`", section.path());
-                section.clash(BOUNDS, message, "one of them");
-            }
-            [false, false] => {
+impl ValueBound {
+    fn of(ratios: [Option<f64>; 2], section: &Section<'_>, dimension: Dimension, range: Range) -> Self {
+        let [upper, lower] = ["upper", "lower"].map(|key| section.read(key, &quantity(dimension, range)));
+        let written: Vec<&str> = BOUNDS.into_iter().filter(|key| section.has(key)).collect();
+        match written[..] {
+            [] => {
                 let example = format!("upper = \"{}\", or upper_ratio = 0.9", dimension.example());
                 section.missing(&BOUNDS, &example);
             }
-            _ => {}
+            [_] => {}
+            [first, second, ..] => {
+                let message = format!("`{}` has both `{first}` and `{second}`", section.path());
+                section.clash([first, second], message, "one of them");
+            }
         }
-        ratio.map_or(Self::Value(value.unwrap_or(f64::NAN)), Self::Ratio)
+        match (written.first(), ratios) {
+            (Some(&"upper_ratio"), [Some(ratio), _]) => Self::AtMostRatio(ratio),
+            (Some(&"lower_ratio"), [_, Some(ratio)]) => Self::AtLeastRatio(ratio),
+            (Some(&"lower"), _) => Self::AtLeast(lower.unwrap_or(f64::NAN)),
+            _ => Self::AtMost(upper.unwrap_or(f64::NAN)),
+        }
     }
 }

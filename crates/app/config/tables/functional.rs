@@ -1,8 +1,10 @@
 //! What is measured of the field: the keys that `[objective]`, its terms and `[[constraints]]` share.
 
+use serde_json::{Value, json};
+
 use super::design::{COMPONENTS, unit_vector};
 use crate::config::section::Section;
-use crate::config::table::rules::{Rules, Then};
+use crate::config::table::rules::{Rules, Then, is};
 use crate::config::table::table;
 use crate::config::text::dimension::Dimension;
 use crate::config::value::choice::choice;
@@ -12,9 +14,15 @@ table! {
     pub struct Functional {
         /// What is measured. The default is the paper's objective.
         kind: ObjectiveKind = WORD => ObjectiveKind::FluxDensitySquared;
-        /// The region it is measured in; for `force` and `torque` a body of `[[forces]]`. Required, but for `energy`: without it
-        /// the energy is that of everything that is meshed.
+        /// The region it is measured in; for `force` and `torque` a body of `[[forces]]`, for `multipole` and `multipole_content` an
+        /// expansion of `[[multipoles]]`. Required, but for `energy`: without it the energy is that of everything that is meshed; and
+        /// but for quantities of `coils`.
         region: Option<String> = TEXT;
+        /// For quantities of coils, required: the coils with `turns` that it is of, one or two as the kind says.
+        coils: Option<Vec<String>> = not_empty(NAMES);
+        /// For `multipole` and `multipole_content`, required: terms of the expansion, such as `"b3"` and `"a2"` on a circle, `"c2_0"` and
+        /// `"s2_1"` (n_m) in a ball; of `multipole` one.
+        harmonics: Option<Vec<String>> = not_empty(NAMES);
         /// For `flux_density_squared`, `target_field` and `homogeneity`: how the cells of the region are weighted. Default
         /// `"point"`, as in the paper; of `homogeneity` `"volume"`.
         weighting: Option<Weighting> = WORD;
@@ -37,16 +45,45 @@ pub(super) const TARGET_FIELD: [&str; 2] = ["target_field", "uniformity"];
 /// Kinds that are a component.
 const DIRECTED: [&str; 3] = ["field_component", "force", "torque"];
 
+/// Kinds of one coil.
+const OF_ONE_COIL: [&str; 8] = [
+    "flux_linkage",
+    "current",
+    "voltage",
+    "power",
+    "power_factor",
+    "inductance",
+    "resistance",
+    "quality_factor",
+];
+
+/// Kinds of two coils.
+const OF_TWO_COILS: [&str; 3] = ["mutual_inductance", "coupling", "link_efficiency"];
+
+/// Kinds of an expansion.
+const OF_TERMS: [&str; 2] = ["multipole", "multipole_content"];
+
 /// Kinds that may have one.
 const MAY_BE_DIRECTED: [&str; 4] = ["field_component", "force", "torque", "homogeneity"];
 
 /// Which keys go with which kind.
 pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
+    let of_coils = [&OF_ONE_COIL[..], &OF_TWO_COILS].concat();
+    let of_one = json!({ "maxItems": 1 });
+    let of_two = json!({ "minItems": 2, "maxItems": 2 });
+    let count = |kinds: &[&str], items: &Value| json!({ "if": is("kind", kinds), "then": { "properties": { "coils": items } } });
     rules
-        .unless("kind", &["energy"], Then { required: &["region"], refused: &[] })
+        .unless("kind", &[&["energy"], &of_coils[..]].concat(), Then { required: &["region"], refused: &[] })
+        .when("kind", &of_coils, Then { required: &["coils"], refused: &["region"] })
+        .unless("kind", &of_coils, Then { required: &[], refused: &["coils"] })
+        .when("kind", &OF_TERMS, Then { required: &["harmonics"], refused: &[] })
+        .unless("kind", &OF_TERMS, Then { required: &[], refused: &["harmonics"] })
+        .add(json!({ "if": is("kind", &["multipole"]), "then": { "properties": { "harmonics": of_one } } }))
+        .add(count(&OF_ONE_COIL, &of_one))
+        .add(count(&OF_TWO_COILS, &of_two))
         .when(
             "kind",
-            &["field_component", "loss", "energy", "force", "torque"],
+            &[&["field_component", "loss", "energy", "force", "torque"], &OF_TERMS[..], &of_coils].concat(),
             Then { required: &[], refused: &["weighting"] },
         )
         .when("kind", &TARGET_FIELD, Then { required: &["target"], refused: &[] })
@@ -82,6 +119,36 @@ choice! {
         Force = "force",
         /// Torque on a body of `[[forces]]` along `direction` about its point `about` [N m]. The body may move.
         Torque = "torque",
+        /// Inductance of a coil [H], of the meshed part.
+        Inductance = "inductance",
+        /// Mutual inductance of two coils [H].
+        MutualInductance = "mutual_inductance",
+        /// Coupling factor of two coils: mutual inductance over the root of the product of their inductances [1].
+        Coupling = "coupling",
+        /// Resistance of a coil [Ω]: that of its wire, and that of the losses which its current alone makes in the field; needs a
+        /// frequency above 0.
+        Resistance = "resistance",
+        /// Quality factor of a coil [1]: its reactance over its resistance; needs a frequency above 0.
+        QualityFactor = "quality_factor",
+        /// The largest share of the power into one of two coils that a load at the other can take, with the best compensation [1];
+        /// needs a frequency above 0.
+        LinkEfficiency = "link_efficiency",
+        /// Flux linkage of a coil [Wb]; in harmonics the magnitude of its phasor.
+        FluxLinkage = "flux_linkage",
+        /// Magnitude of the current [A] of a coil that a voltage drives; needs a frequency above 0.
+        Current = "current",
+        /// Magnitude of the voltage [V] across a coil with its resistance, without what else is in series; needs a frequency above 0.
+        Voltage = "voltage",
+        /// Power into a coil, time average [W]; needs a frequency above 0.
+        Power = "power",
+        /// Power factor [1] of a coil with what is in series with it: its power over half the product of the magnitudes of voltage and
+        /// current; needs a frequency above 0.
+        PowerFactor = "power_factor",
+        /// One of the `harmonics` of an expansion [T]; in harmonics the magnitude of its phasor. What is expanded must not move.
+        Multipole = "multipole",
+        /// How much of some `harmonics` an expansion has: their summed squares over those of the main order [1], the square of what
+        /// builders of magnets give in units of 1e-4. What is expanded must not move.
+        MultipoleContent = "multipole_content",
     }
 }
 
@@ -113,6 +180,60 @@ impl ObjectiveKind {
         matches!(self, Self::FluxDensitySquared | Self::TargetField | Self::Homogeneity)
     }
 
+    /// Whether its values have either sign.
+    pub(super) fn may_be_negative(self) -> bool {
+        matches!(
+            self,
+            Self::FieldComponent
+                | Self::Force
+                | Self::Torque
+                | Self::MutualInductance
+                | Self::Coupling
+                | Self::PowerFactor
+                | Self::FluxLinkage
+                | Self::Power
+                | Self::Multipole
+        )
+    }
+
+    /// How many coils it is of.
+    pub fn coils(self) -> usize {
+        match self.name() {
+            name if OF_ONE_COIL.contains(&name) => 1,
+            name if OF_TWO_COILS.contains(&name) => 2,
+            _ => 0,
+        }
+    }
+
+    /// Whether it has a meaning at 0 Hz.
+    pub fn may_be_static(self) -> bool {
+        self.why_not_static().is_none()
+    }
+
+    /// Whether it has no meaning at 0 Hz, and why.
+    fn why_not_static(self) -> Option<&'static str> {
+        match self {
+            Self::Loss => Some("a loss at 0 Hz, where no current is induced"),
+            Self::Resistance | Self::QualityFactor | Self::LinkEfficiency => {
+                Some("of losses at 0 Hz, where no current is induced")
+            }
+            Self::Current | Self::Voltage | Self::Power | Self::PowerFactor => {
+                Some("of a coil at 0 Hz, where no shape changes it")
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether it is of an expansion of `[[multipoles]]`.
+    pub fn is_of_terms(self) -> bool {
+        matches!(self, Self::Multipole | Self::MultipoleContent)
+    }
+
+    /// Whether its `region` is one of the mesh.
+    pub fn is_of_a_region(self) -> bool {
+        !self.is_of_a_body() && !self.is_of_terms()
+    }
+
     /// Whether it acts on a body of `[[forces]]`.
     pub fn is_of_a_body(self) -> bool {
         matches!(self, Self::Force | Self::Torque)
@@ -127,10 +248,28 @@ impl Functional {
         let is_component =
             DIRECTED.contains(&kind.name()) || is_homogeneity && self.compare == Some(Compared::Component);
         let takes_direction = is_component || is_homogeneity && self.compare.is_none();
-        if !section.has("region") && kind != ObjectiveKind::Energy {
+        if !section.has("region") && kind != ObjectiveKind::Energy && kind.coils() == 0 {
             section.missing(&["region"], "region = \"observation\"");
         }
+        let example = ["", "coils = [\"coil\"]", "coils = [\"one\", \"other\"]"][kind.coils()];
+        if let Some(named) = &self.coils
+            && kind.coils() > 0
+            && named.len() != kind.coils()
+        {
+            let message =
+                format!("`{}` is of {} coils, and {} are named", kind.name(), kind.coils(), named.len());
+            section.wrong("coils", message, example);
+        }
+        if let Some(named) = self.harmonics.as_ref().filter(|_| kind == ObjectiveKind::Multipole)
+            && named.len() > 1
+        {
+            let message = format!("`multipole` is one term, and {} are named", named.len());
+            section.wrong("harmonics", message, "one of them, or the kind multipole_content");
+        }
         for (key, example, wanted) in [
+            ("harmonics", Some("harmonics = [\"b3\"]"), kind.is_of_terms()),
+            ("coils", Some(example), kind.coils() > 0),
+            ("region", None, kind.coils() == 0),
             ("weighting", None, kind.sums_over_cells()),
             ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::TargetField),
             ("direction", is_component.then_some("direction = [0, 0, 1]"), takes_direction),
@@ -166,9 +305,10 @@ impl Functional {
         let still = |f: f64| f == 0.0;
         let nothing =
             self.frequency.map_or(!analysed.is_empty() && analysed.iter().all(|&f| still(f)), still);
-        if self.kind == ObjectiveKind::Loss && nothing {
-            let message = format!("`{}` is a loss at 0 Hz, where no current is induced", section.path());
-            section.wrong("kind", message, "a frequency above 0 Hz");
+        let anything_static = self.frequency.is_none() && analysed.iter().any(|&f| still(f));
+        let is_void = if self.kind == ObjectiveKind::Loss { nothing } else { nothing || anything_static };
+        if let Some(why) = self.kind.why_not_static().filter(|_| is_void) {
+            section.wrong("kind", format!("`{}` is {why}", section.path()), "a frequency above 0 Hz");
         }
     }
 
@@ -187,6 +327,21 @@ impl Functional {
             (ObjectiveKind::Energy, _) => Dimension::Energy,
             (ObjectiveKind::Force, _) => Dimension::Force,
             (ObjectiveKind::Torque, _) => Dimension::Torque,
+            (ObjectiveKind::Inductance | ObjectiveKind::MutualInductance, _) => Dimension::Inductance,
+            (
+                ObjectiveKind::Coupling
+                | ObjectiveKind::QualityFactor
+                | ObjectiveKind::LinkEfficiency
+                | ObjectiveKind::PowerFactor
+                | ObjectiveKind::MultipoleContent,
+                _,
+            ) => Dimension::Ratio,
+            (ObjectiveKind::Multipole, _) => Dimension::FluxDensity,
+            (ObjectiveKind::Resistance, _) => Dimension::Resistance,
+            (ObjectiveKind::FluxLinkage, _) => Dimension::FluxLinkage,
+            (ObjectiveKind::Current, _) => Dimension::Current,
+            (ObjectiveKind::Voltage, _) => Dimension::Voltage,
+            (ObjectiveKind::Power, _) => Dimension::Power,
         }
     }
 }

@@ -14,6 +14,7 @@ mod linear_solver;
 mod material;
 mod mesh;
 mod morph;
+mod multipole;
 mod objective;
 mod open;
 mod optimizer;
@@ -29,7 +30,7 @@ pub use coil::{
     Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
 };
 pub use config::Config;
-pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, UpperBound};
+pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, ValueBound};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
 pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
@@ -44,6 +45,7 @@ pub use morph::{
     AutoWord, Case, DesignMotion, DesignWord, Increments, Morph, Paper, PrescribedMotion, Rotation, Scale,
     Target, Tune, TunedParameter,
 };
+pub use multipole::{ExpansionShape, MultipoleSet};
 pub use objective::{Goal, Objective, Probe, Sum, Term};
 pub use open::Open;
 pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};

@@ -10,7 +10,18 @@ use crate::config::table::{Group, table};
 use crate::config::value::choice::choice;
 
 /// The keys that belong to a term.
-const OF_A_TERM: [&str; 7] = ["kind", "region", "weighting", "target", "direction", "frequency", "weight"];
+const OF_A_TERM: [&str; 10] = [
+    "kind",
+    "region",
+    "coils",
+    "harmonics",
+    "weighting",
+    "target",
+    "compare",
+    "direction",
+    "frequency",
+    "weight",
+];
 
 table! {
     /// What is made small or large; needed by `run` and `gradient`. Either one functional, with its keys in `[objective]`

@@ -113,6 +113,9 @@ dimensions! {
     /// A ratio of like quantities [1].
     Ratio = "a ratio", in "1", such as "1e-8 1":
         decimal("1", 0);
+    /// A flux linkage [Wb].
+    FluxLinkage = "a flux linkage", in "Wb", such as "5 mWb":
+        decimal("Wb", 0), decimal("mWb", -3), decimal("uWb", -6), decimal("\u{b5}Wb", -6);
     /// A volume [m³].
     Volume = "a volume", in "m\u{b3}", such as "400 cm3":
         decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("cm3", -6),

@@ -10,6 +10,7 @@
 //!
 //! Does not live here: anything that solves a field or moves a mesh. What is shown was computed by the run.
 
+mod circuits;
 mod coils;
 mod colour;
 mod convergence;

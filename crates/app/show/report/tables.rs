@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
+use super::circuits::circuits;
 use super::data::RunData;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
@@ -19,13 +20,13 @@ const SHOWN: usize = 12;
 const MOST_POINTS: usize = 200;
 
 /// Rows that a table holds; of the evaluations the first and the last half of so many.
-const MOST_ROWS: usize = 800;
+pub(super) const MOST_ROWS: usize = 800;
 
 /// Events of the mesh motion that are listed.
 const MOST_EVENTS: usize = 160;
 
 /// A table under its title, nothing where it is empty; of a very long one the beginning.
-fn titled_table(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
+pub(super) fn titled_table(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
     let shown = rows.len().min(most);
     html! {
         @if !rows.is_empty() {
@@ -121,6 +122,7 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     html! {
         (constraints(&result.constraints, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
+        (circuits(result))
         (losses(&states))
         (probes(&states))
     }
@@ -162,7 +164,11 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
     let row = |t: &TermResult| {
         vec![
             t.kind.replace('_', " "),
-            t.region.clone().unwrap_or_else(|| "whole mesh".to_owned()),
+            match (&t.region, &t.coils[..]) {
+                (Some(region), _) => region.clone(),
+                (None, []) => "whole mesh".to_owned(),
+                (None, coils) => coils.join(", "),
+            },
             t.frequency.map_or("all".to_owned(), hertz),
             trim_zeros(t.weight, 6),
             format!("{} {}", number(t.value, 6), unit(&t.kind)),

@@ -3,7 +3,7 @@
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
     Algorithm, BodyKind, Compared, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal,
-    Limit, ObjectiveKind, UpperBound, Weighting,
+    Limit, ObjectiveKind, ValueBound, Weighting,
 };
 
 /// What is made small or large.
@@ -50,11 +50,26 @@ pub(super) fn functional(functional: &Functional) -> String {
         ObjectiveKind::Energy => format!("the magnetic energy in {region}"),
         ObjectiveKind::Force => format!("the force on {region} along ({})", along(functional)),
         ObjectiveKind::Torque => format!("the torque on {region} about ({})", along(functional)),
+        ObjectiveKind::Multipole => format!("the term {} of {region}", harmonics(functional)),
+        ObjectiveKind::MultipoleContent => {
+            format!("the relative content of {} in {region}", harmonics(functional))
+        }
+        kind => format!("the {} of {}", kind.name().replace('_', " "), coils(functional)),
     };
     match functional.frequency {
         Some(frequency) => format!("{what} at {} Hz", trim_zeros(frequency, 6)),
         None => what,
     }
+}
+
+/// The terms of an expansion.
+fn harmonics(functional: &Functional) -> String {
+    functional.harmonics.as_deref().unwrap_or_default().join(", ")
+}
+
+/// The coils of a quantity.
+fn coils(functional: &Functional) -> String {
+    functional.coils.as_deref().unwrap_or_default().join(" and ")
 }
 
 /// The direction of a component.
@@ -99,20 +114,26 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
 
 /// A constraint.
 pub(super) fn constraint(constraint: &Constraint) -> String {
-    let upper = |bound: &UpperBound, unit: &str| match bound {
-        UpperBound::Value(value) => format!("at most {}{unit}", number(*value, 4)),
-        UpperBound::Ratio(ratio) => format!("at most {} times its initial value", trim_zeros(*ratio, 6)),
+    let within = |bound: &ValueBound, unit: &str| match bound {
+        ValueBound::AtMost(value) => format!("at most {}{unit}", number(*value, 4)),
+        ValueBound::AtMostRatio(ratio) => {
+            format!("at most {} times its initial value", trim_zeros(*ratio, 6))
+        }
+        ValueBound::AtLeast(value) => format!("at least {}{unit}", number(*value, 4)),
+        ValueBound::AtLeastRatio(ratio) => {
+            format!("at least {} times its initial value", trim_zeros(*ratio, 6))
+        }
     };
     match &constraint.limit {
         Limit::Field { functional: measured, bound } => {
             let unit = format!(" {}", measured.dimension().si_unit());
-            format!("{} {}", functional(measured), upper(bound, &unit))
+            format!("{} {}", functional(measured), within(bound, &unit))
         }
         Limit::Body { kind: BodyKind::Volume, region, bound } => {
-            format!("the volume of {region} {}", upper(bound, " m³"))
+            format!("the volume of {region} {}", within(bound, " m³"))
         }
         Limit::Body { kind: BodyKind::Mass, region, bound } => {
-            format!("the mass of {region} {}", upper(bound, " kg"))
+            format!("the mass of {region} {}", within(bound, " kg"))
         }
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];

@@ -54,18 +54,30 @@ impl AdjointAccumulator {
         let mut clock = Stopwatch::start();
         let mut right_side: Option<Vec<c64>> = None;
         for (number, term) in terms.iter().filter(|(_, term)| term.states.contains(index)) {
+            work.timings.gradient += clock.lap();
+            for &winding in term.functional.windings() {
+                model.respond(system, winding, state).map_err(finite::of_term(owner, term, model))?;
+                state.response(winding).into_iter().for_each(|response| work.report.include(response));
+            }
+            work.timings.state += clock.lap();
             let evaluated = term.functional.evaluate(model, work.mesh, state);
-            let FunctionalValue { value, derivative, explicit } =
+            let FunctionalValue { value, derivative, explicit, inductances } =
                 evaluated.map_err(finite::of_term(owner, term, model))?;
             self.values[*number] += value;
-            if shape.is_none() {
-                continue;
-            }
-            let sum = right_side.get_or_insert_with(|| vec![c64::default(); derivative.len()]);
-            for (sum, d) in sum.iter_mut().zip(derivative) {
-                *sum += term.weight * d;
+            let Some(shape) = shape else { continue };
+            if !derivative.is_empty() {
+                let sum = right_side.get_or_insert_default();
+                sum.resize(sum.len().max(derivative.len()), c64::default());
+                for (sum, d) in sum.iter_mut().zip(derivative) {
+                    *sum += term.weight * d;
+                }
             }
             self.add_nodal(term.weight, explicit.as_deref().unwrap_or_default());
+            if !inductances.is_empty() {
+                let moving = shape.motion().moving();
+                let nodal = adjoint::inductance_gradient(model, work.mesh, state, &inductances, moving)?;
+                self.add_nodal(term.weight, &nodal);
+            }
         }
         work.timings.gradient += clock.lap();
         let (Some(right_side), Some(shape)) = (right_side, shape) else { return Ok(()) };

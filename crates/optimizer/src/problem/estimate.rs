@@ -3,8 +3,8 @@
 //! What one state contributes, and the equations, are in [`fluxmorph_solver::enrichment`].
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_solver::FieldModel;
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
+use fluxmorph_solver::{FieldModel, FunctionalValue};
 
 use super::{Analysis, Problem};
 use crate::error::Error;
@@ -73,19 +73,31 @@ impl State<'_> {
     /// The error of the weighted sum of some terms on this state; what each element adds is added to `by_element`.
     fn error_of(&mut self, terms: &[&Term], by_element: Option<&mut Vec<f64>>) -> Result<f64, Error> {
         let mesh = &self.analysis.mesh;
+        let solution = &self.analysis.solutions[self.index];
+        let own = || terms.iter().filter(|term| term.states.contains(&self.index));
+        for &winding in own().flat_map(|term| term.functional.windings()) {
+            if let Some(response) = solution.response(winding) {
+                self.enriched.respond(winding, response)?;
+            }
+        }
         let model = self.enriched.model();
         let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| self.enriched.state(share));
         let mut error = 0.0;
         let mut right_side = vec![c64::default(); model.unknown_count()];
-        for term in terms.iter().filter(|term| term.states.contains(&self.index)) {
+        let mut inductances = Vec::new();
+        for term in own() {
             let at = |state| term.functional.evaluate(model, mesh, state);
             error += term.weight * (at(&after)?.value - at(&before)?.value);
-            let derivative = at(&half_way)?.derivative;
+            let FunctionalValue { derivative, inductances: of_term, .. } = at(&half_way)?;
+            right_side.resize(right_side.len().max(derivative.len()), c64::default());
             right_side.iter_mut().zip(derivative).for_each(|(sum, d)| *sum += term.weight * d);
+            inductances.extend(of_term.into_iter().map(|(j, k, slope)| (j, k, term.weight * slope)));
         }
         let weighed = self.enriched.weigh(self.coarse, &right_side)?;
         if let Some(sums) = by_element {
             sums.iter_mut().zip(&weighed.by_element).for_each(|(sum, own)| *sum += own);
+            let more = self.enriched.weigh_inductances(self.coarse, &inductances);
+            sums.iter_mut().zip(more).for_each(|(sum, own)| *sum += own);
         }
         Ok(error + weighed.remainder)
     }

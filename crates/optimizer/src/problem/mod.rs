@@ -178,7 +178,9 @@ impl Problem {
         let Some(shape) = self.shape.as_ref().filter(|_| !self.constraints.is_empty()) else {
             return Ok(Vec::new());
         };
-        let is_ratio = |constraint: &Constraint| matches!(constraint.limit, Limit::AtMostRatio(_));
+        let is_ratio = |constraint: &Constraint| {
+            matches!(constraint.limit, Limit::AtMostRatio(_) | Limit::AtLeastRatio(_))
+        };
         let initial;
         let measured = if p != shape.initial() && self.constraints.iter().any(is_ratio) {
             // Of the undeformed mesh's motion, as a run has it, and not of the round around `p`.

@@ -201,6 +201,11 @@ impl<'a> Sum<'a> {
     }
 
     pub(super) fn into_value(self) -> FunctionalValue {
-        FunctionalValue { value: self.value, derivative: self.derivative, explicit: Some(self.explicit) }
+        FunctionalValue {
+            value: self.value,
+            derivative: self.derivative,
+            explicit: Some(self.explicit),
+            inductances: Vec::new(),
+        }
     }
 }

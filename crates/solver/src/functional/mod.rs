@@ -3,13 +3,17 @@
 //! `dF/dx = explicit − 2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )` with `K λ = ∂F/∂u`: [`FunctionalValue::derivative`] is the right
 //! side of the adjoint problem, [`FunctionalValue::explicit`] the first term, and [`crate::adjoint`] the second.
 //! `observation` holds what is a function of B in cells that do not move, `homogeneity` its deviation from its own mean,
-//! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body. Weighted sums,
-//! bounds and several frequencies are the optimiser's business.
+//! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body, `terminal` what is a
+//! function of current and flux linkage of a coil, `inductance` what is one of the inductances, `multipole` what is one of terms of
+//! an expansion. Weighted sums, bounds and several frequencies are the optimiser's business.
 
 mod force;
 mod homogeneity;
+mod inductance;
 mod integral;
+mod multipole;
 mod observation;
+mod terminal;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
@@ -21,8 +25,11 @@ use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 pub use force::{Force, RigidMotion};
 pub use homogeneity::{Compared, FieldQuality};
+pub use inductance::{InductanceFunctional, Inductive};
 pub use integral::Integral;
+pub use multipole::{MirrorPlane, MultipoleFunctional, Multipoles, OfTerms};
 pub use observation::{Observation, Observed, Weighting};
+pub use terminal::{AtTerminals, TerminalFunctional};
 
 /// A real quantity of one field solution.
 #[derive(Clone, Debug)]
@@ -33,15 +40,24 @@ pub enum Functional {
     Integral(Integral),
     /// A force or torque on a body, which may move.
     Force(Force),
+    /// A function of current and flux linkage of a coil.
+    Terminal(TerminalFunctional),
+    /// A function of the inductances of coils.
+    Inductance(InductanceFunctional),
+    /// A function of terms of an expansion of B.
+    Multipole(MultipoleFunctional),
 }
 
 /// Value of a functional, and what its gradient needs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FunctionalValue {
     /// `F`.
     pub value: f64,
-    /// `∂F/∂u`, one entry per unknown: `dF = 2 Re Σ derivative · du`.
+    /// `∂F/∂u`, one entry per unknown, then one per current that a voltage drives: `dF = 2 Re Σ derivative · du`. Zero where it
+    /// ends.
     pub derivative: Vec<c64>,
+    /// `(j, k, ∂F/∂L_jk)` by the places of windings: `dF = 2 Re Σ ∂F/∂L_jk · dL_jk` beside the other parts.
+    pub inductances: Vec<(usize, usize, c64)>,
     /// `∂F/∂x` at fixed potentials [unit of F per m], shape `(n_nodes, 3)`; `None` where the region stays in place.
     pub explicit: Option<Vec<Point>>,
 }
@@ -86,13 +102,47 @@ impl Functional {
         Ok(Self::Force(Force::new(model, mesh, name, regions, motion)?))
     }
 
-    /// Elements that must stay where they are: those of an observation.
+    /// A function of what the terminals of the coil with this name see; a coil that it may be asked of has a winding.
+    ///
+    /// # Errors
+    /// [`SolverError::Parameter`] for a coil without winding, and where the quantity has no meaning or does not change.
+    pub fn at_terminals(model: &FieldModel, coil: &str, of: AtTerminals) -> Result<Self, SolverError> {
+        Ok(Self::Terminal(TerminalFunctional::new(model, coil, of)?))
+    }
+
+    /// A function of the inductances of the coils with these names: of one, or of two.
+    ///
+    /// # Errors
+    /// [`SolverError::Parameter`] for coils without winding, another number of them, and where it has no meaning.
+    pub fn of_inductances(model: &FieldModel, coils: &[&str], of: Inductive) -> Result<Self, SolverError> {
+        Ok(Self::Inductance(InductanceFunctional::new(model, coils, of)?))
+    }
+
+    /// A function of terms of an expansion.
+    ///
+    /// # Errors
+    /// [`SolverError::Parameter`] for a term that the expansion does not have.
+    pub fn multipole(multipoles: Multipoles, of: OfTerms) -> Result<Self, SolverError> {
+        Ok(Self::Multipole(MultipoleFunctional::new(multipoles, of)?))
+    }
+
+    /// Places of the windings whose responses to 1 A the state must have ([`FieldModel::respond`]).
+    pub fn windings(&self) -> &[usize] {
+        match self {
+            Self::Inductance(functional) => functional.windings(),
+            _ => &[],
+        }
+    }
+
+    /// Elements that must stay where they are: those of an observation, and around the points of an expansion.
     pub fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        let observation = match self {
-            Self::Observation(observation) => Some(observation),
-            Self::Integral(_) | Self::Force(_) => None,
+        let (observation, multipole) = match self {
+            Self::Observation(observation) => (Some(observation), None),
+            Self::Multipole(multipole) => (None, Some(multipole)),
+            _ => (None, None),
         };
-        observation.into_iter().flat_map(Observation::elements)
+        let observed = observation.into_iter().flat_map(Observation::elements);
+        observed.chain(multipole.into_iter().flat_map(MultipoleFunctional::elements))
     }
 
     /// Mean flux density [T] of every observation cell, shape `(n_cells, 3)`; empty for an integral.
@@ -104,7 +154,7 @@ impl Functional {
     ) -> Vec<Complex3> {
         match self {
             Self::Observation(observation) => observation.cell_flux_densities(model, mesh, solution),
-            Self::Integral(_) | Self::Force(_) => Vec::new(),
+            _ => Vec::new(),
         }
     }
 
@@ -117,14 +167,14 @@ impl Functional {
     ) -> Option<FieldQuality> {
         match self {
             Self::Observation(observation) => observation.field_quality(model, mesh, solution),
-            Self::Integral(_) | Self::Force(_) => None,
+            _ => None,
         }
     }
 
     /// `F` and its derivatives on a solution of `model` on `mesh`.
     ///
     /// # Errors
-    /// [`SolverError::NotFinite`].
+    /// [`SolverError::NotFinite`]; [`SolverError::Parameter`] where the state lacks a response of [`Functional::windings`].
     pub fn evaluate(
         &self,
         model: &FieldModel,
@@ -135,12 +185,27 @@ impl Functional {
             Self::Observation(observation) => observation.evaluate(model, mesh, solution),
             Self::Integral(integral) => integral.evaluate(model, mesh, solution),
             Self::Force(force) => force.evaluate(model, mesh, solution),
+            Self::Terminal(terminal) => terminal.evaluate(model, mesh, solution),
+            Self::Inductance(inductance) => inductance.evaluate(model, solution)?,
+            Self::Multipole(multipole) => multipole.evaluate(model, mesh, solution),
         };
         if !result.value.is_finite() {
             return Err(SolverError::NotFinite { what: "objective", value: result.value });
         }
         Ok(result)
     }
+}
+
+/// Places of the windings of some coils by name.
+fn windings_of(model: &FieldModel, coils: &[&str]) -> Result<Vec<usize>, SolverError> {
+    let place = |coil: &&str| {
+        model.windings().position(model, coil).ok_or_else(|| SolverError::Parameter {
+            what: "coil".to_owned(),
+            value: (*coil).to_owned(),
+            expected: "a coil of the model with the turns of its winding".to_owned(),
+        })
+    };
+    coils.iter().map(place).collect()
 }
 
 /// Whether the field does not alternate.

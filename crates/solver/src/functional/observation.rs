@@ -126,7 +126,7 @@ impl Observation {
                 });
             }
         }
-        FunctionalValue { value, derivative, explicit: None }
+        FunctionalValue { value, derivative, ..Default::default() }
     }
 
     /// Where `B` is taken in each element of a cell.

@@ -91,12 +91,15 @@ impl PreparedSystem {
         self.field.solve(right_side)
     }
 
-    /// Solves with the circuits' sources shorted, as adjoint problems are.
+    /// Solves with the circuits' sources shorted, as adjoint problems are. Behind the entries of the field's unknowns there may
+    /// be those of the currents that voltages drive, zero where they are left out.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve_field`].
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        let (values, report, _) = self.solve_with(right_side, Excitation::Shorted)?;
+        let unknowns = self.border.as_ref().map_or(right_side.len(), Border::field_unknowns);
+        let (field, circuits) = right_side.split_at(unknowns.min(right_side.len()));
+        let (values, report, _) = self.solve_with(field, Excitation::Given(circuits))?;
         Ok((values, report))
     }
 
@@ -107,7 +110,7 @@ impl PreparedSystem {
     pub(crate) fn solve_with(
         &mut self,
         right_side: &[c64],
-        excitation: Excitation,
+        excitation: Excitation<'_>,
     ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
         let (mut values, report) = self.field.solve(right_side)?;
         let border = self.border.as_ref();

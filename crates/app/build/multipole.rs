@@ -1,0 +1,144 @@
+//! Expansions of a configuration on its mesh and states.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_solver::coil::Frame;
+use fluxmorph_solver::functional::{MirrorPlane, Multipoles, OfTerms};
+use fluxmorph_solver::multipole::{Expansion, Harmonic};
+use fluxmorph_solver::{FieldModel, Functional};
+
+use super::functional::functionals;
+use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
+use crate::error::Error;
+
+/// Share of the reference radius by which a plane may miss the centre.
+const OFF_CENTRE: f64 = 1e-9;
+
+/// A term as it is written: `b3`, `a2`, `c2_0`, `s2_1`; `None` for what is none.
+fn parse(text: &str) -> Option<Harmonic> {
+    let (letter, numbers) = text.split_at_checked(1)?;
+    let is_plain = |number: &&str| !number.starts_with('0') || *number == "0";
+    let whole = |number: &str| Some(number).filter(is_plain)?.parse::<usize>().ok();
+    match (letter, numbers.split_once('_')) {
+        ("b", None) => whole(numbers).map(Harmonic::Normal),
+        ("a", None) => whole(numbers).map(Harmonic::Skew),
+        ("c", Some((n, m))) => Some(Harmonic::Cosine(whole(n)?, whole(m)?)),
+        ("s", Some((n, m))) => Some(Harmonic::Sine(whole(n)?, whole(m)?)),
+        _ => None,
+    }
+}
+
+/// A term as it is written.
+pub(crate) fn name(term: Harmonic) -> String {
+    match term {
+        Harmonic::Normal(n) => format!("b{n}"),
+        Harmonic::Skew(n) => format!("a{n}"),
+        Harmonic::Cosine(n, m) => format!("c{n}_{m}"),
+        Harmonic::Sine(n, m) => format!("s{n}_{m}"),
+    }
+}
+
+/// All terms of an expansion, in its order.
+fn terms(set: &MultipoleSet) -> Vec<Harmonic> {
+    match set.shape {
+        ExpansionShape::Circle => {
+            (1..=set.order).flat_map(|n| [Harmonic::Normal(n), Harmonic::Skew(n)]).collect()
+        }
+        ExpansionShape::Ball => {
+            let cosines = |n: usize| (0..=n).map(move |m| Harmonic::Cosine(n, m));
+            let sines = |n: usize| (1..=n).map(move |m| Harmonic::Sine(n, m));
+            (0..=set.order).flat_map(|n| cosines(n).chain(sines(n))).collect()
+        }
+    }
+}
+
+/// Those of the main order.
+pub(crate) fn main_terms(set: &MultipoleSet) -> Vec<Harmonic> {
+    let order = |term: &Harmonic| match *term {
+        Harmonic::Normal(n) | Harmonic::Skew(n) | Harmonic::Cosine(n, _) | Harmonic::Sine(n, _) => n,
+    };
+    terms(set).into_iter().filter(|term| Some(order(term)) == set.main).collect()
+}
+
+/// Expansions that are not there, and terms that they do not have.
+pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known: Vec<&str> = config.multipoles.iter().map(|set| set.name.as_str()).collect();
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_terms()) {
+        let wanted = functional.region.as_deref().unwrap_or_default();
+        let Some(set) = config.multipoles.iter().find(|set| set.name == wanted) else {
+            if !wanted.is_empty() {
+                let what = "expansion of [[multipoles]]";
+                faults.push(source.unknown_name(&format!("{path}.region"), what, wanted, &known));
+            }
+            continue;
+        };
+        let all = terms(set);
+        for (k, written) in functional.harmonics.iter().flatten().enumerate() {
+            if !parse(written).is_some_and(|term| all.contains(&term)) {
+                let message = format!("`{written}` is no term of the expansion `{wanted}`");
+                let [first, last] =
+                    [all.first(), all.last()].map(|term| term.copied().map(name).unwrap_or_default());
+                let fault = source.diagnostic(&format!("{path}.harmonics[{k}]"), message);
+                faults.push(
+                    fault.expected(format!("a term from {first} to {last}, or a higher `order` there")),
+                );
+            }
+        }
+    }
+    faults
+}
+
+/// An expansion on a mesh.
+pub(crate) fn multipoles(
+    config: &Config,
+    set: &MultipoleSet,
+    mesh: &Mesh,
+    model: &FieldModel,
+) -> Result<Multipoles, Error> {
+    let frame = Frame::new(set.center, set.axis.vector(), set.direction)?;
+    let expansion = match set.shape {
+        ExpansionShape::Circle => Expansion::circle(&frame, set.radius, set.order),
+        ExpansionShape::Ball => Expansion::ball(&frame, set.radius, set.order),
+    };
+    let planes = planes(config, set, mesh)?;
+    Ok(Multipoles::new(model, mesh, &set.name, &expansion, &planes)?)
+}
+
+/// A functional of terms.
+pub(super) fn functional(
+    config: &Config,
+    wanted: &config::Functional,
+    mesh: &Mesh,
+    model: &FieldModel,
+) -> Result<Functional, Error> {
+    let region = wanted.region.as_deref().unwrap_or_default();
+    let set = config.multipoles.iter().find(|set| set.name == region).expect("checked with the names");
+    let harmonics: Vec<Harmonic> = wanted.harmonics.iter().flatten().filter_map(|text| parse(text)).collect();
+    let of = match (wanted.kind, harmonics.first()) {
+        (ObjectiveKind::Multipole, Some(first)) => OfTerms::Coefficient(*first),
+        _ => OfTerms::Content { terms: harmonics, main: main_terms(set) },
+    };
+    Ok(Functional::multipole(multipoles(config, set, mesh, model)?, of)?)
+}
+
+/// The symmetry planes through the centre of an expansion.
+fn planes(config: &Config, set: &MultipoleSet, mesh: &Mesh) -> Result<Vec<MirrorPlane>, Error> {
+    let boundaries = &config.boundaries;
+    let parallel = boundaries.flux_parallel.iter().map(|name| (name, -1.0));
+    let normal = boundaries.flux_normal.iter().map(|name| (name, 1.0));
+    let mut planes: Vec<MirrorPlane> = Vec::new();
+    for (surface, across) in parallel.chain(normal) {
+        let triangles = mesh.topology().surface(surface)?;
+        let points = || triangles.iter().flatten().map(|&node| mesh.point(node));
+        let goes_through = |axis: usize| {
+            let tolerance = OFF_CENTRE * set.radius;
+            points().all(|x| (x[axis] - set.center[axis]).abs() <= tolerance) && !triangles.is_empty()
+        };
+        for axis in (0..3).filter(|&axis| goes_through(axis)) {
+            if planes.iter().all(|plane| plane.axis != axis) {
+                planes.push(MirrorPlane { axis, at: set.center[axis], across });
+            }
+        }
+    }
+    Ok(planes)
+}

@@ -1,0 +1,185 @@
+//! Coils as parts of circuits: what their terminals see of the field, and currents that a voltage drives.
+//!
+//! A coil of `N` turns carries `I` [A]; `F` is the load of 1 A in it, so that its flux linkage is `λ = Fᵀu` [Wb], be it
+//! `∫T·B` or `∫J·A` for one ampere, and `L_jk = F_jᵀ K⁻¹ F_k` [H]. With a voltage source `V` and a series impedance `Z = R +
+//! jωL_s + 1/(jωC)` the current is unknown too, one equation a coil, `V = Z I + jωλ`, which makes the system
+//!
+//! `[ K  −F ; −Fᵀ  −Z/(jω) ] [ u ; I ] = [ f ; −V/(jω) ]`:
+//!
+//! complex symmetric as `K` is, so that the adjoint has the same matrix, and as `F` does not move with the design, the
+//! derivative of `K` remains all there is. It is solved by eliminating `u`: one further solution a coil. All values are those
+//! of the meshed part. At 0 Hz a voltage drives `V/R`.
+//! Lives here: windings (`mod`), the elimination (`border`), what the terminals see (`terminals`). Does not live here: the loads
+//! (`crate::load`), functionals of terminals and inductances (`crate::functional`).
+
+mod border;
+mod terminals;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use crate::coil::Coil;
+use crate::error::SolverError;
+use crate::load::Sources;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+use crate::space::Space;
+use crate::unknowns::Unknowns;
+pub(crate) use border::{Border, Excitation};
+pub use terminals::{CoilTerminals, Terminals, terminals};
+
+/// A coil's winding, and the circuit that it is in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Winding {
+    /// Turns.
+    pub turns: f64,
+    /// Resistance of the wire, and of what is in series with it [Ω].
+    pub resistance: f64,
+    /// Inductance in series [H].
+    pub series_inductance: f64,
+    /// Capacitance in series [F]; `None`: none.
+    pub series_capacitance: Option<f64>,
+    /// Voltage of the source, peak phasor [V]; `None`: the coil's current is given.
+    pub voltage: Option<c64>,
+}
+
+impl Winding {
+    /// `R + jωL_s + 1/(jωC)` [Ω].
+    pub fn impedance(&self, angular_frequency: f64) -> c64 {
+        let capacitive = self.series_capacitance.map_or(0.0, |c| -1.0 / (angular_frequency * c));
+        c64::new(self.resistance, angular_frequency * self.series_inductance + capacitive)
+    }
+}
+
+/// The loads of 1 A in each coil that has a winding.
+#[derive(Debug)]
+pub(crate) struct Windings {
+    coils: Vec<Driven>,
+}
+
+/// A winding with its load.
+#[derive(Debug)]
+struct Driven {
+    /// Place of its coil in the model.
+    coil: usize,
+    winding: Winding,
+    sources: Sources,
+    /// `F` [m per unit of a test function].
+    load: Vec<c64>,
+}
+
+impl Windings {
+    /// Of the coils with a winding, in their order.
+    ///
+    /// # Errors
+    /// As [`Sources::new`].
+    pub(crate) fn new(
+        mesh: &Mesh,
+        coils: &[Coil],
+        windings: &[Option<Winding>],
+        (space, unknowns): (&Space, &Unknowns),
+    ) -> Result<Self, SolverError> {
+        let of = |(coil, winding): (usize, &Option<Winding>)| -> Option<Result<Driven, SolverError>> {
+            let (winding, unit) = (
+                (*winding)?,
+                Coil { ampere_turns: c64::from(winding.as_ref()?.turns), ..coils.get(coil)?.clone() },
+            );
+            Some(Sources::new(mesh, &[unit], &[]).map(|sources| {
+                let mut load = vec![c64::default(); unknowns.dofs.count()];
+                sources.add_load(space, unknowns, mesh, &mut load);
+                Driven { coil, winding, sources, load }
+            }))
+        };
+        let coils = windings.iter().enumerate().filter_map(of).collect::<Result<_, _>>()?;
+        Ok(Self { coils })
+    }
+
+    /// Elements that a coil with a winding meets: these must not move.
+    pub(crate) fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.coils.iter().flat_map(|driven| driven.sources.fixed_elements())
+    }
+
+    /// Whether a voltage excites a field.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.with_source().next().is_some()
+    }
+
+    /// The place among these of the coil with a name.
+    pub(crate) fn position(&self, model: &FieldModel, name: &str) -> Option<usize> {
+        self.coils.iter().position(|driven| model.coils()[driven.coil].name == name)
+    }
+
+    /// The winding at a place.
+    pub(crate) fn winding(&self, k: usize) -> &Winding {
+        &self.coils[k].winding
+    }
+
+    /// `F` of the winding at a place, one entry per unknown.
+    pub(crate) fn load(&self, k: usize) -> &[c64] {
+        &self.coils[k].load
+    }
+
+    /// Number of voltage-driven coils.
+    pub(crate) fn source_count(&self) -> usize {
+        self.with_source().count()
+    }
+
+    /// The place of a winding among the voltage-driven ones; `None` where its current is given.
+    pub(crate) fn source_position(&self, k: usize) -> Option<usize> {
+        self.coils[k].winding.voltage?;
+        Some(self.coils[..k].iter().filter(|driven| driven.winding.voltage.is_some()).count())
+    }
+
+    /// Adds the loads of currents [A] in the voltage-driven coils to one of the field.
+    pub(crate) fn add_driven_load(&self, currents: &[c64], load: &mut [c64]) {
+        for ((driven, _), current) in self.with_source().zip(currents) {
+            load.iter_mut().zip(&driven.load).for_each(|(sum, own)| *sum += current * own);
+        }
+    }
+
+    /// Current [A] of a winding in a state.
+    pub(crate) fn current(&self, k: usize, model: &FieldModel, state: &FieldSolution) -> c64 {
+        let Driven { coil, winding, .. } = &self.coils[k];
+        match (winding.voltage, model.angular_frequency() == 0.0) {
+            (None, _) => model.coils()[*coil].ampere_turns / winding.turns,
+            (Some(voltage), true) => voltage / winding.resistance,
+            (Some(_), false) => {
+                self.source_position(k).and_then(|d| state.currents().get(d)).copied().unwrap_or_default()
+            }
+        }
+    }
+
+    /// Flux linkage [Wb] of a winding in a state.
+    pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
+        self.coils[k].sources.linkage(model.space(), mesh, |e| state.element(model, e))
+    }
+
+    /// The voltage-driven ones.
+    fn with_source(&self) -> impl Iterator<Item = (&Driven, c64)> {
+        self.coils.iter().filter_map(|driven| Some((driven, driven.winding.voltage?)))
+    }
+}
+
+/// The coils with the currents that are known before the field is: those that a voltage drives carry none in harmonics, and `V/R`
+/// in statics.
+pub(crate) fn given_currents(
+    coils: &[Coil],
+    windings: &[Option<Winding>],
+    angular_frequency: f64,
+) -> Vec<Coil> {
+    let mut coils = coils.to_vec();
+    for (coil, winding) in coils.iter_mut().zip(windings) {
+        let Some((winding, voltage)) = winding.and_then(|winding| Some((winding, winding.voltage?))) else {
+            continue;
+        };
+        let current = if angular_frequency == 0.0 { voltage / winding.resistance } else { c64::default() };
+        coil.ampere_turns = winding.turns * current;
+    }
+    coils.retain(|coil| coil.ampere_turns != c64::default());
+    coils
+}
+
+/// `xᵀy`, without conjugation; summed in order.
+pub(crate) fn product(x: &[c64], y: &[c64]) -> c64 {
+    x.iter().zip(y).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,92 @@
+//! What the terminals of coils see of a state, and the matrix of their inductances.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+
+use super::{Driven, product};
+use crate::error::SolverError;
+use crate::linear::PreparedSystem;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+
+/// What the terminals of a coil see, peak phasors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoilTerminals {
+    /// Name of the coil.
+    pub name: String,
+    /// Current [A].
+    pub current: c64,
+    /// Flux linkage [Wb].
+    pub flux_linkage: c64,
+    /// Resistance [Ω]: that of the winding, and that of the losses that its current alone makes in the field.
+    pub resistance: f64,
+    /// Voltage across the coil with its resistance, without what else is in series [V].
+    pub voltage: c64,
+}
+
+/// The coils with a winding, and their inductance matrix [H], in their order: its real part in harmonics, where losses make it
+/// complex; empty where iron saturates, which has no such matrix.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Terminals {
+    /// What each sees.
+    pub coils: Vec<CoilTerminals>,
+    /// `L_jk`, by rows.
+    pub inductance: Vec<Vec<f64>>,
+}
+
+/// `F_jᵀ K⁻¹ F_k` [H], by rows; the responses are those of the state, or solved for.
+fn mutual(
+    model: &FieldModel,
+    mesh: &Mesh,
+    coils: &[Driven],
+    state: &FieldSolution,
+) -> Result<Vec<Vec<c64>>, SolverError> {
+    let mut system: Option<PreparedSystem> = None;
+    let mut respond = |(k, driven): (usize, &Driven)| -> Result<Vec<c64>, SolverError> {
+        if let Some(response) = state.response(k) {
+            return Ok(response.values().to_vec());
+        }
+        if system.is_none() {
+            system = Some(model.prepare(model.assembled(mesh))?);
+        }
+        let system = system.as_mut().expect("it has just been prepared");
+        Ok(system.solve_field(&driven.load)?.0)
+    };
+    let unit = coils.iter().enumerate().map(&mut respond).collect::<Result<Vec<_>, SolverError>>()?;
+    Ok(coils.iter().map(|driven| unit.iter().map(|u| product(&driven.load, u)).collect()).collect())
+}
+
+/// What the terminals see of a state; solves for 1 A in each coil with the state's matrix.
+///
+/// # Errors
+/// As [`FieldModel::prepare`] and [`PreparedSystem::solve`].
+pub fn terminals(
+    model: &FieldModel,
+    mesh: &Mesh,
+    solution: &FieldSolution,
+) -> Result<Terminals, SolverError> {
+    let windings = model.windings();
+    let coils = &windings.coils;
+    if coils.is_empty() {
+        return Ok(Terminals::default());
+    }
+    let angular_frequency = model.angular_frequency();
+    let mutual = if model.is_linear() { mutual(model, mesh, coils, solution)? } else { Vec::new() };
+    let of = |(k, driven): (usize, &Driven)| {
+        let flux_linkage = windings.linkage(k, model, mesh, solution);
+        let current = windings.current(k, model, solution);
+        let wire = driven.winding.resistance;
+        CoilTerminals {
+            name: model.coils()[driven.coil].name.clone(),
+            current,
+            flux_linkage,
+            // Re(jωL) = −ω Im L.
+            resistance: wire - mutual.get(k).map_or(0.0, |row| angular_frequency * row[k].im),
+            voltage: wire * current + c64::new(0.0, angular_frequency) * flux_linkage,
+        }
+    };
+    Ok(Terminals {
+        coils: coils.iter().enumerate().map(of).collect(),
+        inductance: mutual.iter().map(|row| row.iter().map(|l| l.re).collect()).collect(),
+    })
+}

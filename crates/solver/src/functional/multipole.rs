@@ -1,0 +1,195 @@
+//! Functions of the terms of an expansion of B around an axis or a point that does not move.
+//!
+//! The field at the points is the recovered one, linear in the potentials; a point beyond a symmetry plane has the field of its
+//! image. On a flux-parallel plane B has no component across it, on a flux-normal one none along it: mirrored, that component
+//! changes its sign.
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use super::FunctionalValue;
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::multipole::{Expansion, Harmonic};
+use crate::recovery::RecoveredPoint;
+use crate::solution::FieldSolution;
+
+/// A symmetry plane at right angles to an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MirrorPlane {
+    /// The axis: 0, 1 or 2.
+    pub axis: usize,
+    /// Its coordinate [m].
+    pub at: f64,
+    /// Factor on the component of B across the plane in the image: −1 for a flux-parallel one, +1 for a flux-normal one.
+    pub across: f64,
+}
+
+/// The terms of an expansion as linear functions of the field of a model.
+#[derive(Clone, Debug)]
+pub struct Multipoles {
+    places: Vec<RecoveredPoint>,
+    /// Weights as of [`Expansion::terms`], of the fields at the images.
+    terms: Vec<(Harmonic, Vec<Point>)>,
+}
+
+/// What is made of some terms.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OfTerms {
+    /// The first of them [T]: its value in statics, its magnitude in harmonics.
+    Coefficient(Harmonic),
+    /// `Σ |c|²` over terms, relative to that over `main` [1].
+    Content {
+        /// The terms that are summed.
+        terms: Vec<Harmonic>,
+        /// What they are compared with.
+        main: Vec<Harmonic>,
+    },
+}
+
+/// A function of terms of an expansion.
+#[derive(Clone, Debug)]
+pub struct MultipoleFunctional {
+    multipoles: Multipoles,
+    of: OfTerms,
+}
+
+impl Multipoles {
+    /// Of an expansion with its name; points outside the mesh are sought beyond the planes.
+    ///
+    /// # Errors
+    /// [`SolverError::ProbeOutside`] for the first point that no element holds, and no element the image of.
+    pub fn new(
+        model: &FieldModel,
+        mesh: &Mesh,
+        name: &str,
+        expansion: &Expansion,
+        planes: &[MirrorPlane],
+    ) -> Result<Self, SolverError> {
+        // All combinations of planes, the points themselves first.
+        let images = |x: Point| -> Vec<(Point, Point)> {
+            let combinations = (0..1usize << planes.len()).map(|bits| {
+                let through = planes.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+                through.fold((x, [1.0; 3]), |(mut x, mut factors), (_, plane)| {
+                    x[plane.axis] = 2.0 * plane.at - x[plane.axis];
+                    // In a flux-normal plane the image has the components along it reversed: minus one in all, and across it.
+                    let along = -plane.across;
+                    (0..3).for_each(|d| factors[d] *= if d == plane.axis { plane.across } else { along });
+                    (x, factors)
+                })
+            });
+            combinations.collect()
+        };
+        let candidates: Vec<Vec<(Point, Point)>> = expansion.points.iter().map(|&x| images(x)).collect();
+        let all: Vec<Point> = candidates.iter().flatten().map(|(x, _)| *x).collect();
+        let found = locate(mesh, &all);
+        let count = 1usize << planes.len();
+        let mut places = Vec::with_capacity(candidates.len());
+        let mut factors = Vec::with_capacity(candidates.len());
+        for (k, own) in candidates.iter().enumerate() {
+            let hit = (0..count).find_map(|i| Some((i, found[k * count + i]?.0)));
+            let Some((image, element)) = hit else {
+                let [lower, upper] = mesh.bounding_box();
+                let (probe, point) = (name.to_owned(), expansion.points[k]);
+                return Err(SolverError::ProbeOutside { probe, point, lower, upper });
+            };
+            places.push(RecoveredPoint::new(model, mesh, element, own[image].0));
+            factors.push(own[image].1);
+        }
+        let mirrored = |weights: &[Point]| -> Vec<Point> {
+            let of = |(w, f): (&Point, &Point)| std::array::from_fn(|d| w[d] * f[d]);
+            weights.iter().zip(&factors).map(of).collect()
+        };
+        let terms = expansion.terms.iter().map(|(term, weights)| (*term, mirrored(weights))).collect();
+        Ok(Self { places, terms })
+    }
+
+    /// Elements that take part: these must not move.
+    pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.places.iter().flat_map(RecoveredPoint::elements)
+    }
+
+    /// The coefficients [T] of a field.
+    pub fn coefficients(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        state: &FieldSolution,
+    ) -> Vec<(Harmonic, c64)> {
+        let fields: Vec<_> = self.places.iter().map(|place| place.flux_density(state, model, mesh)).collect();
+        let sum = |weights: &[Point]| -> c64 {
+            let dot = |(w, b): (&Point, &[c64; 3])| (0..3).map(|d| w[d] * b[d]).sum::<c64>();
+            weights.iter().zip(&fields).map(dot).sum()
+        };
+        self.terms.iter().map(|(term, weights)| (*term, sum(weights))).collect()
+    }
+}
+
+impl MultipoleFunctional {
+    pub(super) fn new(multipoles: Multipoles, of: OfTerms) -> Result<Self, SolverError> {
+        let wanted: Vec<Harmonic> = match &of {
+            OfTerms::Coefficient(term) => vec![*term],
+            OfTerms::Content { terms, main } => terms.iter().chain(main).copied().collect(),
+        };
+        let known = |term: &&Harmonic| multipoles.terms.iter().any(|(own, _)| own == *term);
+        if let Some(missing) = wanted.iter().find(|term| !known(term)) {
+            return Err(SolverError::Parameter {
+                what: "term of an expansion".to_owned(),
+                value: format!("{missing:?}"),
+                expected: "one up to the order of the expansion, of its kind".to_owned(),
+            });
+        }
+        Ok(Self { multipoles, of })
+    }
+
+    pub(super) fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.multipoles.elements()
+    }
+
+    pub(super) fn evaluate(&self, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> FunctionalValue {
+        let coefficients = self.multipoles.coefficients(model, mesh, state);
+        let (value, slopes) = self.value(&coefficients, model.angular_frequency());
+        let mut derivative = vec![c64::default(); model.unknown_count()];
+        for (k, place) in self.multipoles.places.iter().enumerate() {
+            let mut q = [c64::default(); 3];
+            for ((_, weights), slope) in self.multipoles.terms.iter().zip(&slopes) {
+                (0..3).for_each(|d| q[d] += slope * weights[k][d]);
+            }
+            place.add_derivative(q, model, mesh, &mut derivative);
+        }
+        FunctionalValue { value, derivative, ..Default::default() }
+    }
+
+    /// The value, and its derivative `s` by every coefficient: `dF = 2 Re Σ s dc`.
+    fn value(&self, coefficients: &[(Harmonic, c64)], omega: f64) -> (f64, Vec<c64>) {
+        let zero = c64::default();
+        match &self.of {
+            OfTerms::Coefficient(wanted) => {
+                let of = |term: &Harmonic, c: c64| match (term == wanted, omega == 0.0, c == zero) {
+                    (false, _, _) => (0.0, zero),
+                    (true, true, _) => (c.re, c64::new(0.5, 0.0)),
+                    // A kink, where zero prefers no side.
+                    (true, false, true) => (0.0, zero),
+                    (true, false, false) => (c.norm(), 0.5 * c.conj() / c.norm()),
+                };
+                let parts: Vec<_> = coefficients.iter().map(|(term, c)| of(term, *c)).collect();
+                (parts.iter().map(|(value, _)| value).sum(), parts.iter().map(|(_, slope)| *slope).collect())
+            }
+            OfTerms::Content { terms, main } => {
+                let square = |of: &[Harmonic]| -> f64 {
+                    coefficients.iter().filter(|(term, _)| of.contains(term)).map(|(_, c)| c.norm_sqr()).sum()
+                };
+                let reference = square(main);
+                let content = square(terms) / reference;
+                let slope = |(term, c): &(Harmonic, c64)| {
+                    let own = if terms.contains(term) { 1.0 } else { 0.0 };
+                    let compared = if main.contains(term) { content } else { 0.0 };
+                    c.conj() * ((own - compared) / reference)
+                };
+                (content, coefficients.iter().map(slope).collect())
+            }
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! Expansions of the flux density around an axis or a point, from values on a circle or a sphere.
+//!
+//! Across the axis of a long magnet `B_y + i B_x = Σ (b_n + i a_n)(z/r)^(n−1)`, so that on the circle of reference radius `r`
+//! the radial component is `Σ b_n sin nθ + a_n cos nθ`: normal and skew harmonics `b_n`, `a_n` [T], `n = 1` the dipole (A. Jain,
+//! Basic theory of magnets, CERN 98-05). In a ball of air any component is harmonic: along the axis
+//! `B = Σ (ρ/r)^n P_nm(cos θ) (c_nm cos mφ + s_nm sin mφ)` with associated Legendre functions without normalisation or phase
+//! (Roméo and Hoult, Magn. Reson. Med. 1 (1984) 44), in [T] at the radius `r`. Both are linear in B at points: the trapezoidal
+//! rule around the axis, that of Gauss along it, exact for all terms that are asked for.
+//! Lives here: points and weights. Does not live here: the field at them ([`crate::recovery`]), functions of the coefficients
+//! ([`crate::functional`]).
+
+use std::f64::consts::PI;
+
+use fluxmorph_geometry::tet4::Point;
+
+use crate::coil::Frame;
+
+/// A term of an expansion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Harmonic {
+    /// `b_n`, `n ≥ 1`.
+    Normal(usize),
+    /// `a_n`, `n ≥ 1`.
+    Skew(usize),
+    /// `c_nm`, `m ≤ n`.
+    Cosine(usize, usize),
+    /// `s_nm`, `1 ≤ m ≤ n`.
+    Sine(usize, usize),
+}
+
+/// Points, and each term as a linear function of B at them.
+#[derive(Clone, Debug)]
+pub struct Expansion {
+    /// Where B is taken [m].
+    pub points: Vec<Point>,
+    /// `(term, w)`: the coefficient is `Σ w·B` over the points, `w` of shape `(n_points, 3)` [1].
+    pub terms: Vec<(Harmonic, Vec<Point>)>,
+}
+
+/// A point of a frame, in units of a reference radius.
+fn place(frame: &Frame, radius: f64, local: Point) -> Point {
+    let (centre, offset) = (frame.centre(), frame.vector(local.map(|c| radius * c)));
+    std::array::from_fn(|d| centre[d] + offset[d])
+}
+
+impl Expansion {
+    /// `b_1, a_1 … b_N, a_N` on the circle of a radius [m] around the axis of a frame.
+    pub fn circle(frame: &Frame, radius: f64, order: usize) -> Self {
+        // Terms up to four times the highest one asked for do not disturb it.
+        let count = 4 * (order + 1);
+        let angles: Vec<f64> = (0..count).map(|k| 2.0 * PI * (k as f64 + 0.5) / count as f64).collect();
+        let points = angles.iter().map(|a| place(frame, radius, [a.cos(), a.sin(), 0.0])).collect();
+        let weights = |along: &dyn Fn(f64) -> f64| -> Vec<Point> {
+            let of = |&a: &f64| {
+                let radial = frame.vector([a.cos(), a.sin(), 0.0]);
+                radial.map(|c| 2.0 / count as f64 * along(a) * c)
+            };
+            angles.iter().map(of).collect()
+        };
+        let pair = |n: usize| {
+            let normal = (Harmonic::Normal(n), weights(&|a| (n as f64 * a).sin()));
+            [normal, (Harmonic::Skew(n), weights(&|a| (n as f64 * a).cos()))]
+        };
+        Self { points, terms: (1..=order).flat_map(pair).collect() }
+    }
+
+    /// `c_nm, s_nm` up to `n = N` on the sphere of a radius [m], of the component along the axis of a frame.
+    pub fn ball(frame: &Frame, radius: f64, order: usize) -> Self {
+        let (rule, around) = (gauss_legendre(order + 1), 2 * order + 2);
+        let nodes: Vec<(f64, f64, f64)> = rule
+            .iter()
+            .flat_map(|&(u, w)| (0..around).map(move |k| (u, w, 2.0 * PI * (k as f64 + 0.5) / around as f64)))
+            .collect();
+        let point = |&(u, _, phi): &(f64, f64, f64)| {
+            let across = (1.0 - u * u).sqrt();
+            place(frame, radius, [across * phi.cos(), across * phi.sin(), u])
+        };
+        let axis = frame.axis();
+        let weights = |n: usize, m: usize, around_axis: fn(f64) -> f64| -> Vec<Point> {
+            // Σ over the rules of (P_nm cos mφ)² is the norm on the unit sphere: 4π/(2n + 1) (n + m)!/(n − m)!, halved for m > 0.
+            let ratio: f64 = (n - m + 1..=n + m).map(|k| k as f64).product();
+            let norm = 2.0 / (2 * n + 1) as f64 * ratio * if m == 0 { 1.0 } else { 0.5 };
+            let of = |&(u, w, phi): &(f64, f64, f64)| {
+                let value = w / around as f64 * legendre(n, m, u) * around_axis(m as f64 * phi) / norm;
+                axis.map(|c| value * c)
+            };
+            nodes.iter().map(of).collect()
+        };
+        let mut terms = Vec::new();
+        for n in 0..=order {
+            for m in 0..=n {
+                terms.push((Harmonic::Cosine(n, m), weights(n, m, f64::cos)));
+                if m > 0 {
+                    terms.push((Harmonic::Sine(n, m), weights(n, m, f64::sin)));
+                }
+            }
+        }
+        Self { points: nodes.iter().map(point).collect(), terms }
+    }
+}
+
+/// `P_nm(u)` without normalisation or phase, by the recurrence in `n` (Abramowitz and Stegun, 8.5.3).
+fn legendre(n: usize, m: usize, u: f64) -> f64 {
+    let across = (1.0 - u * u).max(0.0).sqrt();
+    let diagonal: f64 = (0..m).map(|k| (2 * k + 1) as f64 * across).product();
+    let (mut before, mut value) = (0.0, diagonal);
+    for k in m + 1..=n {
+        let next = ((2 * k - 1) as f64 * u * value - (k + m - 1) as f64 * before) / (k - m) as f64;
+        (before, value) = (value, next);
+    }
+    value
+}
+
+/// Nodes and weights of the Gauss–Legendre rule on [−1, 1], by Newton's method.
+fn gauss_legendre(count: usize) -> Vec<(f64, f64)> {
+    let node = |k: usize| {
+        let mut u = (PI * (k as f64 + 0.75) / (count as f64 + 0.5)).cos();
+        let slope =
+            |u: f64| count as f64 * (u * legendre(count, 0, u) - legendre(count - 1, 0, u)) / (u * u - 1.0);
+        for _ in 0..10 {
+            u -= legendre(count, 0, u) / slope(u);
+        }
+        (u, 2.0 / ((1.0 - u * u) * slope(u).powi(2)))
+    };
+    (0..count).map(node).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RADIUS: f64 = 0.02;
+
+    /// The axis is y; the first direction lies between z and x.
+    fn frame() -> Frame {
+        Frame::new([0.01, -0.02, 0.03], [0.0, 1.0, 0.0], Some([1.0, 0.0, 1.0])).expect("a frame")
+    }
+
+    fn coefficients(expansion: &Expansion, field: impl Fn(Point) -> Point) -> Vec<(Harmonic, f64)> {
+        let dot = |a: Point, b: Point| (0..3).map(|d| a[d] * b[d]).sum::<f64>();
+        let sum = |weights: &[Point]| {
+            weights.iter().zip(&expansion.points).map(|(w, &x)| dot(*w, field(x))).sum::<f64>()
+        };
+        expansion.terms.iter().map(|(term, weights)| (*term, sum(weights))).collect()
+    }
+
+    /// `B_y + i B_x = Σ (b_n + i a_n) z^(n − 1)` is given back.
+    #[test]
+    fn multipoles_of_a_plane_field_are_its_own() {
+        let frame = frame();
+        let given: [(f64, f64); 4] = [(1.0, 0.02), (-0.3, 0.1), (0.05, -0.07), (0.001, 0.4)];
+        let field = |x: Point| {
+            let [x, y, _] = frame.local(x).map(|c| c / RADIUS);
+            let (mut power, mut b) = ((1.0, 0.0), (0.0, 0.0));
+            for (normal, skew) in given {
+                b.1 += normal * power.0 - skew * power.1;
+                b.0 += normal * power.1 + skew * power.0;
+                power = (power.0 * x - power.1 * y, power.0 * y + power.1 * x);
+            }
+            frame.vector([b.0, b.1, 0.0])
+        };
+        for (term, found) in coefficients(&Expansion::circle(&frame, RADIUS, 6), field) {
+            let exact = match term {
+                Harmonic::Normal(n) => given.get(n - 1).map_or(0.0, |c| c.0),
+                Harmonic::Skew(n) => given.get(n - 1).map_or(0.0, |c| c.1),
+                _ => unreachable!("a circle has no others"),
+            };
+            assert!((found - exact).abs() < 1e-14, "{term:?}: {found} {exact}");
+        }
+    }
+
+    /// A harmonic polynomial in Cartesian coordinates: `z`, `zx`, `xy` and the zonal `2z³ − 3z(x² + y²)`.
+    #[test]
+    fn spherical_harmonics_of_a_polynomial_are_its_own() {
+        let frame = frame();
+        let field = |p: Point| {
+            let [x, y, z] = frame.local(p).map(|c| c / RADIUS);
+            let along = 2.0 + 0.3 * z + 0.6 * z * x - 0.9 * x * y
+                + 0.5 * (2.0 * z.powi(3) - 3.0 * z * (x * x + y * y));
+            frame.vector([7.0, -8.0, along])
+        };
+        for (term, found) in coefficients(&Expansion::ball(&frame, RADIUS, 5), field) {
+            // P_21 = 3 u √(1 − u²): zx = P_21 cos φ/3; P_22 = 3(1 − u²): xy = P_22 sin 2φ/6; P_3 = (5u³ − 3u)/2.
+            let exact = match term {
+                Harmonic::Cosine(0, 0) => 2.0,
+                Harmonic::Cosine(1, 0) => 0.3,
+                Harmonic::Cosine(2, 1) => 0.2,
+                Harmonic::Sine(2, 2) => -0.15,
+                Harmonic::Cosine(3, 0) => 1.0,
+                _ => 0.0,
+            };
+            assert!((found - exact).abs() < 1e-13, "{term:?}: {found} {exact}");
+        }
+    }
+
+    #[test]
+    fn the_rule_of_gauss_has_its_degree() {
+        for count in 1..12 {
+            let rule = gauss_legendre(count);
+            for power in 0..2 * count as i32 {
+                let sum: f64 = rule.iter().map(|(u, w)| w * u.powi(power)).sum();
+                let exact = if power % 2 == 0 { 2.0 / f64::from(power + 1) } else { 0.0 };
+                assert!((sum - exact).abs() < 1e-14, "{count} {power}: {sum}");
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! A polynomial fitted to values at points, as weights of these values.
+
+use fluxmorph_geometry::tet4::Point;
+
+/// Exponents of `x, y, z` in the monomials up to a degree: the constant, the coordinates, then the higher ones.
+fn monomials(degree: usize) -> Vec<[i32; 3]> {
+    let mut exponents: Vec<[i32; 3]> = Vec::new();
+    for total in 0..=degree as i32 {
+        for i in (0..=total).rev() {
+            for j in (0..=total - i).rev() {
+                exponents.push([i, j, total - i - j]);
+            }
+        }
+    }
+    exponents
+}
+
+/// The part of a monomial that the others do not already contain, relative to it, below which the nodes do not
+/// determine its coefficient: nodes in two parallel planes, for instance, leave one square open.
+const DEPENDENT: f64 = 1e-3;
+
+/// The polynomial of a degree fitted to values at points, at the origin.
+///
+/// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), coordinates
+/// scaled to the extent of the points in each direction; the weight `exp(−|ξ|²)` in these coordinates lets the nearest
+/// nodes count most.
+pub(super) struct Fit {
+    /// Orthonormal columns, one a monomial, of weighted values.
+    columns: Vec<Vec<f64>>,
+    /// The upper triangle.
+    upper: Vec<Vec<f64>>,
+    /// Weight of every point.
+    weights: Vec<f64>,
+    /// Extent of the points.
+    scale: Point,
+}
+
+impl Fit {
+    /// `None` where the points do not determine the polynomial.
+    pub(super) fn new(degree: usize, points: &[Point]) -> Option<Self> {
+        let monomials = monomials(degree);
+        let terms = monomials.len();
+        if points.len() < terms {
+            return None;
+        }
+        let scale: Point = std::array::from_fn(|d| points.iter().map(|p| p[d].abs()).fold(0.0, f64::max));
+        let mut columns = vec![Vec::with_capacity(points.len()); terms];
+        let mut weights = Vec::with_capacity(points.len());
+        for p in points {
+            let [x, y, z]: Point = std::array::from_fn(|d| p[d] / scale[d]);
+            let weight = (-(x * x + y * y + z * z)).exp();
+            for (column, &[i, j, k]) in columns.iter_mut().zip(&monomials) {
+                column.push(weight * x.powi(i) * y.powi(j) * z.powi(k));
+            }
+            weights.push(weight);
+        }
+        let product = |u: &[f64], v: &[f64]| u.iter().zip(v).map(|(u, v)| u * v).sum::<f64>();
+        let mut upper = vec![vec![0.0; terms]; terms];
+        for k in 0..terms {
+            let (done, open) = columns.split_at_mut(k);
+            let column = &mut open[0];
+            let before = product(column, column).sqrt();
+            for (i, q) in done.iter().enumerate() {
+                upper[i][k] = product(q, column);
+                for (c, q) in column.iter_mut().zip(q) {
+                    *c -= upper[i][k] * q;
+                }
+            }
+            let length = product(column, column).sqrt();
+            // A direction without extent makes the length not a number.
+            if length.is_nan() || length <= DEPENDENT * before {
+                return None;
+            }
+            upper[k][k] = length;
+            for c in column.iter_mut() {
+                *c /= length;
+            }
+        }
+        Some(Self { columns, upper, weights, scale })
+    }
+
+    /// Weights of the values in the polynomial's value.
+    pub(super) fn value(&self) -> Vec<f64> {
+        self.coefficient(0)
+    }
+
+    /// Weights of the values in its gradient [1/m].
+    pub(super) fn gradient(&self) -> Vec<Point> {
+        let [x, y, z] = [1, 2, 3].map(|k| self.coefficient(k));
+        let [a, b, c] = self.scale;
+        x.iter().zip(&y).zip(&z).map(|((x, y), z)| [x / a, y / b, z / c]).collect()
+    }
+
+    /// Weights of the values in the coefficient of a monomial: the row of `R⁻¹ Qᵀ W`.
+    fn coefficient(&self, of: usize) -> Vec<f64> {
+        // Rᵀ y = e: from the top.
+        let mut y: Vec<f64> = Vec::with_capacity(self.columns.len());
+        for k in 0..self.columns.len() {
+            let known: f64 = y.iter().enumerate().map(|(i, y)| self.upper[i][k] * y).sum();
+            let unit = if k == of { 1.0 } else { 0.0 };
+            y.push((unit - known) / self.upper[k][k]);
+        }
+        let at = |i: usize| self.columns.iter().zip(&y).map(|(q, y)| q[i] * y).sum::<f64>();
+        (0..self.weights.len()).map(|i| self.weights[i] * at(i)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(lines: [usize; 3]) -> Vec<Point> {
+        let mut points = Vec::new();
+        for i in 0..lines[0] {
+            for j in 0..lines[1] {
+                points.extend((0..lines[2]).map(|k| [0.01 * i as f64, 0.3 * j as f64, 1e-4 * k as f64]));
+            }
+        }
+        points
+    }
+
+    #[test]
+    fn the_gradient_of_a_quadratic_is_exact_at_the_corner_of_its_points() {
+        let quadratic =
+            |[x, y, z]: Point| 0.4 + 2.0 * x - y + 70.0 * z + 3.0 * x * y - 2.0 * z * z + 9.0 * y * z + x * x;
+        let points = grid([3, 3, 3]);
+        let fit = Fit::new(2, &points).expect("27 points determine a quadratic");
+        let gradients = fit.gradient();
+        for (d, exact) in [2.0, -1.0, 70.0].into_iter().enumerate() {
+            let sum: f64 = gradients.iter().zip(&points).map(|(g, &p)| g[d] * quadratic(p)).sum();
+            // Values of order 1 on a patch of 0.2 mm: rounding of 1e-16 / 2e-4, a hundredfold.
+            assert!((sum - exact).abs() < 1e-10, "{d}: {sum}");
+        }
+        let value: f64 = fit.value().iter().zip(&points).map(|(w, &p)| w * quadratic(p)).sum();
+        assert!((value - 0.4).abs() < 1e-13, "{value}");
+    }
+
+    #[test]
+    fn points_that_leave_a_coefficient_open_are_refused() {
+        for lines in [[3, 3, 2], [3, 3, 1], [9, 2, 1]] {
+            let points = grid(lines);
+            assert!(Fit::new(2, &points).is_none(), "{lines:?}");
+        }
+    }
+}

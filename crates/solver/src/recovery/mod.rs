@@ -1,0 +1,222 @@
+//! Flux density at points: the curl of a polynomial fitted to the potentials around.
+//!
+//! `B` of linear elements is constant in each and of first order. The potentials at the nodes are of second order, so
+//! the curl of a quadratic fitted to them (of quadratic elements: of a cubic) is better by one order where the mesh is
+//! regular, and it stays so beside a
+//! symmetry plane or a material's face, where all elements lie on one side and a mean of their `B` would not
+//! (polynomial-preserving recovery; Zhang and Naga, SIAM J. Sci. Comput. 26 (2005) 1192). Across a material boundary
+//! the true field jumps, so only elements of the probed element's material take part.
+//!
+//! A recovered value is linear in the field: [`RecoveredPoint`] holds its weights, for values and for derivatives.
+//!
+//! Edge elements have no potentials at nodes, and their gauge leaves `A` rough: there a polynomial is fitted to `B` itself at
+//! the points of elements where it is best (Zienkiewicz and Zhu, Int. J. Numer. Methods Eng. 33 (1992) 1331).
+
+mod fit;
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::tet4::{Point, sub};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
+use rayon::prelude::*;
+
+use crate::element::Complex3;
+use crate::element::quadrature::Node;
+use crate::element::tabulated::Rule;
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+use crate::space::{ElementFamily, Order};
+use fit::Fit;
+
+/// Layers of elements around the probed one after which no fit is tried.
+const LAYERS_LIMIT: usize = 3;
+
+/// The recovered flux density at a point of an element as a linear function of the field, on one mesh.
+///
+/// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares with a
+/// polynomial of one degree more than that of the elements; of edge elements `B` in them, with one of their degree. A further
+/// layer of elements where these do not determine it.
+/// In a part of the material too small for any fit, the element's own mean.
+#[derive(Clone, Debug)]
+pub struct RecoveredPoint {
+    elements: BTreeSet<ElementId>,
+    weights: Weights,
+}
+
+/// What a recovered value adds up.
+#[derive(Clone, Debug)]
+enum Weights {
+    /// `B = Σ g × A` over nodes with `g` [1/m].
+    Potentials(Vec<(CarrierId, Point)>),
+    /// `B = Σ w B` over points of elements.
+    FluxDensities(Vec<(ElementId, [f64; 4], f64)>),
+}
+
+impl RecoveredPoint {
+    /// At a point of an element.
+    pub fn new(model: &FieldModel, mesh: &Mesh, element: ElementId, point: Point) -> Self {
+        let topology = model.topology();
+        // A magnet's face is one even where its permeability is that of air, and that of open space is one of the map.
+        let material = |e: ElementId| {
+            let linear = model.materials()[topology.region_of()[e.index()].index()];
+            let is_open = model.form().stretch_of(e).is_some();
+            (linear, model.remanence_of(e), model.curve_of(e), is_open)
+        };
+        let mut elements = BTreeSet::from([element]);
+        for _ in 0..LAYERS_LIMIT {
+            elements = elements
+                .iter()
+                .flat_map(|&e| topology.tet(e))
+                .flat_map(|n| topology.elements_around(n))
+                .copied()
+                .filter(|&e| material(e) == material(element))
+                .collect();
+            let weights = match model.space().family() {
+                ElementFamily::Nodal => of_potentials(model, mesh, &elements, point),
+                ElementFamily::Edge => of_flux_densities(model, mesh, &elements, point),
+            };
+            if let Some(weights) = weights {
+                return Self { elements, weights };
+            }
+        }
+        let own = Weights::FluxDensities(vec![(element, [0.25; 4], 1.0)]);
+        Self { elements: BTreeSet::from([element]), weights: own }
+    }
+
+    /// The elements that take part, ascending.
+    pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.elements.iter().copied()
+    }
+
+    /// `B` [T] there.
+    pub fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+        let mut sum = [c64::default(); 3];
+        match &self.weights {
+            Weights::Potentials(nodes) => {
+                for (node, g) in nodes {
+                    let [a, b, c, _] = solution.potentials(model, *node);
+                    sum[0] += g[1] * c - g[2] * b;
+                    sum[1] += g[2] * a - g[0] * c;
+                    sum[2] += g[0] * b - g[1] * a;
+                }
+            }
+            Weights::FluxDensities(points) => {
+                for (e, lambda, weight) in points {
+                    let b = solution.at(model, mesh, *e, lambda).flux_density;
+                    (0..3).for_each(|d| sum[d] += *weight * b[d]);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Adds `∂(q·B)/∂u` to a vector of unknowns.
+    pub(crate) fn add_derivative(
+        &self,
+        q: Complex3,
+        model: &FieldModel,
+        mesh: &Mesh,
+        derivative: &mut [c64],
+    ) {
+        match &self.weights {
+            Weights::Potentials(nodes) => {
+                for (node, g) in nodes {
+                    // q·(g × A) = (q × g)·A.
+                    let components = [
+                        q[1] * g[2] - q[2] * g[1],
+                        q[2] * g[0] - q[0] * g[2],
+                        q[0] * g[1] - q[1] * g[0],
+                        c64::default(),
+                    ];
+                    model.unknowns().scatter_add(derivative, *node, components);
+                }
+            }
+            Weights::FluxDensities(points) => {
+                for (e, lambda, weight) in points {
+                    let (cell, carriers) = (model.space().cell(mesh, *e), model.space().carriers_of(*e));
+                    model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
+                        let mut local = [c64::default(); 4];
+                        local[component] = (0..3).map(|d| q[d] * (*weight * curl[d])).sum();
+                        model.unknowns().scatter_add(derivative, carriers[carrier], local);
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The recovered flux density [T] at a point of an element ([`RecoveredPoint`]).
+pub fn recovered_flux_density(
+    solution: &FieldSolution,
+    model: &FieldModel,
+    mesh: &Mesh,
+    element: ElementId,
+    point: Point,
+) -> Complex3 {
+    RecoveredPoint::new(model, mesh, element, point).flux_density(solution, model, mesh)
+}
+
+/// The curl at a point of the polynomial fitted to the potentials at the nodes of some elements.
+fn of_potentials(
+    model: &FieldModel,
+    mesh: &Mesh,
+    elements: &BTreeSet<ElementId>,
+    point: Point,
+) -> Option<Weights> {
+    let space = model.space();
+    let nodes: BTreeSet<CarrierId> = elements.iter().flat_map(|&e| space.carriers_of(e)).copied().collect();
+    let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
+    let gradients = Fit::new(space.order().degree() + 1, &offsets)?.gradient();
+    Some(Weights::Potentials(nodes.into_iter().zip(gradients).collect()))
+}
+
+/// The value at a point of the polynomial fitted to the flux densities in some elements, taken where they are of one order
+/// better: at the centroid, or at the four points of the rule of degree 2.
+fn of_flux_densities(
+    model: &FieldModel,
+    mesh: &Mesh,
+    elements: &BTreeSet<ElementId>,
+    point: Point,
+) -> Option<Weights> {
+    let order = model.space().order();
+    let rule: &[Node] = match order {
+        Order::Linear => Rule::Centroid.nodes(),
+        Order::Quadratic => Rule::Degree2.nodes(),
+    };
+    let samples = || elements.iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda)));
+    let place = |(e, lambda): (ElementId, &[f64; 4])| -> Point {
+        let vertices = mesh.vertices(e);
+        std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>() - point[d])
+    };
+    let offsets: Vec<Point> = samples().map(place).collect();
+    let weights = Fit::new(order.degree(), &offsets)?.value();
+    Some(Weights::FluxDensities(samples().zip(weights).map(|((e, lambda), w)| (e, *lambda, w)).collect()))
+}
+
+/// The recovered flux density [T] at the points of a probe.
+///
+/// # Errors
+/// [`SolverError::ProbeOutside`] for the first point that no element holds.
+pub fn probe(
+    solution: &FieldSolution,
+    model: &FieldModel,
+    mesh: &Mesh,
+    name: &str,
+    points: &[Point],
+) -> Result<Vec<Complex3>, SolverError> {
+    let outside = |point: Point| {
+        let [lower, upper] = mesh.bounding_box();
+        SolverError::ProbeOutside { probe: name.to_owned(), point, lower, upper }
+    };
+    let located = locate(mesh, points).into_iter().zip(points);
+    let elements = located
+        .map(|(found, &point)| found.map(|(e, _)| (e, point)).ok_or_else(|| outside(point)))
+        .collect::<Result<Vec<(ElementId, Point)>, _>>()?;
+    Ok(elements
+        .into_par_iter()
+        .map(|(e, point)| recovered_flux_density(solution, model, mesh, e, point))
+        .collect())
+}

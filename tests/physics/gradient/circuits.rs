@@ -1,0 +1,121 @@
+//! Gradients of what coils are in circuits: inductances, losses at terminals, currents that voltages drive; and of the terms of
+//! their field.
+
+use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::verify::{Settings, certify};
+
+use super::check;
+use crate::problems::variables;
+use crate::support::{changed, setup_of};
+
+const COILS: &str = include_str!("../../support/coils.toml");
+
+/// A bound on a kind of one coil or a pair, whatever its value.
+fn bound(kind: &str, coils: &str, number: usize) -> String {
+    let name = format!("{kind}_{number}");
+    format!("[[constraints]]\nname = \"{name}\"\nkind = \"{kind}\"\ncoils = [{coils}]\nlower = 1e-20\n")
+}
+
+/// Every kind that has a meaning at rest.
+fn static_kinds() -> String {
+    let of_one = ["inductance", "flux_linkage"];
+    let of_one = of_one.iter().flat_map(|kind| [bound(kind, "\"one\"", 1), bound(kind, "\"two\"", 2)]);
+    of_one.chain([bound("mutual_inductance", "\"one\", \"two\"", 1), TERMS.to_owned()]).collect()
+}
+
+/// Terms of the field above the coils.
+const TERMS: &str = r#"
+[[constraints]]
+name = "dipole"
+kind = "multipole"
+region = "circle"
+harmonics = ["b1"]
+lower = 1e-20
+[[constraints]]
+name = "content"
+kind = "multipole_content"
+region = "circle"
+harmonics = ["a2", "b3"]
+upper = 1
+[[constraints]]
+name = "slope"
+kind = "multipole"
+region = "ball"
+harmonics = ["c1_0"]
+upper = 1
+[[constraints]]
+name = "ball_content"
+kind = "multipole_content"
+region = "ball"
+harmonics = ["c1_0", "c2_0", "c2_2"]
+upper = 1
+"#;
+
+/// Every other kind.
+fn harmonic_kinds() -> String {
+    let of_one = ["resistance", "quality_factor", "voltage", "power", "power_factor"];
+    let of_one = of_one.iter().flat_map(|kind| [bound(kind, "\"one\"", 1), bound(kind, "\"two\"", 2)]);
+    of_one.chain([bound("link_efficiency", "\"two\", \"one\"", 1)]).collect()
+}
+
+/// The coils with constraints and changes.
+fn problem(constraints: &str, changes: &[(&str, &str)]) -> Problem {
+    let design = format!("{constraints}[design]");
+    setup_of(&changed(COILS, &[&[("[design]", design.as_str())], changes].concat())).problem
+}
+
+fn all_hold(problem: &Problem) {
+    let settings = Settings { directions: 2, ..Settings::default() };
+    let p: Vec<f64> = (0..variables(problem)).map(|k| 4e-4 + 6e-4 * (1.7 * k as f64).sin()).collect();
+    let certificates = certify(problem, &p, &settings, &|| false, |_, _, _| {});
+    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
+    println!("objective {:e}", certificates.objective.objective);
+    check(&certificates.objective);
+    for named in &certificates.constraints {
+        println!("{} {:e}", named.name, named.certificate.objective);
+        check(&named.certificate);
+    }
+}
+
+#[test]
+fn what_coils_are_is_exact_in_statics() {
+    for order in ["order = 1", "order = 2"] {
+        let order = format!("frequency = 0\n{order}");
+        let changes = [("frequency = \"200 Hz\"", order.as_str()), ("phase = \"30 deg\"\n", "")];
+        all_hold(&problem(&static_kinds(), &changes));
+    }
+}
+
+#[test]
+fn what_coils_are_is_exact_over_a_conductor_in_both_families() {
+    let kinds = format!("{}{}", static_kinds(), harmonic_kinds());
+    all_hold(&problem(&kinds, &[]));
+    let nodal = [("elements = \"edge\"", "elements = \"nodal\""), ("permeability = 2", "permeability = 1")];
+    all_hold(&problem(&kinds, &nodal));
+}
+
+#[test]
+fn what_coils_are_is_exact_over_an_impedance_surface() {
+    let kinds = format!("{}{}", static_kinds(), harmonic_kinds());
+    let thin = [
+        ("material = \"metal\"", "material = \"metal\"\nmodel = \"impedance\""),
+        ("region = [\"gap\", \"plate\"]", "region = \"gap\""),
+        ("frequency = \"200 Hz\"", "frequency = \"20 kHz\""),
+        ("free = [\"face\"]", ""),
+    ];
+    all_hold(&problem(&kinds, &thin));
+}
+
+/// A voltage drives one coil through a capacitor, the other is short-circuited: both currents follow the shape.
+#[test]
+fn currents_that_voltages_drive_follow_the_shape() {
+    let driven = [
+        ("ampere_turns = \"100 A\"", "voltage = \"1 V\"\nphase = \"20 deg\"\nseries_capacitance = 0.2"),
+        ("ampere_turns = \"20 A\"", "voltage = \"0 V\"\nseries_inductance = \"1 uH\""),
+    ];
+    let of_one = ["current", "voltage", "flux_linkage", "power", "power_factor"];
+    let mut kinds: String = of_one.iter().map(|kind| bound(kind, "\"one\"", 1)).collect();
+    kinds += &bound("current", "\"two\"", 2);
+    kinds += "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 2\n";
+    all_hold(&problem(&kinds, &driven));
+}

@@ -1,0 +1,177 @@
+//! Coils as circuits through the binary: energy and reciprocity, voltages against currents, runs on what coils are.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::changed;
+use crate::support::folder::read_json;
+use crate::support::program::{Finished, fluxmorph, folder};
+
+const COILS: &str = include_str!("../support/coils.toml");
+
+/// A command on the coils with changes.
+fn execute(command: &str, folder: &Path, changes: &[(&str, &str)]) -> Finished {
+    let config = folder.join("coils.toml");
+    std::fs::write(&config, changed(COILS, changes)).expect("written");
+    fluxmorph(&[&command, &config, &"--out", &folder.join("run"), &"--quiet", &"--force"])
+}
+
+/// `result.json` of a command that comes to its end.
+fn result(command: &str, changes: &[(&str, &str)]) -> Value {
+    let folder = folder();
+    execute(command, folder.path(), changes).completed();
+    read_json(&folder.path().join("run/result.json"))
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// A phasor `[re, im]`.
+fn phasor(value: &Value) -> [f64; 2] {
+    [number(&value[0]), number(&value[1])]
+}
+
+/// `|a − b| / |b|`.
+fn deviation([a, b]: [[f64; 2]; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1]) / b[0].hypot(b[1])
+}
+
+#[test]
+fn the_energy_is_that_of_the_inductances_and_the_matrix_is_symmetric() {
+    let changes = [
+        ("phase = \"30 deg\"\n", ""),
+        ("frequency = \"200 Hz\"", "frequency = 0"),
+        ("goal = \"maximise\"\nkind = \"coupling\"\ncoils = [\"one\", \"two\"]", "kind = \"energy\""),
+    ];
+    let result = result("solve", &changes);
+    let l = |j: usize, k: usize| number(&result["inductance_h"][j][k]);
+    let i = [0, 1].map(|k| number(&result["coils"][k]["current_a"]));
+    assert_eq!(i[0], 10.0);
+    let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    let energy: f64 = pairs.iter().map(|&(j, k)| 0.5 * i[j] * l(j, k) * i[k]).sum();
+    // What the issue asks for; the linear solver's residual is 1e-13.
+    let found = number(&result["objective"]["initial"]);
+    assert!((energy / found - 1.0).abs() < 1e-8, "{energy} {found}");
+    assert!((l(0, 1) / l(1, 0) - 1.0).abs() < 1e-9);
+    let coupling = l(0, 1) / (l(0, 0) * l(1, 1)).sqrt();
+    assert!((number(&result["coupling"][0][1]) / coupling - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_voltage_drives_the_current_that_needs_it() {
+    let given = result("solve", &[]);
+    let [re, im] = phasor(&given["coils"][0]["voltage_v"]);
+    let drive = format!("voltage = {:?}\nphase = {:?}", re.hypot(im), im.atan2(re));
+    let driven = result("solve", &[("ampere_turns = \"100 A\"", &drive)]);
+    for (k, key) in [(0, "current_a"), (0, "flux_linkage_wb"), (1, "flux_linkage_wb"), (1, "voltage_v")] {
+        let both = [&driven, &given].map(|result| phasor(&result["coils"][k][key]));
+        // What the issue asks for.
+        assert!(deviation(both) < 1e-9, "{k} {key}: {both:?}");
+    }
+    let losses = [&driven, &given].map(|result| number(&result["losses_w"]["plate"]));
+    assert!((losses[0] / losses[1] - 1.0).abs() < 1e-9);
+    // An objective of the matrix does not know what drives the coils.
+    let couplings = [&driven, &given].map(|result| number(&result["objective"]["initial"]));
+    assert!((couplings[0] / couplings[1] - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_run_raises_the_coupling_and_keeps_a_least_inductance() {
+    let least = "[[constraints]]\nkind = \"inductance\"\ncoils = [\"one\"]\nlower_ratio = 0.99\n\n[design]";
+    let result = result("run", &[("[design]", least)]);
+    let [initial, best] = ["initial", "best"].map(|key| number(&result["objective"][key]));
+    assert!(best > 1.001 * initial, "{initial} {best}");
+    // The objective of the best design is the coupling of its result.
+    assert!((number(&result["coupling"][0][1]) / best - 1.0).abs() < 1e-9);
+    let constraint = &result["constraints"][0];
+    assert_eq!(constraint["name"], "inductance_one");
+    assert_eq!(constraint["satisfied"], true);
+    let inductance = number(&result["inductance_h"][0][0]);
+    assert!((number(&constraint["value"]) / inductance - 1.0).abs() < 1e-9);
+    assert_eq!(result["objective"]["terms"][0]["coils"], serde_json::json!(["one", "two"]));
+}
+
+#[test]
+fn the_current_at_a_voltage_can_be_made_small() {
+    let changes = [
+        ("ampere_turns = \"100 A\"", "voltage = \"1 V\""),
+        (
+            "goal = \"maximise\"\nkind = \"coupling\"\ncoils = [\"one\", \"two\"]",
+            "kind = \"current\"\ncoils = [\"one\"]",
+        ),
+    ];
+    let result = result("run", &changes);
+    let [initial, best] = ["initial", "best"].map(|key| number(&result["objective"][key]));
+    let [re, im] = phasor(&result["coils"][0]["current_a"]);
+    assert!(best < 0.999 * initial && (re.hypot(im) / best - 1.0).abs() < 1e-9, "{initial} {best}");
+}
+
+/// Probes at points of the circle in the meshed quarter, with the weights of a least-squares fit of the terms that the
+/// symmetry allows, give the terms of the expansion.
+#[test]
+fn multipoles_are_those_of_a_fit_of_probes() {
+    let (order, radius, height) = (4, 8e-3, 30e-3);
+    let count = 4 * (order + 1);
+    let angles = (0..count).map(|k| 2.0 * std::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(count));
+    // Angles from y towards z; the other half is the image in y = 0, where B_y is odd.
+    let points: Vec<(f64, [f64; 2])> =
+        angles.map(|a| (a, [radius * a.cos(), height + radius * a.sin()])).collect();
+    let text: Vec<String> = points.iter().map(|(_, [y, z])| format!("[0.0, {:?}, {z:?}]", y.abs())).collect();
+    let probes = format!("[[probes]]\nname = \"circle\"\npoints = [{}]\n\n[output]", text.join(", "));
+    let statics =
+        [("phase = \"30 deg\"\n", ""), ("frequency = \"200 Hz\"", "frequency = 0"), ("[output]", &probes)];
+    let result = result("solve", &statics);
+    let field = |k: usize, d: usize| number(&result["probes"][0]["b_re_t"][k][d]);
+    for (n, letter) in (1..=order).flat_map(|n| [(n, "b"), (n, "a")]) {
+        let coefficient: f64 = (0..points.len())
+            .map(|k| {
+                let (a, [y, _]) = points[k];
+                let radial = field(k, 1) * y.signum() * a.cos() + field(k, 2) * a.sin();
+                let along = f64::from(n) * a;
+                2.0 / f64::from(count) * radial * if letter == "b" { along.sin() } else { along.cos() }
+            })
+            .sum();
+        let terms = result["multipoles"][0]["terms"].as_array().expect("terms");
+        let name = format!("{letter}{n}");
+        let term = terms.iter().find(|term| term["name"] == name.as_str()).expect("of the order");
+        let main = field(0, 2).abs();
+        // What the issue asks for.
+        assert!(
+            (number(&term["value_t"]) - coefficient).abs() < 1e-6 * main,
+            "{name}: {coefficient:e} {term}"
+        );
+    }
+    let dipole = &result["multipoles"][0]["terms"][0];
+    assert_eq!((&dipole["name"], number(&dipole["units"])), (&"b1".into(), 1e4));
+    // In the middle of the ball the field along the axis is the term without direction.
+    let ball = &result["multipoles"][1]["terms"][0];
+    let deviation = number(&ball["value_t"]) / number(&dipole["value_t"]) - 1.0;
+    assert!(ball["name"] == "c0_0" && deviation.abs() < 0.1, "{deviation}");
+}
+
+#[test]
+fn coils_that_cannot_be_asked_are_refused_by_name() {
+    let refused = |changes: &[(&str, &str)], fragments: &[&str]| {
+        let folder = folder();
+        execute("solve", folder.path(), changes).with(3, fragments);
+    };
+    refused(&[("coils = [\"one\", \"two\"]", "coils = [\"one\", \"tow\"]")], &["no coil `tow`", "`two`"]);
+    refused(&[("turns = 4\n", ""), ("resistance = \"2 mohm\"\n", "")], &["`two` has no turns", "turns = 10"]);
+    let current =
+        ("kind = \"coupling\"\ncoils = [\"one\", \"two\"]", "kind = \"current\"\ncoils = [\"two\"]");
+    refused(&[current], &["current of the coil `two` is given"]);
+    refused(&[("coils = [\"one\", \"two\"]", "coils = [\"one\"]")], &["is of 2 coils, and 1 are named"]);
+    let resistance =
+        ("kind = \"coupling\"\ncoils = [\"one\", \"two\"]", "kind = \"resistance\"\ncoils = [\"two\"]");
+    let content = "kind = \"multipole_content\"\nregion = \"circel\"\nharmonics = [\"b3\"]";
+    let kind = "kind = \"coupling\"\ncoils = [\"one\", \"two\"]";
+    refused(&[(kind, content)], &["no expansion of [[multipoles]] `circel`", "`circle`"]);
+    let content = "kind = \"multipole_content\"\nregion = \"circle\"\nharmonics = [\"b9\"]";
+    refused(&[(kind, content)], &["`b9` is no term", "a term from b1 to a4"]);
+    refused(
+        &[resistance, ("frequency = \"200 Hz\"", "frequency = 0"), ("phase = \"30 deg\"\n", "")],
+        &["a frequency above 0 Hz"],
+    );
+}
