@@ -31,6 +31,7 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
             "two constraints are named",
             "two probes are named",
             "two forces are named",
+            "two multipoles are named",
             "two surfaces are named",
             "two subregions are named",
             "two cases are named",
@@ -50,12 +51,15 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
             "the bounds leave out",
             "m at least and",
             "more than a half size",
+            "which is no order of its terms",
         ],
     ),
     (
         "frequencies and what is analysed at them",
         &[
             "is a loss at 0 Hz",
+            "is of losses at 0 Hz",
+            "is of a coil at 0 Hz",
             "has an impedance surface",
             "is a permanent magnet, but",
             "has a B–H curve, but",
