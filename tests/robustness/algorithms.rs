@@ -53,6 +53,7 @@ fn record(number: usize, p: &[f64], constrained: bool) -> Record {
         inversion_element: None,
         inversion_region: None,
         round: 0,
+        forces: Vec::new(),
         constraints: Default::default(),
     };
     Record {
@@ -76,6 +77,7 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
         version: String::new(),
         configuration: "0".repeat(64),
         mesh: "0".repeat(64),
+        tables: String::new(),
         variables: VARIABLES,
         constraints: usize::from(constrained),
     };

@@ -2,31 +2,44 @@
 
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use fluxmorph_geometry::io::open_regular;
 use fluxmorph_solver::BhCurve;
+use fluxmorph_solver::bh::{Analytic, Knee};
 
-use crate::config::{Config, Diagnostic, SourceMap};
+use super::steels;
+use crate::config::{Config, Diagnostic, KneeWord, Material, SourceMap, WrittenCurve};
 use crate::error::Error;
+use crate::files::blake3_hex;
 
 /// Largest table that is read [bytes]: a thousand times the longest one that was ever measured.
 const LARGEST_FILE: u64 = 1024 * 1024;
 
 /// Curves by the name of their material.
 #[derive(Debug, Default)]
-pub(super) struct Curves(BTreeMap<String, Arc<BhCurve>>);
+pub(super) struct Curves {
+    curves: BTreeMap<String, Arc<BhCurve>>,
+    files: BTreeMap<PathBuf, String>,
+    /// Whether nothing alternates.
+    is_static: bool,
+}
 
 impl Curves {
     /// Those of all materials, or the faults of all of them.
     pub(super) fn read(config: &Config, source: &SourceMap) -> Result<Self, Error> {
-        let (mut curves, mut faults) = (BTreeMap::new(), Vec::new());
+        let (mut curves, mut files, mut faults) = (BTreeMap::new(), BTreeMap::new(), Vec::new());
         for (name, material) in &config.materials {
-            let curve = match (&material.bh, &material.bh_file) {
-                (Some(points), _) => listed(name, points, source),
-                (None, Some(path)) => filed(name, path, source),
-                (None, None) => continue,
+            let curve = match (&material.bh, &material.bh_file, material.saturation) {
+                (Some(WrittenCurve::Points(points)), ..) => listed(name, points, source),
+                (Some(WrittenCurve::Named(steel)), ..) => Ok(steels::curve(*steel)),
+                (None, Some(path), _) => filed(name, path, source).map(|(curve, hash)| {
+                    files.insert(path.clone(), hash);
+                    curve
+                }),
+                (None, None, Some(saturation)) => closed(name, material, saturation, source),
+                (None, None, None) => continue,
             };
             match curve {
                 Ok(curve) => _ = curves.insert(name.clone(), Arc::new(curve)),
@@ -34,26 +47,37 @@ impl Curves {
             }
         }
         source.check(faults)?;
-        Ok(Self(curves))
+        let is_static = config.analysis.frequencies().iter().all(|&f| f == 0.0);
+        Ok(Self { curves, files, is_static })
+    }
+
+    /// The files that were read, with BLAKE3 of their content.
+    pub(super) fn into_files(self) -> BTreeMap<PathBuf, String> {
+        self.files
     }
 
     /// The curve of a region's material.
     pub(super) fn of(&self, config: &Config, region: &str) -> Option<Arc<BhCurve>> {
-        self.0.get(&config.regions.get(region)?.material).cloned()
+        self.curves.get(&config.regions.get(region)?.material).cloned()
     }
 
     /// What is not wrong with a curve, but seldom meant.
     pub(super) fn warnings(&self) -> Vec<String> {
         let warning = |(name, curve): (&String, &Arc<BhCurve>)| {
-            let [h, b] = curve.end();
-            (!curve.ends_saturated()).then(|| {
+            let [h, b] = curve.end().filter(|_| !curve.ends_saturated())?;
+            Some({
                 format!(
                     "materials.{name}: the B–H curve ends at {b} T and {h} A/m with a slope of more than 2 μ0, before the \
                      material is saturated; beyond, it is taken as saturated at once"
                 )
             })
         };
-        self.0.iter().filter_map(warning).collect()
+        let approximation = (!self.is_static && !self.curves.is_empty()).then(|| {
+            "iron with a B–H curve above 0 Hz: each amplitude follows the curve, and of what alternates the fundamental alone is \
+             computed (effective reluctivity); that is an approximation"
+                .to_owned()
+        });
+        self.curves.iter().filter_map(warning).chain(approximation).collect()
     }
 }
 
@@ -67,8 +91,26 @@ fn listed(name: &str, points: &[[f64; 2]], source: &SourceMap) -> Result<BhCurve
     })
 }
 
-/// A curve from a file; a fault names its line.
-fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<BhCurve, Box<Diagnostic>> {
+/// A curve in closed form.
+fn closed(
+    name: &str,
+    material: &Material,
+    saturation: f64,
+    source: &SourceMap,
+) -> Result<BhCurve, Box<Diagnostic>> {
+    let knee = match material.knee {
+        None | Some(KneeWord::Sharp) => Knee::Sharp,
+        Some(KneeWord::Arctangent) => Knee::Arctangent,
+    };
+    Analytic::new(material.relative_permeability, saturation, knee).map(BhCurve::analytic).ok_or_else(|| {
+        let path = format!("materials.{name}.saturation");
+        let message = format!("{saturation} T is beyond any material");
+        Box::new(source.diagnostic(&path, message).expected("at most 10 T: iron and cobalt have 2.4 T"))
+    })
+}
+
+/// A curve from a file, with BLAKE3 of it; a fault names its line.
+fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String), Box<Diagnostic>> {
     let refused = |place: String, message: String| {
         let key = format!("materials.{name}.bh_file");
         let message = format!("`{}`{place}: {message}", path.display());
@@ -78,10 +120,10 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<BhCurve, Box<Dia
     let mut text = String::new();
     let read = open_regular(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text));
     read.map_err(|error| refused(String::new(), error.to_string()))?;
-    let is_row = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+    let hash = blake3_hex(text.as_bytes());
     let mut lines = Vec::new();
     let mut points = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, line)| is_row(line)) {
+    for (number, line) in text.lines().enumerate().filter(|(_, line)| steels::is_row(line)) {
         let at = |message: &str| refused(format!(", line {}", number + 1), message.to_owned());
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let &[h, b] = fields.as_slice() else {
@@ -93,8 +135,9 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<BhCurve, Box<Dia
         points.push([number_in(h)?, number_in(b)?]);
         lines.push(number + 1);
     }
-    BhCurve::new(&points).map_err(|(row, fault)| {
+    let curve = BhCurve::new(&points).map_err(|(row, fault)| {
         let place = lines.get(row).map_or_else(String::new, |line| format!(", line {line}"));
         refused(place, fault.to_string())
-    })
+    })?;
+    Ok((curve, hash))
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
@@ -287,8 +288,18 @@ fn at_terminals(model: &FieldModel, coils: &[&str], of: AtTerminals) -> Result<F
     Ok(Functional::at_terminals(model, coils.first().copied().unwrap_or_default(), of)?)
 }
 
+/// The bodies whose forces are reported.
+pub(super) fn bodies(config: &Config, mesh: &Mesh, model: &FieldModel) -> Result<Vec<Body>, Error> {
+    let of = |body: &config::ForceBody| {
+        let regions = body.regions.iter().map(|name| mesh.topology().region(name));
+        let regions = regions.collect::<Result<Vec<_>, _>>()?;
+        Ok(Body::new(model, mesh, &body.name, &regions, body.about)?)
+    };
+    config.forces.iter().map(of).collect()
+}
+
 /// A component of the force or torque on a body.
-pub(crate) fn force(
+fn force(
     body: &config::ForceBody,
     mesh: &Mesh,
     model: &FieldModel,

@@ -22,6 +22,7 @@ mod shape;
 mod share;
 mod skin;
 mod soundness;
+pub(crate) mod steels;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
@@ -32,6 +33,9 @@ pub use outline::{Outline, OutlinedDesign, outline};
 pub use skin::Audited;
 pub(crate) use skin::result_warnings;
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
@@ -41,7 +45,6 @@ use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
 use fluxmorph_solver::{FieldModel, Material};
 
 use self::curves::Curves;
-pub(crate) use self::functional::force;
 use self::locate_error::DiagnosticSink;
 use self::skin::audits;
 use crate::config::{self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, SourceMap};
@@ -62,6 +65,8 @@ pub struct Setup {
     pub open_patches: Vec<OpenPatch>,
     /// The region that a positive design thickens.
     pub designed_body: Option<String>,
+    /// The B–H tables that were read from files, with BLAKE3 of their content.
+    pub tables: BTreeMap<PathBuf, String>,
 }
 
 /// Which parts of the configuration a command needs.
@@ -230,9 +235,12 @@ fn problem_on(
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
-    let problem = Problem::new(mesh, states, objective, constraints, shape).shared_out(share);
+    let bodies = functional::bodies(config, &mesh, &states[0])?;
+    let problem =
+        Problem::new(mesh, states, objective, constraints, shape).shared_out(share).with_bodies(bodies);
     warnings.extend(skin::bound_warnings(config, &audits, &problem, designed_body.as_deref()));
-    Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body })
+    let tables = curves.into_files();
+    Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body, tables })
 }
 
 /// Refuses names that the mesh does not have; what was left out of a mesh file is often why.

@@ -4,12 +4,13 @@ mod sweep;
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::template::Template;
 use super::{examples, exit};
-use crate::build::{memory_limit, with_names};
-use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, parse_quantity};
+use crate::build::{memory_limit, steels, with_names};
+use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, Steel, parse_quantity};
 use crate::error::Error;
 use crate::files::OverwritePolicy;
 
@@ -278,6 +279,13 @@ pub struct GenerateArgs {
 pub enum Generated {
     /// The JSON schema of the configuration
     Schema,
+    /// The steels that a configuration may name, with their sources
+    #[command(after_help = examples::MATERIALS)]
+    Materials {
+        /// One of them alone, as a file for `bh_file`
+        #[arg(value_name = "NAME", value_parser = PossibleValuesParser::new(steels::ALL.map(Steel::name)))]
+        name: Option<String>,
+    },
     /// The man pages: all in one on standard output, or one for each command into a folder
     #[command(after_help = examples::MAN)]
     Man {

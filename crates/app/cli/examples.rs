@@ -82,6 +82,11 @@ Examples:
   fluxmorph generate man | man -l -
   fluxmorph generate completions bash > ~/.local/share/bash-completion/completions/fluxmorph";
 
+pub(super) const MATERIALS: &str = "\
+Examples:
+  fluxmorph generate materials
+  fluxmorph generate materials team20_steel > steel.csv";
+
 pub(super) const MAN: &str = "\
 Examples:
   fluxmorph generate man | man -l -

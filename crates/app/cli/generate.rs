@@ -6,6 +6,8 @@ use clap::{Command, CommandFactory};
 
 use super::args::{Cli, GenerateArgs, Generated};
 use super::stdout;
+use crate::build::steels;
+use crate::config::Steel;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{OutputError, system_disk, write_whole};
@@ -19,6 +21,11 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<ExitCode, Error> {
     let mut bytes = Vec::new();
     match &args.what {
         Generated::Schema => bytes.extend_from_slice(schema::text().as_bytes()),
+        Generated::Materials { name: Some(name) } => {
+            let named = steels::ALL.into_iter().filter(|steel| steel.name() == name);
+            named.for_each(|steel| bytes.extend_from_slice(steels::table(steel).as_bytes()));
+        }
+        Generated::Materials { name: None } => bytes.extend_from_slice(materials().as_bytes()),
         Generated::Man { out: Some(folder) } => write_pages(folder)?,
         Generated::Man { out: None } => pages().into_iter().for_each(|(_, page)| bytes.extend(page)),
         Generated::Completions { shell } => {
@@ -27,6 +34,25 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<ExitCode, Error> {
     }
     stdout::print(&String::from_utf8_lossy(&bytes))?;
     Ok(ExitCode::Success)
+}
+
+/// All steels, as a part of a configuration.
+fn materials() -> String {
+    let points = |table: &str| -> String {
+        table.lines().filter(|line| steels::is_row(line)).map(|line| format!("    [{line}],\n")).collect()
+    };
+    let comments = |table: &str| -> String {
+        table.lines().filter(|line| line.starts_with('#')).map(|line| format!("{line}\n")).collect()
+    };
+    let of = |steel: Steel| {
+        let (name, table) = (steel.name(), steels::table(steel));
+        format!(
+            "{}# The same as bh = \"{name}\".\n[materials.{name}]\nbh = [\n{}]\n",
+            comments(table),
+            points(table)
+        )
+    };
+    steels::ALL.map(of).join("\n")
 }
 
 /// One man page for the program and each of its commands, by the name of its file.

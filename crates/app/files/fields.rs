@@ -6,6 +6,7 @@ use fluxmorph_geometry::io::{ArrayData, Field, VtuPiece, pvtu_text, vtu_bytes};
 use fluxmorph_geometry::quality::qualities_of;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
+use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::problem::Analysis;
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
@@ -25,10 +26,12 @@ pub struct FieldData<'a> {
     pub error: Option<&'a [f64]>,
     /// One solution per state. For a piece only the potentials at its nodes matter.
     pub solutions: &'a [FieldSolution],
+    /// Bodies with the forces at their nodes in the first state; empty: no such array.
+    pub bodies: &'a [Body],
 }
 
 impl<'a> FieldData<'a> {
-    /// Those of an analysed design.
+    /// Those of an analysed design, without forces.
     pub fn of(analysis: &'a Analysis) -> Self {
         Self {
             mesh: &analysis.mesh,
@@ -37,6 +40,7 @@ impl<'a> FieldData<'a> {
             thickness: None,
             error: None,
             solutions: &analysis.solutions,
+            bodies: &[],
         }
     }
 }
@@ -55,8 +59,8 @@ pub fn vtu(states: &[FieldModel], data: &FieldData<'_>) -> Result<Vec<u8>, MeshE
     vtu_bytes(data.mesh, &arrays.at_nodes(), &arrays.in_cells())
 }
 
-/// The VTU file of some elements of a design and the nodes that they touch: what [`vtu`] has for them, and their numbers
-/// in the whole mesh.
+/// The VTU file of some elements of a design and the nodes that they touch: what [`vtu`] has for them without forces, which take
+/// elements of other pieces, and their numbers in the whole mesh.
 ///
 /// # Errors
 /// As [`vtu`], for values of the piece.
@@ -85,14 +89,24 @@ struct Arrays {
     region: Vec<i32>,
     quality: Vec<f64>,
     error: Option<Vec<f64>>,
+    force: Option<Vec<Point>>,
 }
 
 impl Arrays {
     fn new(states: &[FieldModel], data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
         let regions = data.mesh.topology().region_of();
-        let at = |values: &[Point]| nodes.iter().map(|n| values[n.index()]).collect();
+        let at = |values: &[Point]| -> Vec<Point> { nodes.iter().map(|n| values[n.index()]).collect() };
+        let force = (!data.bodies.is_empty()).then(|| {
+            let mut force = vec![[0.0; 3]; data.mesh.points().len()];
+            let of = |body: &Body| body.nodal(&states[0], data.mesh, &data.solutions[0]);
+            for (node, own) in data.bodies.iter().flat_map(of) {
+                (0..3).for_each(|d| force[node.index()][d] += own[d]);
+            }
+            at(&force)
+        });
         let states = states.iter().zip(data.solutions).enumerate();
         Self {
+            force,
             states: states
                 .map(|(index, (model, solution))| {
                     StateArrays::new(model, solution, data.mesh, index, nodes, elements)
@@ -114,6 +128,8 @@ impl Arrays {
         fields.push(Field { name: "sensitivity", data: ArrayData::Vector(&self.sensitivity) });
         let thickness = self.thickness.as_ref();
         fields.extend(thickness.map(|values| Field { name: "thickness", data: ArrayData::Scalar(values) }));
+        let force = self.force.as_ref();
+        fields.extend(force.map(|force| Field { name: "force", data: ArrayData::Vector(force) }));
         fields.extend(others.iter().flat_map(StateArrays::at_nodes));
         fields
     }

@@ -1,5 +1,8 @@
 //! `history.csv`: one row an evaluation, on the disk before the next evaluation starts.
 
+use std::collections::BTreeMap;
+
+use fluxmorph_optimizer::body::BodyForce;
 use serde_json::Value;
 
 use super::{OutputError, RunDirectory, SyncedLog, csv_text};
@@ -13,17 +16,19 @@ pub struct History {
 }
 
 impl History {
-    /// Starts the file with the rows so far; `constraints` are the names of the constraints in their order.
+    /// Starts the file with the rows so far; `constraints` and `bodies` are the names of the constraints and of the bodies whose
+    /// forces are reported, in their order.
     ///
     /// # Errors
     /// When the operating system refuses.
     pub fn create(
         directory: &RunDirectory,
-        constraints: &[&str],
+        (constraints, bodies): (&[&str], &[&str]),
         rows: &[&Evaluation],
     ) -> Result<Self, OutputError> {
-        let columns = columns(constraints);
-        let mut table = format!("{}\n", columns.join(","));
+        let columns = columns(constraints, bodies);
+        let head: Vec<String> = columns.iter().map(|column| csv_text(column)).collect();
+        let mut table = format!("{}\n", head.join(","));
         table.extend(rows.iter().map(|row| csv_line(row, &columns)));
         Ok(Self { csv: directory.log(&directory.history_csv(), table.as_bytes())?, columns })
     }
@@ -37,20 +42,25 @@ impl History {
     }
 }
 
-/// The columns of `history.csv`: those of every run, then one for each constraint.
-fn columns(constraints: &[&str]) -> Vec<String> {
+/// The columns of `history.csv`: those of every run, then one for each constraint, then six for each body.
+fn columns(constraints: &[&str], bodies: &[&str]) -> Vec<String> {
     let fixed = Evaluation::COLUMNS.iter().map(|&name| name.to_owned());
-    fixed.chain(constraints.iter().map(|name| column(name))).collect()
+    let at_rest =
+        |name: &&str| BodyForce { name: (*name).to_owned(), force_n: [0.0; 3], torque_nm: [0.0; 3] };
+    let of_body = |name| at_rest(name).columns().map(|(column, _)| column).collect::<Vec<_>>();
+    fixed.chain(constraints.iter().map(|name| column(name))).chain(bodies.iter().flat_map(of_body)).collect()
 }
 
 /// The line of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
 /// the device does not have.
 fn csv_line(evaluation: &Evaluation, columns: &[String]) -> String {
     let value = serde_json::to_value(evaluation).expect("numbers and text have a JSON form");
-    let cell = |column: &String| match &value[column] {
-        Value::Null => String::new(),
-        Value::String(text) => csv_text(text),
-        other => other.to_string(),
+    let forces: BTreeMap<String, f64> = evaluation.forces.iter().flat_map(BodyForce::columns).collect();
+    let cell = |column: &String| match (&value[column], forces.get(column)) {
+        (_, Some(force)) => Value::from(*force).to_string(),
+        (Value::Null, None) => String::new(),
+        (Value::String(text), None) => csv_text(text),
+        (other, None) => other.to_string(),
     };
     format!("{}\n", columns.iter().map(cell).collect::<Vec<_>>().join(","))
 }
@@ -77,6 +87,11 @@ mod tests {
             inversion_element: Some(17),
             inversion_region: Some("air, \"near\"".to_owned()),
             round: 0,
+            forces: vec![BodyForce {
+                name: "pole".to_owned(),
+                force_n: [0.5, 0.0, -1.25],
+                torque_nm: [0.0; 3],
+            }],
             constraints: [("c_volume".to_owned(), -0.5)].into(),
         }
     }
@@ -86,22 +101,24 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
             .expect("a run directory");
-        History::create(&run, &["volume"], &[&evaluation()])
+        History::create(&run, (&["volume"], &["pole"]), &[&evaluation()])
             .and_then(|mut history| history.append(&evaluation()))
             .expect("written");
 
-        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,-0.5\n";
+        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,-0.5,0.5,0.0,-1.25,0.0,0.0,0.0\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
                       min_thickness_m,max_thickness_m,linear_iterations,seconds,step_to_inversion,inversion_element,inversion_region,\
-                      round,c_volume\n";
+                      round,c_volume,force_pole_x_n,force_pole_y_n,force_pole_z_n,torque_pole_x_nm,torque_pole_y_nm,\
+                      torque_pole_z_nm\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));
     }
 
     #[test]
     fn every_column_is_a_field_and_every_field_a_column() {
-        let value = serde_json::to_value(evaluation()).expect("an object");
+        let without_forces = Evaluation { forces: Vec::new(), ..evaluation() };
+        let value = serde_json::to_value(without_forces).expect("an object");
         let keys: Vec<_> = value.as_object().expect("an object").keys().cloned().collect();
-        assert_eq!(keys, columns(&["volume"]));
+        assert_eq!(keys, columns(&["volume"], &[]));
     }
 }

@@ -44,6 +44,9 @@ pub struct Manifest {
     pub resumed: Vec<Resumption>,
     /// The mesh.
     pub mesh: Option<MeshHash>,
+    /// The B–H tables that were read from files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tables: Vec<FileHash>,
     /// Names of the STL files in the directory.
     #[serde(default)]
     pub surfaces: Vec<String>,
@@ -192,6 +195,7 @@ impl Manifest {
             limits: None,
             resumed: Vec::new(),
             mesh: None,
+            tables: Vec::new(),
             surfaces: Vec::new(),
             host: Host::this(),
             threads,

@@ -34,7 +34,7 @@ pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
 pub(crate) use result::to_json;
 pub use result::{
-    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HarmonicResult, HomogeneityResult,
+    Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,
     LinearSolverResult, MeshResult, MultipoleResult, ObjectiveResult, OpenResult, ProbeResult, RunResult,
     SaturatedRegion, SaturationResult, StateResult, TermResult, Verification,
 };

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_optimizer::body::BodyForce;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::problem::{RoundEvent, RoundStart};
 use serde::{Deserialize, Serialize};
@@ -50,7 +51,7 @@ pub struct RunResult {
     pub losses_w: BTreeMap<String, f64>,
     /// Force and torque on every body of the configuration, at the first frequency.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub forces: Vec<ForceResult>,
+    pub forces: Vec<BodyForce>,
     /// Newton's method and saturation, where there is a B–H curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
@@ -224,17 +225,6 @@ pub struct ConstraintResult {
     pub satisfied: bool,
 }
 
-/// Force and torque on a body, of the meshed part; in harmonics the time average.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ForceResult {
-    /// The body.
-    pub name: String,
-    /// [N].
-    pub force_n: [f64; 3],
-    /// About the point of the configuration [N m].
-    pub torque_nm: [f64; 3],
-}
-
 /// A nonlinear solution, and how far it goes into the curves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SaturationResult {
@@ -253,8 +243,12 @@ pub struct SaturatedRegion {
     pub highest_b_t: f64,
     /// Where [m].
     pub place_m: [f64; 3],
-    /// Last `B` of the curve's points [T].
-    pub table_ends_b_t: f64,
+    /// Last `B` of the curve's points [T]; `None` for a curve in closed form.
+    pub table_ends_b_t: Option<f64>,
+    /// Where its knee is: the `B` beyond which the differential permeability is below a tenth of its largest [T]; `None` where
+    /// there is no such field.
+    #[serde(default)]
+    pub knee_b_t: Option<f64>,
     /// Share of its volume beyond the knee: where the differential permeability is below a tenth of its largest.
     pub volume_share_beyond_knee: f64,
 }

@@ -20,7 +20,9 @@ mod solve;
 mod summary;
 pub mod sweep;
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -40,7 +42,7 @@ use crate::build::{Mode, Setup, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{
-    Disk, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
+    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
     check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
@@ -159,7 +161,8 @@ impl Session<'_> {
         let problem = &self.setup.problem;
         let (shape, constraints) = (problem.shape(), problem.constraints());
         let variables = shape.map_or(0, |shape| shape.surface().variable_count());
-        Identity::new(self.config, &self.setup.full_mesh, variables, constraints.len())
+        let read = (&self.setup.full_mesh, &self.setup.tables);
+        Identity::new(self.config, read, variables, constraints.len())
     }
 
     /// Optimises, and writes what the best design leaves.
@@ -311,6 +314,15 @@ impl Session<'_> {
         result.peak_memory_bytes = peak_memory_bytes();
         Ok(result)
     }
+}
+
+/// The B–H tables that were read, with the hashes of their content.
+fn table_hashes(tables: &BTreeMap<PathBuf, String>) -> Vec<FileHash> {
+    let of = |(path, blake3): (&PathBuf, &String)| FileHash {
+        path: path.display().to_string(),
+        blake3: blake3.clone(),
+    };
+    tables.iter().map(of).collect()
 }
 
 /// Origin and content hash of the mesh with all its regions.

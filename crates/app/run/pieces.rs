@@ -107,6 +107,7 @@ impl CommandHandler for PieceWriter {
             thickness,
             error: None,
             solutions: &solutions,
+            bodies: &[],
         };
         let rank = self.share.group.rank();
         let own = self.share.partition.elements_of(rank);

@@ -7,7 +7,7 @@ use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::problem::RoundEvent;
 
-use super::{Options, Session, mesh_hash};
+use super::{Options, Session, mesh_hash, table_hashes};
 use crate::build::locate_error::attribute_error;
 use crate::build::{Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
@@ -68,6 +68,7 @@ impl<'a> Prepared<'a> {
             RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
         let mut manifest = Manifest::new(command, options.threads).reading(source);
         manifest.mesh = Some(mesh_hash(config, &self.setup.full_mesh));
+        manifest.tables = table_hashes(&self.setup.tables);
         manifest.ranks = options.ranks.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
         manifest.limits = (command == "run").then(|| LimitsInForce::of(&config.optimizer));

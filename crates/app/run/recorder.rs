@@ -43,7 +43,8 @@ impl DirectoryRecorder {
         let names: Vec<&str> =
             problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect();
         let rows: Vec<&Evaluation> = replayed.iter().map(|record| &record.row).collect();
-        let history = History::create(&directory, &names, &rows)?;
+        let bodies: Vec<&str> = session.config.forces.iter().map(|body| body.name.as_str()).collect();
+        let history = History::create(&directory, (&names, &bodies), &rows)?;
         let mut written = directory.evaluations_with_fields()?;
         written.retain(|&evaluation| replayed.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
         // No collection names a file that is removed.
@@ -125,7 +126,7 @@ pub(super) fn write_field(
         return pieces.write(directory, evaluation, problem, analysis);
     }
     let thickness = thickness(problem, analysis);
-    let data = FieldData { error, thickness: thickness.as_deref(), ..FieldData::of(analysis) };
+    let data = FieldData { error, thickness: thickness.as_deref(), bodies: problem.bodies(), ..FieldData::of(analysis) };
     let bytes = fields::vtu(problem.states(), &data)?;
     Ok(directory.write_field(evaluation, &bytes)?)
 }

@@ -11,16 +11,16 @@ use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shap
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{
-    FieldModel, FieldSolution, Functional, RigidMotion, SolverError, recovery, saturation,
+    FieldModel, FieldSolution, Functional, SolverError, recovery, saturation,
 };
 
 use super::Session;
 use super::reservations::reservations;
-use crate::build::{force, multipole};
+use crate::build::multipole;
 use crate::config;
 use crate::error::Error;
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, DesignResult, ForceResult, HarmonicResult, HomogeneityResult,
+    Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,
     LinearSolverResult, MeshResult, MultipoleResult, OpenResult, ProbeResult, RunResult, SaturatedRegion,
     SaturationResult, StateResult, StopReason, TermResult, peak_memory_bytes,
 };
@@ -73,7 +73,7 @@ impl Session<'_> {
             frequencies_hz: self.config.analysis.frequencies().to_vec(),
             probes,
             losses_w,
-            forces: self.forces(analysis)?,
+            forces: analysis.forces.clone(),
             saturation: saturation(problem, analysis),
             states: if states.len() > 1 { states } else { Vec::new() },
             open: open(problem, analysis)?,
@@ -86,28 +86,6 @@ impl Session<'_> {
             warnings,
             peak_memory_bytes: peak_memory_bytes(),
         })
-    }
-
-    /// Force and torque on every body.
-    fn forces(&self, analysis: &Analysis) -> Result<Vec<ForceResult>, Error> {
-        let (model, mesh) = (&self.setup.problem.states()[0], &analysis.mesh);
-        let along = |body: &config::ForceBody, motion: fn(Point, Point) -> RigidMotion| {
-            let mut components = [0.0; 3];
-            for (d, component) in components.iter_mut().enumerate() {
-                let unit = std::array::from_fn(|i| f64::from(u8::from(i == d)));
-                let functional = force(body, mesh, model, motion(unit, body.about))?;
-                *component = functional.evaluate(model, mesh, &analysis.solutions[0])?.value;
-            }
-            Ok::<_, Error>(components)
-        };
-        let of = |body: &config::ForceBody| {
-            Ok(ForceResult {
-                name: body.name.clone(),
-                force_n: along(body, |direction, _| RigidMotion::Translation(direction))?,
-                torque_nm: along(body, |axis, about| RigidMotion::Rotation { axis, about })?,
-            })
-        };
-        self.config.forces.iter().map(of).collect()
     }
 
     /// The terms of every expansion.
@@ -200,6 +178,7 @@ fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult
         highest_b_t: found.highest,
         place_m: found.place,
         table_ends_b_t: found.end,
+        knee_b_t: found.knee,
         volume_share_beyond_knee: found.share_beyond_knee,
     };
     (!model.is_linear()).then(|| SaturationResult {

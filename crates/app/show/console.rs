@@ -75,7 +75,8 @@ impl<W: Write> Observer for Console<W> {
     fn newton(&mut self, progress: NewtonProgress) {
         if !self.has_evaluations {
             let NewtonProgress { steps, residual, energy, .. } = progress;
-            self.line(&format!("  Newton step {steps:>2}: residual {residual:.1e}, energy {energy:.6e} J"));
+            let energy = energy.map_or(String::new(), |energy| format!(", energy {energy:.6e} J"));
+            self.line(&format!("  Newton step {steps:>2}: residual {residual:.1e}{energy}"));
         }
     }
 

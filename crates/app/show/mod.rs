@@ -92,6 +92,7 @@ mod tests {
             inversion_element: Some(17),
             inversion_region: Some("plate".to_owned()),
             round: 0,
+            forces: Vec::new(),
             constraints: BTreeMap::new(),
         }
     }

@@ -1,11 +1,13 @@
 //! The end of a run, or of a single analysis, in a few lines.
 
+use fluxmorph_optimizer::body::BodyForce;
+
 use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Goal, Objective};
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, CrossCheck, ForceResult, ObjectiveResult, RunResult, RunStatus,
-    SAFETY, SaturatedRegion, Verdict,
+    Amplitude, CoilResult, ConstraintResult, CrossCheck, ObjectiveResult, RunResult, RunStatus, SAFETY,
+    SaturatedRegion, Verdict,
 };
 use crate::printable::printable;
 
@@ -58,7 +60,7 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
                 .map(|(region, loss)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)))),
         );
     }
-    for ForceResult { name, force_n: [x, y, z], .. } in &result.forces {
+    for BodyForce { name, force_n: [x, y, z], .. } in &result.forces {
         rows.push(("force", format!("({x:.6e}, {y:.6e}, {z:.6e}) N on {}", printable(name))));
     }
     if let Some(saturation) = &result.saturation {
@@ -94,12 +96,13 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
 /// How far a region goes into its B–H curve.
 fn saturated(region: &SaturatedRegion) -> Row {
     let SaturatedRegion { region: name, highest_b_t: highest, table_ends_b_t: end, .. } = region;
-    let beyond = if highest > end { ", beyond its curve" } else { "" };
+    let end = match end {
+        Some(end) if highest > end => format!(", beyond its curve, which ends at {end} T"),
+        Some(end) => format!(", whose curve ends at {end} T"),
+        None => String::new(),
+    };
     let share = 100.0 * region.volume_share_beyond_knee;
-    let text = format!(
-        "{highest:.3} T in {}{beyond}, which ends at {end} T; {share:.1} % is beyond the knee",
-        printable(name)
-    );
+    let text = format!("{highest:.3} T in {}{end}; {share:.1} % is beyond the knee", printable(name));
     ("highest B", text)
 }
 

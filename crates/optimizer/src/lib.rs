@@ -4,6 +4,7 @@
 //! It composes [`fluxmorph_solver`] and [`fluxmorph_remesh`]. What a person sees is not here: configuration keys, files,
 //! exit codes and the terminal belong to the application.
 
+pub mod body;
 pub mod constraint;
 pub mod design;
 pub mod driver;

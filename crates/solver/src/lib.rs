@@ -8,6 +8,7 @@
 //! crates' business.
 
 pub mod adjoint;
+mod amplitude;
 pub mod audit;
 pub mod bh;
 pub mod boundary;

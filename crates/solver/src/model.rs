@@ -12,6 +12,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
+use crate::amplitude;
 use crate::bh::BhCurve;
 use crate::boundary::{self, Boundary};
 use crate::circuit::{self, Border, Excitation, Winding, Windings};
@@ -50,8 +51,8 @@ pub struct FieldModelSetup {
     pub materials: Vec<Material>,
     /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
     pub remanence: Vec<Point>,
-    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Statics only. The permeability of the region's
-    /// material is then that of the penalty of nodal elements.
+    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Above 0 Hz it is that of the amplitude. The
+    /// permeability of the region's material is then that of the penalty of nodal elements.
     pub bh: Vec<Option<Arc<BhCurve>>>,
     /// Conductors replaced by their surfaces.
     pub conductors: Vec<Conductor>,
@@ -309,6 +310,9 @@ impl FieldModel {
         observer: &mut NewtonObserver<'_>,
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
+        if self.angular_frequency > 0.0 {
+            return amplitude::solve(self, mesh, cache, observer);
+        }
         newton::solve(self, mesh, cache, observer)
     }
 
@@ -545,8 +549,13 @@ fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
     if !setup.bh.iter().any(Option::is_some) {
         return Ok(());
     }
-    if setup.frequency > 0.0 {
-        return refuse("frequency", setup.frequency.to_string(), "0 Hz: a B–H curve is a static law");
+    let is_driven = setup.windings.iter().flatten().any(|winding| winding.voltage.is_some());
+    if setup.frequency > 0.0 && is_driven {
+        return refuse(
+            "voltage",
+            "of a coil beside a B–H curve".to_owned(),
+            "a given current: above 0 Hz a circuit is solved with linear materials",
+        );
     }
     if setup.ownership.is_some() {
         return refuse(

@@ -8,9 +8,10 @@
 
 use fluxmorph_geometry::fem::scalar::{axpy, dot, norm};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::tet4::{Point, centroid};
+use fluxmorph_geometry::tet4::centroid;
 use fluxmorph_geometry::{ElementId, Mesh};
 
+use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::linear::{LinearSolverCache, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
@@ -18,13 +19,13 @@ use crate::nonlinear::{self, Added};
 use crate::solution::FieldSolution;
 
 /// Steps after which there is no hope: five to fifteen are usual.
-const MOST_STEPS: usize = 60;
+pub(crate) const MOST_STEPS: usize = 60;
 
 /// Halvings of one step: the energy is convex, so that one of them is short enough unless rounding is all that is left.
 const MOST_HALVINGS: usize = 30;
 
 /// Relative residual above which a state is refused [1].
-const REQUIRED: f64 = 1e-10;
+pub(crate) const REQUIRED: f64 = 1e-10;
 
 /// The part of the promised decrease that is asked for (Nocedal and Wright: 1e-4).
 const ARMIJO: f64 = 1e-4;
@@ -33,7 +34,7 @@ const ARMIJO: f64 = 1e-4;
 const ENERGY_ROUNDING: f64 = 1e-13;
 
 /// A residual that a step leaves at more than this part of itself is rounding, once it is below `REQUIRED`.
-const STAGNATION: f64 = 0.1;
+pub(crate) const STAGNATION: f64 = 0.1;
 
 /// Where Newton's method stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,8 +43,8 @@ pub struct NewtonProgress {
     pub steps: usize,
     /// `|residual| / |load|`.
     pub residual: f64,
-    /// `W` [J].
-    pub energy: f64,
+    /// `W` [J]; `None` in harmonics, where eddy currents leave nothing that is minimised.
+    pub energy: Option<f64>,
     /// Length of the last step over Newton's own: one, or what halving left of it.
     pub damping: f64,
 }
@@ -135,7 +136,7 @@ pub(crate) fn solve(
     let (mut steps, mut before, mut damping) = (1, f64::INFINITY, 1.0);
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
-        observer(NewtonProgress { steps, residual, energy: iterate.energy, damping });
+        observer(NewtonProgress { steps, residual, energy: Some(iterate.energy), damping });
         let tangent = model.assemble_tangent(mesh, &iterate.added.tangents);
         let mut system = model.prepare_with(tangent, &mut cache)?;
         if residual <= tolerance || residual <= REQUIRED && residual > STAGNATION * before {
@@ -143,27 +144,36 @@ pub(crate) fn solve(
             let values = iterate.solution.values().to_vec();
             return Ok((FieldSolution::state(values, report).after_newton(steps), system));
         }
-        let refused = |from: &FieldSolution, to: &FieldSolution| {
-            let (element, flux_density) = least_settled(model, mesh, from, to);
-            let region = model.topology().region_of()[element.index()];
-            SolverError::Newton {
-                steps,
-                residual,
-                region: model.topology().region_names()[region.index()].clone(),
-                place: centroid(mesh.vertices(element)),
-                flux_density,
-            }
-        };
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
         let (step, report) = system.solve(&right_side)?;
         let Some((next, length)) = problem.search(&iterate, &step).filter(|_| steps < MOST_STEPS) else {
             let mut values = iterate.solution.values().to_vec();
             axpy(c64::from(1.0), &step, &mut values);
-            return Err(refused(&iterate.solution, &FieldSolution::of_state(values)));
+            let to = FieldSolution::of_state(values);
+            return Err(refused(model, mesh, (steps, residual), &iterate.solution, &to));
         };
         cache = system.into_cache().without_initial_guess();
         iterations += report.iterations;
         (steps, before, damping, iterate) = (steps + 1, residual, length, next);
+    }
+}
+
+/// Why there is no state: what a step from one to another would change most.
+pub(crate) fn refused(
+    model: &FieldModel,
+    mesh: &Mesh,
+    (steps, residual): (usize, f64),
+    from: &FieldSolution,
+    to: &FieldSolution,
+) -> SolverError {
+    let (element, flux_density) = least_settled(model, mesh, from, to);
+    let region = model.topology().region_of()[element.index()];
+    SolverError::Newton {
+        steps,
+        residual,
+        region: model.topology().region_names()[region.index()].clone(),
+        place: centroid(mesh.vertices(element)),
+        flux_density,
     }
 }
 
@@ -176,12 +186,12 @@ fn least_settled(
 ) -> (ElementId, f64) {
     let elements = model.elements_with_a_law();
     let fields = |of: &FieldSolution| of.flux_densities_of(model, mesh, elements);
-    let size = |b: Point| b.iter().map(|b| b * b).sum::<f64>().sqrt();
+    let size = |b: Complex3| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
     let mut worst = (elements[0], 0.0, -1.0);
     for ((&e, a), b) in elements.iter().zip(fields(from)).zip(fields(to)) {
-        let change = size(std::array::from_fn(|d| b[d].re - a[d].re));
+        let change = size(std::array::from_fn(|d| b[d] - a[d]));
         if change > worst.2 {
-            worst = (e, size(a.map(|c| c.re)), change);
+            worst = (e, size(a), change);
         }
     }
     (worst.0, worst.1)

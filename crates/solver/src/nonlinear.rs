@@ -8,7 +8,6 @@
 //! residual, tangent and shape derivative are derivatives of one another to the last digit on any mesh.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh};
 use rayon::prelude::*;
 
@@ -32,6 +31,11 @@ pub(crate) struct Tangents {
 }
 
 impl Tangents {
+    /// Those of some elements, ascending.
+    pub(crate) fn new(elements: Vec<ElementId>, tensors: Vec<[Tangent; MOST_POINTS]>) -> Self {
+        Self { elements, tensors }
+    }
+
     /// Those of an element; `None` where its material is linear.
     #[inline]
     pub(crate) fn of(&self, e: ElementId) -> Option<&[Tangent; MOST_POINTS]> {
@@ -79,28 +83,30 @@ fn of_element(
     let (mut tensors, mut point) = ([[[0.0; 3]; 3]; MOST_POINTS], 0);
     let integral =
         space.elements().flux_integral(&space.cell(mesh, e), state.element(model, e).values(), &mut |b| {
+            let (value, by_b) = energy(curve, b);
             let b = b.map(|c| c.re);
             tensors[point] = less(curve.tangent(b), reluctivity);
             point += 1;
-            let (value, by_b) = energy(curve, b);
             let linear = 0.5 * reluctivity * b.iter().map(|b| b * b).sum::<f64>();
             (value - linear, std::array::from_fn(|d| by_b[d] - 0.5 * reluctivity * b[d]))
         });
     (integral, tensors)
 }
 
-/// The energy density `w(|B|)` [J/m³], with its derivatives halved.
-pub(crate) fn energy(curve: &BhCurve, b: Point) -> OfFlux {
-    let size = b.iter().map(|b| b * b).sum::<f64>().sqrt();
-    (curve.at(size).energy, curve.field_strength(b).map(|h| c64::from(0.5 * h)))
+/// The energy density `w(|B|)` [J/m³], with its derivatives halved; of a phasor that of its amplitude, twice the mean.
+pub(crate) fn energy(curve: &BhCurve, b: Complex3) -> OfFlux {
+    let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+    let (reluctivity, _) = curve.amplitude(b);
+    (curve.at(size).energy, b.map(|c| 0.5 * reluctivity * c.conj()))
 }
 
-/// `H(B_u) − ν_r B_u` and `(∂H/∂B − ν_r) B_l`, from `B_l` and `B_u`: what the shape derivative takes.
-pub(crate) fn response(curve: &BhCurve, reluctivity: f64, l: Complex3, u: Complex3) -> [Complex3; 2] {
-    let b = u.map(|c| c.re);
-    let (field, tensor) = (curve.field_strength(b), less(curve.tangent(b), reluctivity));
-    let turned = tensor.map(|row| (0..3).map(|j| row[j] * l[j]).sum());
-    [std::array::from_fn(|d| c64::from(field[d] - reluctivity * b[d])), turned]
+/// `H(B_u) − ν_r B_u` and `(∂H/∂B − ν_r) B_l`, from `B_l` and `B_u`: what the shape derivative takes. Of phasors the second has the
+/// derivative's adjoint, as `crate::amplitude` says.
+pub(crate) fn response(curve: &BhCurve, linear: f64, l: Complex3, u: Complex3) -> [Complex3; 2] {
+    let (reluctivity, along) = curve.amplitude(u);
+    let excess = reluctivity - linear;
+    let work = along * (0..3).map(|d| (u[d] * l[d]).re).sum::<f64>();
+    [u.map(|u| excess * u), std::array::from_fn(|d| excess * l[d] + work * u[d].conj())]
 }
 
 fn less(mut tensor: Tangent, reluctivity: f64) -> Tangent {

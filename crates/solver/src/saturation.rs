@@ -3,6 +3,7 @@
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh};
 
+use crate::bh::BhCurve;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 
@@ -15,8 +16,10 @@ pub struct Saturation {
     pub highest: f64,
     /// Where [m].
     pub place: Point,
-    /// The last `B` of the curve's points [T].
-    pub end: f64,
+    /// The last `B` of the curve's points [T]; `None` for a closed form.
+    pub end: Option<f64>,
+    /// The `B` above which the differential permeability is below a tenth of its largest [T]; `None` where there is none.
+    pub knee: Option<f64>,
     /// Share of the volume in which the differential permeability is below a tenth of its largest.
     pub share_beyond_knee: f64,
 }
@@ -28,7 +31,7 @@ pub fn by_region(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> V
     let mut found: Vec<Option<(Saturation, [f64; 2])>> = vec![None; topology.region_names().len()];
     let sizes = solution.flux_densities_of(model, mesh, elements);
     for (&e, b) in elements.iter().zip(sizes) {
-        let size = b.iter().map(|c| c.re * c.re).sum::<f64>().sqrt();
+        let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let region = topology.region_of()[e.index()].index();
         let (saturation, volumes) = found[region]
             .get_or_insert_with(|| (of_region(model, &topology.region_names()[region], e), [0.0; 2]));
@@ -36,8 +39,7 @@ pub fn by_region(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> V
             (saturation.highest, saturation.place) = (size, centroid(mesh.vertices(e)));
         }
         let v = volume(mesh.vertices(e));
-        let knee = model.curve_of(e).map_or(f64::INFINITY, |curve| curve.knee());
-        volumes[0] += if size > knee { v } else { 0.0 };
+        volumes[0] += if saturation.knee.is_some_and(|knee| size > knee) { v } else { 0.0 };
         volumes[1] += v;
     }
     let share = |(saturation, [beyond, all]): (Saturation, [f64; 2])| Saturation {
@@ -52,7 +54,8 @@ fn of_region(model: &FieldModel, name: &str, e: ElementId) -> Saturation {
         region: name.to_owned(),
         highest: 0.0,
         place: [0.0; 3],
-        end: model.curve_of(e).map_or(0.0, |curve| curve.end()[1]),
+        end: model.curve_of(e).and_then(|curve| curve.end()).map(|[_, b]| b),
+        knee: model.curve_of(e).and_then(BhCurve::knee),
         share_beyond_knee: 0.0,
     }
 }

@@ -5,10 +5,12 @@
 //! `--include-ignored` all of them; `just verify` puts them into the page.
 
 mod case;
+mod coil_forces;
 mod forces;
 mod page;
 mod plate;
 mod rows;
+mod saturated_spheroid;
 mod shield;
 mod sphere;
 mod steel;

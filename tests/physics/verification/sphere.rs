@@ -21,10 +21,10 @@ use crate::orders::Study;
 use crate::references::{complex, material, named, number, reference};
 
 /// Outer radius over that of the sphere.
-const BOX: f64 = 8.0;
+pub(super) const BOX: f64 = 8.0;
 
 /// Conditions of an octant in the unit field along z.
-fn setup(mesh: &Mesh, frequency: f64, material: Material, order: Order) -> FieldModelSetup {
+pub(super) fn setup(mesh: &Mesh, frequency: f64, material: Material, order: Order) -> FieldModelSetup {
     let of = |name: &str| if name == "sphere" { material } else { Material::AIR };
     let applied = UniformField { flux_density: [0.0, 0.0, 1.0], centre: None };
     let boundaries = [
@@ -139,7 +139,7 @@ fn parameters(radius: f64, skin_depth: f64, refinement: f64) -> SphereParameters
 }
 
 /// A sphere without layers.
-fn coarse(radius: f64, refinement: f64) -> SphereParameters {
+pub(super) fn coarse(radius: f64, refinement: f64) -> SphereParameters {
     let outer_radius = BOX * radius;
     SphereParameters {
         radius,

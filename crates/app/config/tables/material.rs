@@ -7,12 +7,15 @@ use serde_json::json;
 
 use crate::config::section::Section;
 use crate::config::table::rules::{Rules, present};
-use crate::config::table::table;
+use crate::config::table::{one_of, table};
 use crate::config::value::choice::choice;
 
 table! {
-    /// An isotropic material: linear, or with a B–H curve in magnetostatics. Any number of them, each with a name of its own. A
-    /// list or table in place of a number, an anisotropic material, is refused.
+    /// An isotropic material: linear, or with a B–H curve. Any number of them, each with a name of its own. A list or table in
+    /// place of a number, an anisotropic material, is refused.
+    ///
+    /// A curve holds for static fields, and above 0 Hz for amplitudes: the field strength of the curve at the peak of the flux
+    /// density, of which the fundamental alone is computed. That is an approximation.
     ///
     /// ```toml
     /// [materials.steel]
@@ -23,13 +26,18 @@ table! {
     pub struct Material {
         /// Permeability over that of vacuum; below 1 too. Most conductors are not magnetic.
         relative_permeability: f64 = number(POSITIVE) => 1.0;
-        /// B–H curve of iron that saturates: points `[H, B]` [A/m, T] in ascending order, from the origin, which may be left out.
-        /// Instead of `relative_permeability`, and for magnetostatics only. Between the points the curve is a smooth monotone
-        /// cubic, beyond the last one its slope is that of vacuum.
-        bh: Option<Vec<[f64; 2]>> = not_empty(number(FINITE));
+        /// B–H curve of iron that saturates: points `[H, B]` [A/m, T] in ascending order, from the origin, which may be left out, or
+        /// the name of a steel that `fluxmorph generate materials` prints. Instead of `relative_permeability`. Between the points
+        /// the curve is a smooth monotone cubic, beyond the last one its slope is that of vacuum.
+        bh: Option<WrittenCurve> = ONE_OF;
         /// The same from a file, relative to the folder of the configuration: on each line H [A/m] and B [T], with a comma between
         /// them; lines that begin with `#` are comments. Instead of `bh`.
         bh_file: Option<PathBuf> = TEXT;
+        /// Polarisation B − μ0 H at which iron is saturated [T]: a curve in closed form, of which `relative_permeability` is the
+        /// initial permeability. Instead of `bh`.
+        saturation: Option<f64> = quantity(FluxDensity, POSITIVE);
+        /// With `saturation`: how the curve comes to it. Default `"sharp"`.
+        knee: Option<KneeWord> = WORD;
         /// Electric conductivity [S/m]. A material conducts only when it is told to.
         conductivity: f64 = quantity(Conductivity, NOT_NEGATIVE) => 0.0;
         /// Mass density [kg/m³]; needed where `[[constraints]]` limit a mass.
@@ -40,9 +48,41 @@ table! {
     rules = one_law;
 }
 
+one_of! {
+    /// A B–H curve in the configuration itself.
+    pub enum WrittenCurve {
+        /// Of a steel that the program knows.
+        Named(Steel) = WORD, if text;
+        /// Points `[H, B]` [A/m, T].
+        Points(Vec<[f64; 2]>) = not_empty(number(FINITE));
+    }
+}
+
+choice! {
+    /// Steels that the program knows, with their sources.
+    pub enum Steel {
+        /// The construction steel (SS400) of TEAM workshop problem 20.
+        Team20 = "team20_steel",
+        /// The cold-rolled steel of TEAM workshop problems 10 and 13.
+        Team13 = "team13_steel",
+    }
+}
+
+choice! {
+    /// How a curve in closed form comes to saturation.
+    pub enum KneeWord {
+        /// Straight up to it, with a corner rounded over a twentieth.
+        Sharp = "sharp",
+        /// Along an arctangent, as soft iron does.
+        Arctangent = "arctan",
+    }
+}
+
 /// A curve comes from one place, and stands in place of the permeability.
 fn one_law(rules: Rules) -> Rules {
-    rules.not_both(["bh", "bh_file"]).add(json!({
+    let rules =
+        rules.not_both(["bh", "bh_file"]).not_both(["bh", "saturation"]).not_both(["bh_file", "saturation"]);
+    rules.needs("saturation", &["relative_permeability"]).needs("knee", &["saturation"]).add(json!({
         "if": { "anyOf": present(&["bh", "bh_file"]) },
         "then": { "properties": { "relative_permeability": { "const": 1 } } },
     }))
@@ -90,21 +130,36 @@ table! {
 impl Material {
     /// Whether it has a B–H curve.
     pub fn saturates(&self) -> bool {
-        self.bh.is_some() || self.bh_file.is_some()
+        self.bh.is_some() || self.bh_file.is_some() || self.saturation.is_some()
     }
 
     /// A curve comes from one place, and stands in place of the permeability.
     fn check(&mut self, section: &Section<'_>) {
-        if section.has("bh") && section.has("bh_file") {
-            let message = format!("`{}` has both `bh` and `bh_file`", section.path());
-            section.clash(["bh", "bh_file"], message, "one of them");
+        for keys in [["bh", "bh_file"], ["bh", "saturation"], ["bh_file", "saturation"]] {
+            if keys.iter().all(|key| section.has(key)) {
+                let message = format!("`{}` has both `{}` and `{}`", section.path(), keys[0], keys[1]);
+                section.clash(keys, message, "one of them");
+            }
         }
-        if self.saturates() && self.relative_permeability != 1.0 {
+        if self.bh.is_some() || self.bh_file.is_some() {
+            if self.relative_permeability != 1.0 {
+                let message = format!(
+                    "`{}` has a relative permeability beside its B–H curve, which says it for every field",
+                    section.path()
+                );
+                section.wrong("relative_permeability", message, "one of the two");
+            }
+        } else if section.has("saturation") && self.relative_permeability <= 1.0 {
             let message = format!(
-                "`{}` has a relative permeability beside its B–H curve, which says it for every field",
-                section.path()
+                "`{}` saturates, but its initial relative permeability is {}",
+                section.path(),
+                self.relative_permeability
             );
-            section.wrong("relative_permeability", message, "one of the two");
+            section.wrong("saturation", message, "relative_permeability above 1, such as 1000");
+        }
+        if section.has("knee") && !section.has("saturation") {
+            let message = format!("`{}` has a knee without `saturation`", section.path());
+            section.wrong("knee", message, "saturation = \"2.1 T\" beside it");
         }
     }
 
@@ -158,7 +213,7 @@ pub(super) fn check_regions(
         match materials.get(&region.material) {
             Some(material) => {
                 if material.saturates() {
-                    check_curve(&section, region, largest);
+                    check_curve(&section, region);
                 }
                 if region.model == RegionModel::Impedance {
                     check_impedance(&section, &region.material, material, least);
@@ -190,18 +245,9 @@ fn check_impedance(section: &Section<'_>, name: &str, material: &Material, frequ
     }
 }
 
-/// A B–H curve is a law of static fields in what is meshed.
-fn check_curve(section: &Section<'_>, region: &Region, frequency: f64) {
+/// A B–H curve is a law of what is meshed, and a magnet has a straight recoil line.
+fn check_curve(section: &Section<'_>, region: &Region) {
     let name = &region.material;
-    if frequency > 0.0 {
-        section.wrong(
-            "material",
-            format!(
-                "`{name}` has a B–H curve, but the frequency is {frequency} Hz: it is a law of static fields"
-            ),
-            format!("analysis.frequency = 0, or a relative_permeability in materials.{name}"),
-        );
-    }
     if region.model == RegionModel::Impedance {
         section.wrong(
             "model",

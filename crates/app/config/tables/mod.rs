@@ -36,7 +36,7 @@ pub use force::ForceBody;
 pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
-pub use material::{Material, Region, RegionModel};
+pub use material::{KneeWord, Material, Region, RegionModel, Steel, WrittenCurve};
 pub use mesh::{
     BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,
     SphereMesh,

@@ -1,4 +1,7 @@
-//! What a journal belongs to: the version of the program, the configuration, the mesh.
+//! What a journal belongs to: the version of the program, the configuration, the mesh, the B–H tables.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use fluxmorph_geometry::Mesh;
 use serde::{Deserialize, Serialize};
@@ -17,6 +20,9 @@ pub struct Identity {
     pub configuration: String,
     /// [`mesh_hash`] of the undeformed mesh.
     pub mesh: String,
+    /// [`tables_hash`] of the B–H tables that are read from files; empty where there are none.
+    #[serde(default)]
+    pub tables: String,
     /// Number of design variables.
     pub variables: usize,
     /// Number of constraints.
@@ -25,9 +31,15 @@ pub struct Identity {
 
 impl Identity {
     /// That of a problem with so many variables and constraints.
-    pub fn new(config: &Config, mesh: &Mesh, variables: usize, constraints: usize) -> Self {
+    pub fn new(
+        config: &Config,
+        (mesh, tables): (&Mesh, &BTreeMap<PathBuf, String>),
+        variables: usize,
+        constraints: usize,
+    ) -> Self {
         let (configuration, mesh) = (configuration_hash(config), mesh_hash(mesh));
-        Self { version: VERSION.to_owned(), configuration, mesh, variables, constraints }
+        let tables = tables_hash(config, tables);
+        Self { version: VERSION.to_owned(), configuration, mesh, tables, variables, constraints }
     }
 
     /// Whether a journal of this identity belongs to the problem that is there now.
@@ -55,6 +67,9 @@ impl Identity {
                 short(&self.mesh),
                 short(&now.mesh)
             )
+        } else if self.tables != now.tables {
+            "it belongs to other B–H tables: a file that `bh_file` names has changed; restore it, manifest.json has its hash"
+                .to_owned()
         } else if sizes(self) != sizes(now) {
             format!("it has {} variables and constraints, the problem has {}", sizes(self), sizes(now))
         } else {
@@ -65,8 +80,8 @@ impl Identity {
 
 /// BLAKE3 of everything in a configuration that an evaluation or the method depends on, hexadecimal.
 ///
-/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may be resumed. Nor is
-/// the path of a mesh file: its content is in [`mesh_hash`].
+/// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may be resumed. Nor are
+/// the paths of a mesh file and of B–H tables: their content is in [`mesh_hash`] and [`tables_hash`].
 pub fn configuration_hash(config: &Config) -> String {
     let mut bare = config.clone();
     let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
@@ -77,7 +92,20 @@ pub fn configuration_hash(config: &Config) -> String {
     if let MeshConfig::File { path, .. } = &mut bare.mesh {
         path.clear();
     }
+    for path in bare.materials.values_mut().filter_map(|material| material.bh_file.as_mut()) {
+        path.clear();
+    }
     blake3::hash(resolved_toml(&bare).as_bytes()).to_hex().to_string()
+}
+
+/// BLAKE3 of the names of the materials with a table from a file and of its content, hexadecimal; empty where there are none.
+fn tables_hash(config: &Config, tables: &BTreeMap<PathBuf, String>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for (name, material) in &config.materials {
+        let Some(hash) = material.bh_file.as_ref().and_then(|path| tables.get(path)) else { continue };
+        hasher.update(name.as_bytes()).update(b"\n").update(hash.as_bytes()).update(b"\n");
+    }
+    if tables.is_empty() { String::new() } else { hasher.finalize().to_hex().to_string() }
 }
 
 /// BLAKE3 of points, tetrahedra, regions with their names and cells, and surfaces with their triangles, hexadecimal.

@@ -95,8 +95,9 @@ fn parse_header(bytes: &[u8]) -> Result<(Identity, usize, String), JournalError>
     let identity: Identity = serde_json::from_slice(line).map_err(|_| JournalError::Header)?;
     let is_hash = |text: &str| text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
     let is_version = |text: &str| text.len() <= LONGEST_VERSION && !text.contains(char::is_control);
-    let Identity { version, configuration, mesh, .. } = &identity;
-    let is_sound = is_version(version) && is_hash(configuration) && is_hash(mesh);
+    let Identity { version, configuration, mesh, tables, .. } = &identity;
+    let hashes = is_hash(configuration) && is_hash(mesh) && (tables.is_empty() || is_hash(tables));
+    let is_sound = is_version(version) && hashes;
     if is_sound { Ok((identity, line.len(), sum)) } else { Err(JournalError::Header) }
 }
 

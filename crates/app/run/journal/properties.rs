@@ -53,7 +53,8 @@ fn written() -> impl Strategy<Value = Written> {
         let texts = ("[0-9a-f]{64}", "[0-9a-f]{64}", "[0-9.a-z]{0,10}");
         (texts, vec(record(variables, constraints), 0..4)).prop_map(
             move |((configuration, mesh, version), records)| {
-                let identity = Identity { version, configuration, mesh, variables, constraints };
+                let identity =
+                    Identity { version, configuration, mesh, tables: String::new(), variables, constraints };
                 Written::new(identity, records)
             },
         )

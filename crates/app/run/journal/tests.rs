@@ -14,6 +14,7 @@ pub(super) fn identity() -> Identity {
         version: "1.2.3".into(),
         configuration: "1".repeat(64),
         mesh: "2".repeat(64),
+        tables: "3".repeat(64),
         variables: 3,
         constraints: 1,
     }
@@ -38,6 +39,7 @@ pub(super) fn record(number: usize) -> Record {
             inversion_element: None,
             inversion_region: Some("air,\"sum\":\"gap\"".to_owned()),
             round: 1,
+            forces: Vec::new(),
             constraints: BTreeMap::from([("c_volume".to_owned(), -0.5)]),
         },
         improved: number.is_multiple_of(2),
@@ -180,6 +182,7 @@ fn another_file_is_refused() {
         Identity { version: "1\x1b[2J".into(), ..identity() },
         Identity { version: "1".repeat(65), ..identity() },
         Identity { mesh: "ä".repeat(32), ..identity() },
+        Identity { tables: "ä".repeat(32), ..identity() },
     ] {
         assert_eq!(parse(&Written::new(odd, Vec::new()).bytes), Err(JournalError::Header));
     }
@@ -233,6 +236,7 @@ fn the_first_difference_between_identities_is_named() {
             "another configuration (hash 0909090909090909,",
         ),
         (Identity { mesh: "9".repeat(64), ..identity() }, "another mesh"),
+        (Identity { tables: String::new(), ..identity() }, "other B–H tables"),
         (Identity { variables: 4, ..identity() }, "4 and 1 variables"),
     ] {
         let message = other.check(&now).expect_err("different");

@@ -202,6 +202,7 @@ impl Run<'_> {
             inversion_element: analysis.inversion.element.map(ElementId::index),
             inversion_region: analysis.inversion.element.map(region),
             round: shape.motion().round(),
+            forces: analysis.forces.clone(),
             constraints: BTreeMap::new(),
         };
         let constraint = |measured: &Measured| {

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::body::BodyForce;
+
 /// One evaluation of objective, constraints and gradients; a row of the history.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
@@ -37,6 +39,9 @@ pub struct Evaluation {
     pub inversion_region: Option<String>,
     /// Rounds of the mesh motion begun so far (see [`fluxmorph_optimizer::driver`]).
     pub round: usize,
+    /// Force and torque on every body whose force is reported.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<BodyForce>,
     /// Relative distance of every constraint from its bound, satisfied where ≤ 0, by column (see [`column`]).
     #[serde(flatten)]
     pub constraints: BTreeMap<String, f64>,

@@ -7,6 +7,8 @@ use fluxmorph_remesh::StepToInversion;
 use fluxmorph_solver::FieldSolution;
 use fluxmorph_solver::linear::SolverEvent;
 
+use crate::body::BodyForce;
+
 /// Wall time of the parts of an evaluation [s].
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Timings {
@@ -52,6 +54,8 @@ pub struct Analysis {
     pub terms: Vec<f64>,
     /// What the constraints measure, in their order.
     pub constraints: Vec<Measured>,
+    /// Force and torque on every body, in the first state.
+    pub forces: Vec<BodyForce>,
     /// dF/dp [unit of F per m], if asked for.
     pub gradient: Option<Vec<f64>>,
     /// dF/dx at the nodes that may move [unit of F per m], if asked for; shape `(n_nodes, 3)`.

@@ -12,6 +12,7 @@ use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
 use super::progress::{Progress, Stage};
 use super::stopwatch::Stopwatch;
 use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings, finite};
+use crate::body::Body;
 use crate::constraint::{Constraint, Quantity};
 use crate::error::Error;
 use crate::objective::Term;
@@ -92,7 +93,9 @@ impl Problem {
         let Sums { objective, solutions, events, .. } = sums;
         let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
+        let of_body = |body: &Body| body.force(&self.states[0], &mesh, &solutions[0]);
         let analysis = Analysis {
+            forces: self.bodies.iter().map(of_body).collect(),
             displacement,
             inversion,
             solutions,

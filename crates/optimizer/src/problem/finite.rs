@@ -108,6 +108,11 @@ pub fn analysis(analysis: &Analysis, constraints: &[Constraint]) -> Result<(), E
             return Err(Error::NotFinite { what: name, value: measured.value, expected: SUM });
         }
     }
+    for force in &analysis.forces {
+        if let Some((column, value)) = force.columns().find(|(_, value)| !value.is_finite()) {
+            return Err(Error::NotFinite { what: format!("`{column}`"), value, expected: FIELD });
+        }
+    }
     let value = analysis.quality.worst;
     if !value.is_finite() {
         let what = format!("the quality of element {}", analysis.quality.worst_element);

@@ -29,6 +29,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_remesh::{Moved, RemeshError, StepToInversion};
 use fluxmorph_solver::FieldModel;
 
+use crate::body::Body;
 use crate::constraint::{Bound, Constraint, Limit};
 use crate::error::Error;
 use crate::objective::WeightedSum;
@@ -51,6 +52,7 @@ pub struct Problem {
     constraints: Vec<Constraint>,
     shape: Option<Shape>,
     share: Option<Ownership>,
+    bodies: Vec<Body>,
 }
 
 impl Problem {
@@ -73,7 +75,7 @@ impl Problem {
             "a term is measured on states of the problem"
         );
         assert!(constraints.is_empty() || shape.is_some(), "what is constrained can move");
-        Self { original, states, objective, constraints, shape, share: None }
+        Self { original, states, objective, constraints, shape, share: None, bodies: Vec::new() }
     }
 
     /// The same with its work shared out among ranks.
@@ -82,14 +84,20 @@ impl Problem {
         Self { share, ..self }
     }
 
+    /// The same with bodies on which the first state's force is reported.
+    #[must_use]
+    pub fn with_bodies(self, bodies: Vec<Body>) -> Self {
+        Self { bodies, ..self }
+    }
+
     /// The same with other states.
     ///
     /// # Panics
     /// As [`Problem::new`].
     #[must_use]
     pub fn with_states(self, states: Vec<FieldModel>) -> Self {
-        let Self { original, objective, constraints, shape, share, .. } = self;
-        Self::new(original, states, objective, constraints, shape).shared_out(share)
+        let Self { original, objective, constraints, shape, share, bodies, .. } = self;
+        Self::new(original, states, objective, constraints, shape).shared_out(share).with_bodies(bodies)
     }
 
     /// Lets go of states, constraints and shape, which hold nearly all of the memory: the undeformed mesh is left, and
@@ -131,6 +139,11 @@ impl Problem {
     /// What moves, to change the round or the limits of its motion.
     pub fn shape_mut(&mut self) -> Option<&mut Shape> {
         self.shape.as_mut()
+    }
+
+    /// Bodies on which force and torque are reported.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
     }
 
     /// The ranks among which the work is shared out; `None` for one process.

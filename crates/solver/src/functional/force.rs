@@ -10,6 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::tet4::{Point, cross, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use rayon::prelude::*;
 
 use super::integral::Sum;
 use super::{FunctionalValue, is_static};
@@ -40,6 +41,19 @@ impl RigidMotion {
             Self::Rotation { axis, about } => cross(axis, sub(x, about)),
         }
     }
+}
+
+/// Force [N] and torque [N m] of what acts on the nodes of a body ([`Force::nodal`]), the torque about a point.
+pub fn resultant(nodal: &BTreeMap<NodeId, Point>, mesh: &Mesh, about: Point) -> [Point; 2] {
+    let mut sums = [[0.0; 3]; 2];
+    for (&node, &force) in nodal {
+        let torque = cross(sub(mesh.point(node), about), force);
+        for d in 0..3 {
+            sums[0][d] += force[d];
+            sums[1][d] += torque[d];
+        }
+    }
+    sums
 }
 
 /// The force on some regions.
@@ -101,6 +115,40 @@ impl Force {
         Ok(Self { layer: layer.into_iter().collect(), body, motion })
     }
 
+    /// What acts on every node of the body [N], ascending by node: minus the derivative of the layer's energy by its position.
+    /// Sums of it are force and torque; nodes inside the body have nothing.
+    pub fn nodal(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> BTreeMap<NodeId, Point> {
+        let (space, topology) = (model.space(), model.topology());
+        let of_element = |&e: &ElementId| {
+            let field = solution.element(model, e);
+            let at_rest = [[0.0; 3]; 4];
+            let elements = space.elements();
+            elements.virtual_work(&space.cell(mesh, e), self.law(model, e), &at_rest, field.values()).1
+        };
+        // Computed in parallel, added in the order of the elements.
+        let terms: Vec<[Point; 4]> = self.layer.par_iter().map(of_element).collect();
+        let mut sums = BTreeMap::new();
+        for (&e, terms) in self.layer.iter().zip(&terms) {
+            for (node, term) in topology.tet(e).into_iter().zip(terms) {
+                let Some(held) = self.body.get(&node) else { continue };
+                let sum: &mut Point = sums.entry(node).or_default();
+                (0..3).filter(|d| held >> d & 1 == 0).for_each(|d| sum[d] -= term[d]);
+            }
+        }
+        sums
+    }
+
+    /// Share of the energy `ν|B|²` of an element, and the penalty.
+    fn law(&self, model: &FieldModel, e: ElementId) -> [f64; 2] {
+        let share = if is_static(model) { 0.5 } else { 0.25 };
+        [share * model.coefficients_of(e).reluctivity, model.setup().penalty]
+    }
+
     pub(super) fn evaluate(
         &self,
         model: &FieldModel,
@@ -108,7 +156,6 @@ impl Force {
         solution: &FieldSolution,
     ) -> FunctionalValue {
         let space = model.space();
-        let share = if is_static(model) { 0.5 } else { 0.25 };
         let free = |node: NodeId, vector: Point| -> Point {
             let held = self.body.get(&node).copied().unwrap_or(0b111);
             std::array::from_fn(|d| if held >> d & 1 == 1 { 0.0 } else { vector[d] })
@@ -118,7 +165,7 @@ impl Force {
             let nodes = model.topology().tet(e);
             // Minus the rate: the velocities are turned round.
             let velocities = nodes.map(|node| free(node, self.motion.velocity(mesh.point(node))).map(|v| -v));
-            let law = [share * model.coefficients_of(e).reluctivity, model.setup().penalty];
+            let law = self.law(model, e);
             let field = solution.element(model, e);
             let (mut rate, by_velocity) =
                 space.elements().virtual_work(&space.cell(mesh, e), law, &velocities, field.values());

@@ -24,7 +24,8 @@ const CHUNK: usize = 8192;
 /// The integral of a density.
 #[derive(Clone, Debug)]
 pub enum Integral {
-    /// `½∫ν|B − B_r|²` [J] in statics, `∫w(|B|)` where there is a B–H law, `¼∫ν|B|²` in harmonics, over these elements, ascending.
+    /// `½∫ν|B − B_r|²` [J] in statics, `∫w(|B|)` where there is a B–H law, half of that at the amplitude and `¼∫ν|B|²` in
+    /// harmonics, over these elements, ascending.
     Energy(Vec<ElementId>),
     /// `½∫σ|E|²` [W] over these elements, ascending.
     VolumeLoss(Vec<ElementId>),
@@ -87,7 +88,10 @@ impl Integral {
                 sum.elements(of, |e| {
                     let (cell, field) = (space.cell(mesh, e), solution.element(model, e));
                     if let Some(curve) = model.curve_of(e) {
-                        let density = &mut |b: Complex3| nonlinear::energy(curve, b.map(|c| c.re));
+                        let density = &mut |b: Complex3| {
+                            let (value, by_b) = nonlinear::energy(curve, b);
+                            (2.0 * share * value, by_b.map(|c| 2.0 * share * c))
+                        };
                         return elements.flux_integral(&cell, field.values(), density);
                     }
                     let factor = share * model.coefficients_of(e).reluctivity;

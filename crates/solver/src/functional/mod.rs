@@ -23,7 +23,7 @@ use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-pub use force::{Force, RigidMotion};
+pub use force::{Force, RigidMotion, resultant};
 pub use homogeneity::{Compared, FieldQuality};
 pub use inductance::{InductanceFunctional, Inductive};
 pub use integral::Integral;

@@ -7,6 +7,7 @@ use super::distributed::DistributedSystem;
 use super::method::Method;
 use super::report::LinearSolverReport;
 use super::system::{LocalSystem, SolverEvent};
+use crate::amplitude::AmplitudeTangent;
 use crate::circuit::{Border, Excitation};
 use crate::error::SolverError;
 
@@ -24,6 +25,8 @@ pub(crate) enum FieldSystem {
 pub struct PreparedSystem {
     field: FieldSystem,
     border: Option<Border>,
+    /// Where the derivative of the equations is linear over the real numbers alone: then the matrix is its preconditioner.
+    tangent: Option<Box<AmplitudeTangent>>,
 }
 
 impl PreparedSystem {
@@ -38,7 +41,17 @@ impl PreparedSystem {
         ) -> Result<Option<Border>, SolverError>,
     ) -> Result<Self, SolverError> {
         let border = border(&mut |right_side| field.solve(right_side))?;
-        Ok(Self { field, border })
+        Ok(Self { field, border, tangent: None })
+    }
+
+    /// The same with a derivative that the matrix is nearest to.
+    pub(crate) fn with_tangent(self, tangent: AmplitudeTangent) -> Self {
+        Self { tangent: Some(Box::new(tangent)), ..self }
+    }
+
+    /// The field's matrix alone.
+    pub(crate) fn into_field(self) -> FieldSystem {
+        self.field
     }
 
     /// The matrix of the field; `None` where it is on several ranks.
@@ -75,10 +88,7 @@ impl PreparedSystem {
 
     /// What the next design may start from.
     pub fn into_cache(self) -> LinearSolverCache {
-        match self.field {
-            FieldSystem::Local(system) => system.into_cache(),
-            FieldSystem::Distributed(_) => LinearSolverCache::default(),
-        }
+        self.field.into_cache()
     }
 
     /// Solves `K x = b` of the field alone.
@@ -112,7 +122,10 @@ impl PreparedSystem {
         right_side: &[c64],
         excitation: Excitation<'_>,
     ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
-        let (mut values, report) = self.field.solve(right_side)?;
+        let (mut values, report) = match &self.tangent {
+            Some(tangent) => tangent.solve_adjoint(right_side, &mut self.field)?,
+            None => self.field.solve(right_side)?,
+        };
         let border = self.border.as_ref();
         let currents = border.map(|border| border.complete(&mut values, excitation)).unwrap_or_default();
         Ok((values, report, currents))
@@ -120,6 +133,26 @@ impl PreparedSystem {
 }
 
 impl FieldSystem {
+    /// What the next design may start from.
+    pub(crate) fn into_cache(self) -> LinearSolverCache {
+        match self {
+            Self::Local(system) => system.into_cache(),
+            Self::Distributed(_) => LinearSolverCache::default(),
+        }
+    }
+
+    /// Solves, and keeps nothing of it for other designs: one of very many.
+    pub(crate) fn solve_once(
+        &mut self,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let solved = self.solve(right_side)?;
+        if let Self::Local(system) = self {
+            system.forget_last();
+        }
+        Ok(solved)
+    }
+
     fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
         match self {
             Self::Local(system) => system.solve(right_side),

@@ -213,6 +213,11 @@ impl LocalSystem {
         Ok((x, report))
     }
 
+    /// Lets go of the last solution, as the start of no other.
+    pub(crate) fn forget_last(&mut self) {
+        self.solutions.pop();
+    }
+
     /// The solution of the design before where it is nearer than zero.
     fn start(&mut self, right_side: &[c64], scale: f64) -> Vec<c64> {
         let position = self.solutions.len();

@@ -1,22 +1,16 @@
-//! B–H laws: `H` as a function of `B` for isotropic material that saturates.
+//! A table of points `(H_i, B_i)` as a law: a monotone cubic in `b` with a continuous derivative.
 //!
-//! `H = h(|B|) B/|B|` with `h` increasing, so that the energy density `w(b) = ∫₀ᵇ h` is convex in `B` and its tangent
-//! `∂H/∂B = h/b I + (h' − h/b) B Bᵀ/b²` positive definite. A table `(H_i, B_i)` becomes a monotone cubic in `b` with a
-//! continuous derivative (Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238): slopes of parabolas through three
-//! points, reduced into the circle of radius 3. At zero the slope is that of the odd continuation, so that the initial
-//! permeability is the table's. Beyond the last point the material is saturated: `h = H_N + (b − B_N)/μ0`; the slope is
-//! continuous there where the table ends at less than twice the permeability of vacuum ([`BhCurve::ends_saturated`]).
+//! Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238: slopes of parabolas through three points, reduced into the circle of
+//! radius 3. At zero the slope is that of the odd continuation, so that the initial permeability is the table's. Beyond the last
+//! point the material is saturated: `h = H_N + (b − B_N)/μ0`; the slope is continuous there where the table ends at less than
+//! twice the permeability of vacuum ([`Table::ends_saturated`]).
 
-use fluxmorph_geometry::tet4::{Point, dot};
-
+use super::BhPoint;
 use crate::material::VACUUM_PERMEABILITY;
-
-/// A symmetric `∂H/∂B` [m/H].
-pub type Tangent = [[f64; 3]; 3];
 
 /// A monotone table of `H` over `B`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BhCurve {
+pub(super) struct Table {
     /// `B_i` [T], from zero.
     flux_density: Vec<f64>,
     /// `H_i` [A/m].
@@ -93,29 +87,18 @@ pub enum BhFault {
     },
 }
 
-/// A law at one `b = |B|`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BhPoint {
-    /// `h` [A/m].
-    pub field_strength: f64,
-    /// `h'` [m/H].
-    pub slope: f64,
-    /// `w` [J/m³].
-    pub energy: f64,
-}
-
 /// Largest relative permeability `B/(μ0 H)` of a table: ten times that of the softest alloys.
 const LARGEST_PERMEABILITY: f64 = 1e7;
 
 /// Largest polarisation `B − μ0 H` of a table [T]: four times that of iron and cobalt. More is another unit.
 const LARGEST_POLARISATION: f64 = 10.0;
 
-impl BhCurve {
+impl Table {
     /// From points `[H, B]` [A/m, T]; the origin may be among them.
     ///
     /// # Errors
     /// The number of the point at fault, from zero, and what is wrong with it.
-    pub fn new(points: &[[f64; 2]]) -> Result<Self, (usize, BhFault)> {
+    pub(super) fn new(points: &[[f64; 2]]) -> Result<Self, (usize, BhFault)> {
         let skipped = usize::from(points.first() == Some(&[0.0, 0.0]));
         let (mut flux_density, mut field_strength) = (vec![0.0], vec![0.0]);
         for (row, &[h, b]) in points.iter().enumerate().skip(skipped) {
@@ -138,7 +121,7 @@ impl BhCurve {
 
     /// The law at `b = |B|` [T], not negative.
     #[inline]
-    pub fn at(&self, b: f64) -> BhPoint {
+    pub(super) fn at(&self, b: f64) -> BhPoint {
         let last = self.flux_density.len() - 1;
         let beyond = b - self.flux_density[last];
         if beyond >= 0.0 {
@@ -169,53 +152,32 @@ impl BhCurve {
         }
     }
 
-    /// `H` [A/m] of a flux density [T].
-    #[inline]
-    pub fn field_strength(&self, b: Point) -> Point {
-        let size = dot(b, b).sqrt();
-        let reluctivity = self.reluctivity(size, self.at(size));
-        b.map(|b| reluctivity * b)
-    }
-
-    /// `∂H/∂B` [m/H] at a flux density [T].
-    #[inline]
-    pub fn tangent(&self, b: Point) -> Tangent {
-        let size = dot(b, b).sqrt();
-        let at = self.at(size);
-        let reluctivity = self.reluctivity(size, at);
-        let along = if size > 0.0 { (at.slope - reluctivity) / (size * size) } else { 0.0 };
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| along * b[i] * b[j] + if i == j { reluctivity } else { 0.0 })
-        })
-    }
-
-    /// `h/b`; at zero its limit.
-    #[inline]
-    fn reluctivity(&self, size: f64, at: BhPoint) -> f64 {
-        if size > 0.0 { at.field_strength / size } else { self.slope[0] }
+    /// `h'` at zero [m/H].
+    pub(super) fn initial_slope(&self) -> f64 {
+        self.slope[0]
     }
 
     /// The largest `B/(μ0 H)` of the table's points.
-    pub fn largest_permeability(&self) -> f64 {
+    pub(super) fn largest_permeability(&self) -> f64 {
         let points = self.flux_density.iter().zip(&self.field_strength).skip(1);
         points.map(|(b, h)| b / (VACUUM_PERMEABILITY * h)).fold(0.0, f64::max)
     }
 
     /// The last point `[H, B]` [A/m, T].
-    pub fn end(&self) -> [f64; 2] {
+    pub(super) fn end(&self) -> [f64; 2] {
         let last = self.flux_density.len() - 1;
         [self.field_strength[last], self.flux_density[last]]
     }
 
     /// The least of the points' `B` [T] above which the differential permeability is less than a tenth of its largest.
-    pub fn knee(&self) -> f64 {
+    pub(super) fn knee(&self) -> f64 {
         let least = self.slope.iter().copied().fold(f64::INFINITY, f64::min);
         let last_soft = self.slope.iter().rposition(|&slope| slope <= 10.0 * least);
         last_soft.and_then(|i| self.flux_density.get(i + 1)).copied().unwrap_or(self.end()[1])
     }
 
     /// Whether the table ends at less than twice the permeability of vacuum, `ΔB/ΔH < 2 μ0`.
-    pub fn ends_saturated(&self) -> bool {
+    pub(super) fn ends_saturated(&self) -> bool {
         let last = self.flux_density.len() - 1;
         ends_saturated(
             (self.field_strength[last] - self.field_strength[last - 1])
@@ -300,7 +262,7 @@ mod tests {
     #[test]
     fn the_curve_passes_through_its_points_and_rises_with_a_continuous_slope() {
         let points = saturating(32);
-        let curve = BhCurve::new(&points).expect("a sound table");
+        let curve = Table::new(&points).expect("a sound table");
         assert!(curve.ends_saturated());
         for &[h, b] in &points {
             assert!((curve.at(b).field_strength - h).abs() <= 1e-12 * h);
@@ -318,7 +280,7 @@ mod tests {
 
     #[test]
     fn slope_and_energy_are_derivative_and_integral_of_the_field_strength() {
-        let curve = BhCurve::new(&saturating(24)).expect("a sound table");
+        let curve = Table::new(&saturating(24)).expect("a sound table");
         for i in 1..400 {
             let b = 0.011 * f64::from(i);
             let at = curve.at(b);
@@ -331,32 +293,9 @@ mod tests {
     }
 
     #[test]
-    fn the_tangent_is_the_derivative_of_the_field_strength() {
-        let curve = BhCurve::new(&saturating(24)).expect("a sound table");
-        for b in [[0.3, -0.2, 0.5], [1.2, 0.9, -1.1], [2.0, 1.0, 1.5], [1e-4, 0.0, 0.0]] {
-            let tangent = curve.tangent(b);
-            for j in 0..3 {
-                let moved = |s: f64| {
-                    let mut b = b;
-                    b[j] += s;
-                    curve.field_strength(b)
-                };
-                for i in 0..3 {
-                    let difference = central(|s| moved(s)[i], 0.0, 1e-7);
-                    assert!((difference - tangent[i][j]).abs() < 1e-4 * tangent[0][0].abs(), "{b:?} {i} {j}");
-                }
-            }
-        }
-        // At zero the material is linear, with the slope of the first two points.
-        let [h, b] = saturating(24)[1];
-        assert_eq!(curve.tangent([0.0; 3])[1], [0.0, h / b, 0.0]);
-        assert_eq!(curve.field_strength([0.0; 3]), [0.0; 3]);
-    }
-
-    #[test]
     fn a_straight_table_is_a_linear_material() {
         let reluctivity = 1.0 / (800.0 * VACUUM_PERMEABILITY);
-        let curve = BhCurve::new(&[0.1, 0.5, 0.7, 2.0].map(|b| [reluctivity * b, b])).expect("a sound table");
+        let curve = Table::new(&[0.1, 0.5, 0.7, 2.0].map(|b| [reluctivity * b, b])).expect("a sound table");
         for i in 0..200 {
             let b = 0.01 * f64::from(i);
             let at = curve.at(b);
@@ -376,7 +315,7 @@ mod tests {
         let worst = |n: usize| {
             let step = 4000.0 / n as f64;
             let points: Vec<[f64; 2]> = (0..=n).map(|i| step * i as f64).map(|h| [h, law(h)]).collect();
-            let curve = BhCurve::new(&points).expect("a sound table");
+            let curve = Table::new(&points).expect("a sound table");
             let off = |i: usize| {
                 let h = 3000.0 * i as f64 / 997.0;
                 (curve.at(law(h)).field_strength - h).abs()
@@ -389,7 +328,7 @@ mod tests {
 
     #[test]
     fn bad_tables_are_refused_at_their_row() {
-        let refused = |points: &[[f64; 2]]| BhCurve::new(points).expect_err("it is no law");
+        let refused = |points: &[[f64; 2]]| Table::new(points).expect_err("it is no law");
         assert_eq!(refused(&[]), (0, BhFault::TooFew));
         assert_eq!(refused(&[[0.0, 0.0], [10.0, 0.1]]), (1, BhFault::TooFew));
         let second = |point: [f64; 2]| refused(&[[100.0, 0.5], point, [1e4, 1.9]]);

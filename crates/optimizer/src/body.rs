@@ -1,0 +1,76 @@
+//! Bodies on which force and torque are reported with every evaluation.
+
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{Mesh, NodeId, RegionId};
+use fluxmorph_solver::functional::{Force, resultant};
+use fluxmorph_solver::{FieldModel, FieldSolution, RigidMotion, SolverError};
+use serde::{Deserialize, Serialize};
+
+/// A body with the layer of elements in which its force is taken.
+#[derive(Clone, Debug)]
+pub struct Body {
+    name: String,
+    /// The point that the torque is taken about [m].
+    about: Point,
+    force: Force,
+}
+
+/// Force and torque on a body, of the meshed part; in harmonics the time average.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyForce {
+    /// The body.
+    pub name: String,
+    /// [N].
+    pub force_n: Point,
+    /// About the body's point [N m].
+    pub torque_nm: Point,
+}
+
+impl Body {
+    /// The body that some regions make up.
+    ///
+    /// # Errors
+    /// As [`Force::new`].
+    pub fn new(
+        model: &FieldModel,
+        mesh: &Mesh,
+        name: &str,
+        regions: &[RegionId],
+        about: Point,
+    ) -> Result<Self, SolverError> {
+        // Which motion does not matter: the forces at the nodes hold all of them.
+        let force = Force::new(model, mesh, name, regions, RigidMotion::Translation([0.0, 0.0, 1.0]))?;
+        Ok(Self { name: name.to_owned(), about, force })
+    }
+
+    /// What acts on its nodes [N].
+    pub fn nodal(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> BTreeMap<NodeId, Point> {
+        self.force.nodal(model, mesh, solution)
+    }
+
+    /// Its force and torque.
+    pub fn force(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> BodyForce {
+        let [force_n, torque_nm] = resultant(&self.nodal(model, mesh, solution), mesh, self.about);
+        BodyForce { name: self.name.clone(), force_n, torque_nm }
+    }
+}
+
+impl BodyForce {
+    /// The columns of the history: `force_NAME_x_n` …, `torque_NAME_x_nm` …, with their values.
+    pub fn columns(&self) -> impl Iterator<Item = (String, f64)> + '_ {
+        let of = |what: &'static str, unit: &'static str, values: Point| {
+            ["x", "y", "z"]
+                .into_iter()
+                .zip(values)
+                .map(move |(axis, v)| (format!("{what}_{}_{axis}_{unit}", self.name), v))
+        };
+        of("force", "n", self.force_n).chain(of("torque", "nm", self.torque_nm))
+    }
+}

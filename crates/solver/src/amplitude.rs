@@ -1,0 +1,360 @@
+//! Time-harmonic iron by the effective reluctivity of the amplitude.
+//!
+//! `H = ν(|B|) B` with `ν(b) = h(b)/b` of the static law, where `B` is a peak phasor and `|B|² = Bᴴ B`: the fundamental alone, as if
+//! the material followed its curve at the peak of the field. It is an approximation: real iron has harmonics. The law is no
+//! complex-differentiable function, its derivative is linear over the real numbers alone,
+//!
+//! `dH = ν dB + α B Re(Bᴴ dB)`, `α = (h' − ν)/|B|²`;
+//!
+//! with eddy currents nothing is minimised either. Newton's steps are solved by GMRES over the real numbers
+//! (`linear::gmres`), preconditioned by the complex symmetric matrix with the tensor `ν I + ½ α Re(B Bᴴ)`, the part of the
+//! derivative that such a matrix can hold. With `∂F/∂u` as of a linear problem, `dF = 2 Re(dᵀ du)`, the adjoint law is
+//! `ν L + α B̄ Re(Bᵀ L)`: the same number `Re Lᵀ dH`.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::scalar::{axpy, norm};
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use rayon::prelude::*;
+
+use crate::bh::{BhCurve, Tangent};
+use crate::element::Complex3;
+use crate::element::tensor::MOST_POINTS;
+use crate::error::{NonConvergence, SolverError};
+use crate::linear::gmres::{self, Ended};
+use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem};
+use crate::model::FieldModel;
+use crate::newton::{self, MOST_STEPS, NewtonObserver, NewtonProgress, REQUIRED, STAGNATION};
+use crate::nonlinear::Tangents;
+use crate::solution::FieldSolution;
+
+/// Elements whose integrals are held at once: some megabytes.
+const CHUNK: usize = 8192;
+
+/// Halvings of one step: Newton's direction lowers the residual, so that one of them is short enough.
+const MOST_HALVINGS: usize = 12;
+
+/// The part of the promised decrease of the residual that is asked for (Nocedal and Wright: 1e-4).
+const ARMIJO: f64 = 1e-4;
+
+/// A residual of a step's own system [1], at most: Newton's method need not know its direction better far from the solution.
+const LOOSEST: f64 = 1e-2;
+
+/// Applications of the tangent for one system: some tens are usual, where the curve has its knee.
+const MOST_APPLICATIONS: usize = 400;
+
+/// The law at one point of an element, less its linear part.
+#[derive(Clone, Copy, Debug, Default)]
+struct PointLaw {
+    /// `ν(|B|) − ν_r` [m/H].
+    excess: f64,
+    /// `α` [m/H/T²].
+    along: f64,
+    flux_density: Complex3,
+}
+
+/// Which of the two derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    State,
+    Adjoint,
+}
+
+impl PointLaw {
+    fn new(curve: &BhCurve, reluctivity: f64, b: Complex3) -> Self {
+        let (nu, along) = curve.amplitude(b);
+        Self { excess: nu - reluctivity, along, flux_density: b }
+    }
+
+    /// What a further field changes `H − ν_r B` by.
+    fn derivative(&self, side: Side, of: Complex3) -> Complex3 {
+        let own = match side {
+            Side::State => self.flux_density,
+            Side::Adjoint => self.flux_density.map(|b| b.conj()),
+        };
+        let along = self.along * own.iter().zip(&of).map(|(b, d)| (b.conj() * d).re).sum::<f64>();
+        std::array::from_fn(|d| self.excess * of[d] + along * own[d])
+    }
+
+    /// The tensor of the preconditioner, less `ν_r`.
+    fn tensor(&self) -> Tangent {
+        let b = self.flux_density;
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                let along = 0.5 * self.along * (b[i] * b[j].conj()).re;
+                along + if i == j { self.excess } else { 0.0 }
+            })
+        })
+    }
+}
+
+/// The derivative of the field's equations in one state.
+#[derive(Debug)]
+pub(crate) struct AmplitudeTangent {
+    model: FieldModel,
+    mesh: Mesh,
+    /// Of the linear parts.
+    matrix: CsrMatrix<c64>,
+    /// By the elements with a law, in their order.
+    points: Vec<[PointLaw; MOST_POINTS]>,
+}
+
+impl AmplitudeTangent {
+    /// The derivative along some unknowns.
+    fn apply(&self, side: Side, x: &[c64]) -> Vec<c64> {
+        let mut y = vec![c64::default(); x.len()];
+        self.matrix.mul(x, &mut y);
+        // Without the prescribed part of `A`, which does not change.
+        let change = FieldSolution::adjoint(x.to_vec(), LinearSolverReport { iterations: 0, residual: 0.0 });
+        let law =
+            |position: usize, point: usize, b: Complex3| self.points[position][point].derivative(side, b);
+        add_strengths(&self.model, &self.mesh, &change, &law, &mut y);
+        y
+    }
+
+    /// Solves with the derivative, preconditioned by a system of the matrix that is nearest to it.
+    fn invert(
+        &self,
+        side: Side,
+        right_side: &[c64],
+        nearest: &mut FieldSystem,
+        tolerance: f64,
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let mut inner = 0;
+        let operator = &mut |x: &[c64]| Ok(self.apply(side, x));
+        let preconditioner = &mut |r: &[c64]| {
+            let (z, report) = nearest.solve_once(r)?;
+            inner += report.iterations;
+            Ok(z)
+        };
+        let limits = (tolerance, MOST_APPLICATIONS);
+        let (x, Ended { residual, .. }) = gmres::solve(right_side, operator, preconditioner, limits)?;
+        Ok((x, LinearSolverReport { iterations: inner, residual }))
+    }
+
+    /// Solves the adjoint problem.
+    ///
+    /// # Errors
+    /// [`SolverError::NotConverged`], and those of the preconditioner.
+    pub(crate) fn solve_adjoint(
+        &self,
+        right_side: &[c64],
+        nearest: &mut FieldSystem,
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let settings = &self.model.setup().linear_solver;
+        let (x, report) = self.invert(Side::Adjoint, right_side, nearest, settings.tolerance)?;
+        let LinearSolverReport { residual, iterations } = report;
+        if residual <= settings.required {
+            return Ok((x, report));
+        }
+        let (required, cause) = (settings.required, NonConvergence::IllConditioned);
+        Err(SolverError::NotConverged { residual, required, iterations, cause })
+    }
+
+    /// The tensors of the complex symmetric matrix that is nearest.
+    fn tensors(&self) -> Tangents {
+        let of = |points: &[PointLaw; MOST_POINTS]| points.map(|point| point.tensor());
+        Tangents::new(self.model.elements_with_a_law().to_vec(), self.points.iter().map(of).collect())
+    }
+}
+
+/// Adds `∫H·curl w` over the elements with a law, for an `H` by position of the element, point and `B`.
+fn add_strengths(
+    model: &FieldModel,
+    mesh: &Mesh,
+    state: &FieldSolution,
+    strength: &(dyn Fn(usize, usize, Complex3) -> Complex3 + Sync),
+    sum: &mut [c64],
+) {
+    let (space, elements) = (model.space(), model.elements_with_a_law());
+    for (number, chunk) in elements.chunks(CHUNK).enumerate() {
+        let of_element = |(k, &e): (usize, &_)| {
+            let mut point = 0;
+            let density = &mut |b| {
+                point += 1;
+                (0.0, strength(number * CHUNK + k, point - 1, b))
+            };
+            let field = state.element(model, e);
+            space.elements().flux_integral(&space.cell(mesh, e), field.values(), density).potentials
+        };
+        let of_chunk: Vec<_> = chunk.par_iter().enumerate().map(of_element).collect();
+        // In the order of the elements, whatever the number of threads.
+        for (&e, potentials) in chunk.iter().zip(of_chunk) {
+            for (&carrier, terms) in space.carriers_of(e).iter().zip(potentials.values()) {
+                model.unknowns().scatter_add(sum, carrier, *terms);
+            }
+        }
+    }
+}
+
+/// A state on the way.
+struct Iterate {
+    values: Vec<c64>,
+    residual: Vec<c64>,
+}
+
+/// The problem of one mesh.
+struct Problem<'a> {
+    model: &'a FieldModel,
+    mesh: &'a Mesh,
+    matrix: CsrMatrix<c64>,
+    load: Vec<c64>,
+}
+
+impl Problem<'_> {
+    /// Some unknowns with their residual.
+    fn at(&self, values: Vec<c64>) -> Iterate {
+        let mut residual = vec![c64::default(); values.len()];
+        self.matrix.mul(&values, &mut residual);
+        axpy(c64::from(-1.0), &self.load, &mut residual);
+        let elements = self.model.elements_with_a_law();
+        let strength = |position: usize, _: usize, b: Complex3| {
+            let e = elements[position];
+            let curve = self.model.curve_of(e).expect("an element with a law");
+            let excess = curve.amplitude(b).0 - self.model.coefficients_of(e).reluctivity;
+            b.map(|b| excess * b)
+        };
+        let state = FieldSolution::of_state(values.clone());
+        add_strengths(self.model, self.mesh, &state, &strength, &mut residual);
+        Iterate { values, residual }
+    }
+
+    /// The derivative at some unknowns.
+    fn tangent(&self, values: &[c64]) -> AmplitudeTangent {
+        let (space, model) = (self.model.space(), self.model);
+        let state = FieldSolution::of_state(values.to_vec());
+        let of_element = |&e: &_| {
+            let curve = model.curve_of(e).expect("an element with a law");
+            let (mut points, mut count) = ([PointLaw::default(); MOST_POINTS], 0);
+            let density = &mut |b| {
+                points[count] = PointLaw::new(curve, model.coefficients_of(e).reluctivity, b);
+                count += 1;
+                (0.0, [c64::default(); 3])
+            };
+            space.elements().flux_integral(
+                &space.cell(self.mesh, e),
+                state.element(model, e).values(),
+                density,
+            );
+            points
+        };
+        let points = model.elements_with_a_law().par_iter().map(of_element).collect();
+        AmplitudeTangent {
+            model: model.clone(),
+            mesh: self.mesh.clone(),
+            matrix: self.matrix.clone(),
+            points,
+        }
+    }
+
+    /// The longest of Newton's step and its halves that lowers the residual, and its length.
+    fn search(&self, from: &Iterate, step: &[c64]) -> Option<(Iterate, f64)> {
+        let (before, mut length) = (norm(&from.residual), 1.0);
+        for _ in 0..MOST_HALVINGS {
+            let mut values = from.values.clone();
+            axpy(c64::from(length), step, &mut values);
+            let trial = self.at(values);
+            if norm(&trial.residual) <= (1.0 - ARMIJO * length) * before {
+                return Some((trial, length));
+            }
+            length *= 0.5;
+        }
+        None
+    }
+}
+
+/// Solves the state problem of a time-harmonic model with B–H laws; also returns the system with the derivative in that state,
+/// for the adjoint.
+///
+/// # Errors
+/// [`SolverError::Newton`], and those of the linear solver.
+pub(crate) fn solve(
+    model: &FieldModel,
+    mesh: &Mesh,
+    cache: &LinearSolverCache,
+    observer: &mut NewtonObserver<'_>,
+) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+    let problem = Problem { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
+    let (scale, settings) = (norm(&problem.load), &model.setup().linear_solver);
+    let mut cache = LinearSolverCache::with_method(cache.method());
+    let mut system = model.prepare_with(problem.matrix.clone(), &mut cache)?;
+    let (values, LinearSolverReport { mut iterations, .. }) = system.solve_field(&problem.load)?;
+    cache = system.into_cache().without_initial_guess();
+    let zero = problem.at(vec![c64::default(); values.len()]);
+    let mut iterate = problem.at(values);
+    if norm(&zero.residual) < norm(&iterate.residual) {
+        iterate = zero;
+    }
+    let (mut steps, mut before, mut damping) = (1, f64::INFINITY, 1.0);
+    loop {
+        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
+        observer(NewtonProgress { steps, residual, energy: None, damping });
+        let tangent = problem.tangent(&iterate.values);
+        let nearest = model.assemble_tangent(mesh, &tangent.tensors());
+        let system = model.prepare_with(nearest, &mut cache)?;
+        if residual <= settings.tolerance || residual <= REQUIRED && residual > STAGNATION * before {
+            let report = LinearSolverReport { iterations, residual };
+            let state = FieldSolution::state(iterate.values, report).after_newton(steps);
+            return Ok((state, system.with_tangent(tangent)));
+        }
+        let mut field = system.into_field();
+        let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
+        // As exact as the next residual is small.
+        let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual);
+        let (step, report) = tangent.invert(Side::State, &right_side, &mut field, tolerance)?;
+        let Some((next, length)) = problem.search(&iterate, &step).filter(|_| steps < MOST_STEPS) else {
+            let mut values = iterate.values.clone();
+            axpy(c64::from(1.0), &step, &mut values);
+            let [from, to] = [iterate.values, values].map(FieldSolution::of_state);
+            return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
+        };
+        cache = field.into_cache().without_initial_guess();
+        iterations += report.iterations;
+        (steps, before, damping, iterate) = (steps + 1, residual, length, next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::VACUUM_PERMEABILITY;
+
+    fn curve() -> BhCurve {
+        let point = |i: i32| {
+            let h = 20.0 * (1.3_f64.powi(i) - 1.0);
+            [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
+        };
+        BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
+    }
+
+    const FIELDS: [Complex3; 3] = [
+        [c64::new(0.8, 0.1), c64::new(-0.3, 0.9), c64::new(0.2, -0.7)],
+        [c64::new(1.4, -0.6), c64::new(0.5, 0.3), c64::new(-1.1, 0.2)],
+        [c64::new(1e-5, 0.0), c64::new(0.0, 1e-5), c64::new(0.0, 0.0)],
+    ];
+
+    fn strength(curve: &BhCurve, b: Complex3) -> Complex3 {
+        b.map(|c| curve.amplitude(b).0 * c)
+    }
+
+    #[test]
+    fn the_derivative_of_the_law_is_that_of_differences_and_its_adjoint_gives_the_same_work() {
+        let curve = curve();
+        let change: Complex3 = [c64::new(0.3, -0.8), c64::new(0.6, 0.2), c64::new(-0.5, 0.4)];
+        let dual: Complex3 = [c64::new(-0.2, 0.5), c64::new(0.9, -0.1), c64::new(0.3, 0.7)];
+        for b in FIELDS {
+            let law = PointLaw::new(&curve, 0.0, b);
+            let found = law.derivative(Side::State, change);
+            let moved = |s: f64| strength(&curve, std::array::from_fn(|d| b[d] + s * change[d]));
+            let (plus, minus) = (moved(1e-7), moved(-1e-7));
+            let size = found.iter().map(|c| c.norm()).fold(0.0, f64::max);
+            for d in 0..3 {
+                let difference = (plus[d] - minus[d]) / 2e-7;
+                // Truncation and rounding of central differences.
+                assert!((difference - found[d]).norm() < 1e-5 * size, "{b:?} {d}: {difference} {}", found[d]);
+            }
+            let work = |l: Complex3, h: Complex3| (0..3).map(|d| (l[d] * h[d]).re).sum::<f64>();
+            let (ahead, back) = (work(dual, found), work(law.derivative(Side::Adjoint, dual), change));
+            assert!((ahead - back).abs() < 1e-12 * ahead.abs(), "{ahead} {back}");
+        }
+    }
+}
