@@ -12,7 +12,7 @@
 //! `ν L + α B̄ Re(Bᵀ L)`: the same number `Re Lᵀ dH`.
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::fem::scalar::{axpy, norm};
+use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use rayon::prelude::*;
 
@@ -218,6 +218,16 @@ impl Problem<'_> {
         Iterate { values, residual }
     }
 
+    /// Where to start: the field of the linear parts where it has less of a residual than none.
+    fn start(&self, cache: &mut LinearSolverCache) -> Result<(Iterate, usize), SolverError> {
+        let mut system = self.model.prepare_with(self.matrix.clone(), cache)?;
+        let (values, report) = system.solve_field(&self.load)?;
+        *cache = system.into_cache().without_initial_guess();
+        let (linear, zero) = (self.at(values), self.at(vec![c64::default(); self.load.len()]));
+        let is_nearer = norm(&linear.residual) < norm(&zero.residual);
+        Ok((if is_nearer { linear } else { zero }, report.iterations))
+    }
+
     /// The derivative at some unknowns.
     fn tangent(&self, values: &[c64]) -> AmplitudeTangent {
         let (space, model) = (self.model.space(), self.model);
@@ -246,19 +256,30 @@ impl Problem<'_> {
         }
     }
 
-    /// The longest of Newton's step and its halves that lowers the residual, and its length.
-    fn search(&self, from: &Iterate, step: &[c64]) -> Option<(Iterate, f64)> {
-        let (before, mut length) = (norm(&from.residual), 1.0);
+    /// The longest of Newton's step and its halves that lowers the residual, and its length. The residual is measured by
+    /// `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field: unlike its plain norm that does
+    /// not ask saturated iron, whose reluctivity is a thousand times that of the rest, to come first.
+    fn search(
+        &self,
+        from: &Iterate,
+        step: &[c64],
+        nearest: &mut FieldSystem,
+    ) -> Result<Option<(Iterate, f64)>, SolverError> {
+        let mut measure = |residual: &[c64]| -> Result<f64, SolverError> {
+            let (z, _) = nearest.solve_once(residual)?;
+            Ok(ordered_sum(z.len(), |i| residual[i].re * z[i].re + residual[i].im * z[i].im))
+        };
+        let (before, mut length) = (measure(&from.residual)?, 1.0);
         for _ in 0..MOST_HALVINGS {
             let mut values = from.values.clone();
             axpy(c64::from(length), step, &mut values);
             let trial = self.at(values);
-            if norm(&trial.residual) <= (1.0 - ARMIJO * length) * before {
-                return Some((trial, length));
+            if measure(&trial.residual)? <= (1.0 - ARMIJO * length) * before {
+                return Ok(Some((trial, length)));
             }
             length *= 0.5;
         }
-        None
+        Ok(None)
     }
 }
 
@@ -270,21 +291,20 @@ impl Problem<'_> {
 pub(crate) fn solve(
     model: &FieldModel,
     mesh: &Mesh,
-    cache: &LinearSolverCache,
+    (cache, start): (&LinearSolverCache, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Problem { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
     let (scale, settings) = (norm(&problem.load), &model.setup().linear_solver);
     let mut cache = LinearSolverCache::with_method(cache.method());
-    let mut system = model.prepare_with(problem.matrix.clone(), &mut cache)?;
-    let (values, LinearSolverReport { mut iterations, .. }) = system.solve_field(&problem.load)?;
-    cache = system.into_cache().without_initial_guess();
-    let zero = problem.at(vec![c64::default(); values.len()]);
-    let mut iterate = problem.at(values);
-    if norm(&zero.residual) < norm(&iterate.residual) {
-        iterate = zero;
-    }
-    let (mut steps, mut before, mut damping) = (1, f64::INFINITY, 1.0);
+    let (mut iterate, mut iterations, mut steps) = match start {
+        Some(values) => (problem.at(values.to_vec()), 0, 0),
+        None => {
+            let (iterate, iterations) = problem.start(&mut cache)?;
+            (iterate, iterations, 1)
+        }
+    };
+    let (mut before, mut damping) = (f64::INFINITY, 1.0);
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: None, damping });
@@ -301,7 +321,8 @@ pub(crate) fn solve(
         // As exact as the next residual is small.
         let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual);
         let (step, report) = tangent.invert(Side::State, &right_side, &mut field, tolerance)?;
-        let Some((next, length)) = problem.search(&iterate, &step).filter(|_| steps < MOST_STEPS) else {
+        let found = problem.search(&iterate, &step, &mut field)?;
+        let Some((next, length)) = found.filter(|_| steps < MOST_STEPS) else {
             let mut values = iterate.values.clone();
             axpy(c64::from(1.0), &step, &mut values);
             let [from, to] = [iterate.values, values].map(FieldSolution::of_state);

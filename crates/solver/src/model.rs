@@ -288,7 +288,7 @@ impl FieldModel {
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         if !self.is_linear() {
-            return self.solve_nonlinear(mesh, &LinearSolverCache::default(), &mut |_| {});
+            return self.solve_nonlinear(mesh, (&LinearSolverCache::default(), None), &mut |_| {});
         }
         let mut system = self.prepare(self.assembled(mesh))?;
         let state = self.solve_prepared(&mut system, &self.load(mesh))?;
@@ -296,7 +296,8 @@ impl FieldModel {
     }
 
     /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
-    /// adjoint. Of `cache` only the method that worked last takes part.
+    /// adjoint. Of `cache` only the method that worked last takes part; Newton's method begins with `start`, the unknowns of a
+    /// similar state, and where there is none with the field of the linear parts.
     ///
     /// # Errors
     /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].
@@ -306,14 +307,15 @@ impl FieldModel {
     pub fn solve_nonlinear(
         &self,
         mesh: &Mesh,
-        cache: &LinearSolverCache,
+        (cache, start): (&LinearSolverCache, Option<&[c64]>),
         observer: &mut NewtonObserver<'_>,
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
-        if self.angular_frequency > 0.0 {
-            return amplitude::solve(self, mesh, cache, observer);
+        let solve = if self.angular_frequency > 0.0 { amplitude::solve } else { newton::solve };
+        match solve(self, mesh, (cache, start), observer) {
+            Err(SolverError::Newton { .. }) if start.is_some() => solve(self, mesh, (cache, None), observer),
+            solved => solved,
         }
-        newton::solve(self, mesh, cache, observer)
     }
 
     /// Solves the state problem with a prepared system and a load.

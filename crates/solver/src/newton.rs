@@ -2,8 +2,9 @@
 //!
 //! The state minimises `W(A) = ∫w(|B|) − ∫T·B` (with the penalty of nodal elements), which is convex. Newton's steps have the
 //! exact tangent; a step is halved until the energy falls by a small part of what its slope promises (Armijo; Nocedal and
-//! Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, and nothing of other designs
-//! takes part but the method of the linear solver, so that a state is a function of mesh and model. Within one solution a factor serves as long as it
+//! Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, or what the caller gives: the
+//! field on the reference mesh of a round, so that a state is a function of mesh, model and that reference, and not of the designs
+//! before. Within one solution a factor serves as long as it
 //! pays.
 
 use fluxmorph_geometry::fem::scalar::{axpy, dot, norm};
@@ -125,15 +126,21 @@ impl Energy<'_> {
 pub(crate) fn solve(
     model: &FieldModel,
     mesh: &Mesh,
-    cache: &LinearSolverCache,
+    (cache, start): (&LinearSolverCache, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Energy { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
     let scale = norm(&problem.load);
     let tolerance = model.setup().linear_solver.tolerance;
     let mut cache = LinearSolverCache::with_method(cache.method());
-    let (mut iterate, mut iterations) = problem.start(&mut cache)?;
-    let (mut steps, mut before, mut damping) = (1, f64::INFINITY, 1.0);
+    let (mut iterate, mut iterations, mut steps) = match start {
+        Some(values) => (problem.at(values.to_vec()), 0, 0),
+        None => {
+            let (iterate, iterations) = problem.start(&mut cache)?;
+            (iterate, iterations, 1)
+        }
+    };
+    let (mut before, mut damping) = (f64::INFINITY, 1.0);
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: Some(iterate.energy), damping });

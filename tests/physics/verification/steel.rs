@@ -27,7 +27,7 @@ fn solved(name: &str, overrides: &[&str]) -> Solved {
         println!("  {name}, step {}: residual {:.1e}, length {}", p.steps, p.residual, p.damping);
     };
     let solution =
-        model.solve_nonlinear(&mesh, &LinearSolverCache::default(), steps).expect("it converges").0;
+        model.solve_nonlinear(&mesh, (&LinearSolverCache::default(), None), steps).expect("it converges").0;
     Solved { model, mesh, solution }
 }
 

@@ -9,6 +9,10 @@ use crate::config::section::Section;
 use crate::config::table::rules::{Rules, present};
 use crate::config::table::{one_of, table};
 use crate::config::value::choice::choice;
+use crate::config::value::range::Range;
+
+/// Saturation polarisations of any material [T]: iron and cobalt have 2.4 T.
+const POLARISATIONS: Range = Range::closed(1e-3, 10.0);
 
 table! {
     /// An isotropic material: linear, or with a B–H curve. Any number of them, each with a name of its own. A list or table in
@@ -35,7 +39,7 @@ table! {
         bh_file: Option<PathBuf> = TEXT;
         /// Polarisation B − μ0 H at which iron is saturated [T]: a curve in closed form, of which `relative_permeability` is the
         /// initial permeability. Instead of `bh`.
-        saturation: Option<f64> = quantity(FluxDensity, POSITIVE);
+        saturation: Option<f64> = quantity(FluxDensity, POLARISATIONS);
         /// With `saturation`: how the curve comes to it. Default `"sharp"`.
         knee: Option<KneeWord> = WORD;
         /// Electric conductivity [S/m]. A material conducts only when it is told to.
@@ -82,10 +86,19 @@ choice! {
 fn one_law(rules: Rules) -> Rules {
     let rules =
         rules.not_both(["bh", "bh_file"]).not_both(["bh", "saturation"]).not_both(["bh_file", "saturation"]);
-    rules.needs("saturation", &["relative_permeability"]).needs("knee", &["saturation"]).add(json!({
-        "if": { "anyOf": present(&["bh", "bh_file"]) },
-        "then": { "properties": { "relative_permeability": { "const": 1 } } },
-    }))
+    rules
+        .needs("knee", &["saturation"])
+        .add(json!({
+            "if": { "required": ["saturation"] },
+            "then": {
+                "required": ["relative_permeability"],
+                "properties": { "relative_permeability": { "exclusiveMinimum": 1 } },
+            },
+        }))
+        .add(json!({
+            "if": { "anyOf": present(&["bh", "bh_file"]) },
+            "then": { "properties": { "relative_permeability": { "const": 1 } } },
+        }))
 }
 
 choice! {

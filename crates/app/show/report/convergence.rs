@@ -14,6 +14,9 @@ const HEIGHT: f64 = 150.0;
 /// Constraints that have a figure; the table of evaluations has all.
 const MOST_CONSTRAINTS: usize = 12;
 
+/// Bodies whose force has a figure; result.json and history.csv have all.
+const MOST_BODIES: usize = 4;
+
 /// Lines at new rounds.
 const MOST_ROUNDS: usize = 100;
 
@@ -52,6 +55,14 @@ pub(super) fn figures(data: &RunData) -> Markup {
         let mut own = series(&title, &|row| row.constraints.get(name).copied());
         own.bound = Some(0.0);
         all.push(("constraint", own));
+    }
+    let bodies = rows.first().map(|row| row.forces.as_slice()).unwrap_or_default();
+    for (k, body) in bodies.iter().enumerate().take(MOST_BODIES) {
+        let size = |row: &Evaluation| {
+            let force = row.forces.get(k)?.force_n;
+            Some(force.iter().map(|f| f * f).sum::<f64>().sqrt())
+        };
+        all.push(("force", series(&format!("force on {} [N]", body.name), &size)));
     }
     all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [F/m]", &|row| Some(row.gradient_norm))));
     all.push(("quality", series("worst quality of an element (Eq. 4)", &|row| Some(row.worst_quality))));

@@ -62,7 +62,7 @@ impl Drawing<'_> {
         });
         let lines = format!("{id}-lines");
         let inside = html! {
-            defs { path id=(lines) d=(self.boundaries(cut.field)) {} }
+            defs { path id=(lines) d=(boundaries(self.outline, window, frame, cut.field)) {} }
             @for class in ["outline-halo", "outline"] { use class=(class) href={ "#" (lines) } {} }
             (self.coils())
             (self.names(cut))
@@ -76,20 +76,6 @@ impl Drawing<'_> {
         let plane = window.describe("millimetres");
         let label = format!("Flux density in {plane} at evaluation {}", cut.field.evaluation);
         svg(frame.height(), &label, &content)
-    }
-
-    /// Faces between regions, and of the outside, as one path.
-    fn boundaries(&self, field: &Snapshot) -> String {
-        let facets = self.outline.mesh.topology().facets().iter();
-        let cut = facets.filter_map(|facet| {
-            let points = facet.nodes.map(|n| field.points[n.index()]);
-            let ends = self.window.plane.of_triangle(points).filter(|ends| self.window.shows(ends))?;
-            let line = path(&ends.map(|p| self.frame.at(self.window.page.flat(p))));
-            // Shorter than the page's digits.
-            let (from, to) = line.split_once('L')?;
-            (from.trim_start_matches('M') != to).then_some(line)
-        });
-        cut.collect()
     }
 
     /// Cross-sections of coils that are given by their shape.
@@ -122,6 +108,20 @@ impl Drawing<'_> {
             }
         }
     }
+}
+
+/// Faces between regions, and of the outside, as one path.
+pub(super) fn boundaries(outline: &Outline, window: &Window, frame: &Frame, field: &Snapshot) -> String {
+    let facets = outline.mesh.topology().facets().iter();
+    let cut = facets.filter_map(|facet| {
+        let points = facet.nodes.map(|n| field.points[n.index()]);
+        let ends = window.plane.of_triangle(points).filter(|ends| window.shows(ends))?;
+        let line = path(&ends.map(|p| frame.at(window.page.flat(p))));
+        // Shorter than the page's digits.
+        let (from, to) = line.split_once('L')?;
+        (from.trim_start_matches('M') != to).then_some(line)
+    });
+    cut.collect()
 }
 
 fn caption(

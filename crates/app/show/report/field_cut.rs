@@ -25,7 +25,7 @@ pub(super) struct FieldCut<'a> {
 pub(super) struct CutTriangle {
     /// Corners [m], with |B| at them [T].
     pub(super) patch: Patch,
-    region: RegionId,
+    pub(super) region: RegionId,
     /// [m²]
     area: f64,
     /// Its middle on the page [mm], where that is in the window.

@@ -3,6 +3,7 @@
 use maud::Markup;
 
 use super::data::{RunData, Snapshot};
+use super::iron;
 use super::markup::{Card, header};
 use super::observed;
 use super::plane::bounds;
@@ -33,6 +34,7 @@ pub(super) fn head(data: &RunData) -> Markup {
     } else if let Some(mesh) = &data.manifest.mesh {
         cards.push(("tetrahedra", group_digits(mesh.tets), format!("{} nodes", group_digits(mesh.nodes))));
     }
+    cards.extend(iron::cards(data));
     if let Ok(outline) = &data.outline {
         cards.extend(mean_card(data, outline));
         cards.push(size_card(outline));

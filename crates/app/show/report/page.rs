@@ -9,7 +9,7 @@ use super::markup::{document, footer, json, missing, section};
 use super::surface::Surface;
 use super::ticks::{group_digits, trim_zeros};
 use super::words::capital;
-use super::{convergence, facts, field, histogram, map, tables};
+use super::{convergence, facts, field, histogram, iron, map, tables};
 use crate::build::{Outline, OutlinedDesign};
 
 const VIEW: &str = include_str!("view.js");
@@ -44,7 +44,7 @@ fn body(data: &RunData, links: &str, detail: Detail) -> Markup {
         (head(data))
         @if data.config.design.is_some() { (section("shape", "Shape", &shape(data, detail))) }
         @if data.is_run() { (section("convergence", "Convergence", &convergence(data))) }
-        (section("field", "Field", &or_missing("the cut through the field", of_outline(data, field::figure))))
+        (section("field", "Field", &field(data)))
         (section("results", "Results", &results(data)))
         @if !data.history.is_empty() { (section("evaluations", "Evaluations", &tables::evaluations(data))) }
         (section("mesh", "Mesh and equations", &mesh(data)))
@@ -65,6 +65,13 @@ fn of_outline(
     figure: impl FnOnce(&RunData, &Outline) -> Result<Markup, String>,
 ) -> Result<Markup, String> {
     figure(data, data.outline.as_ref().map_err(Clone::clone)?)
+}
+
+fn field(data: &RunData) -> Markup {
+    html! {
+        (or_missing("the cut through the field", of_outline(data, field::figure)))
+        @if let Some(figure) = data.outline.as_ref().ok().and_then(|outline| iron::figure(data, outline)) { (figure) }
+    }
 }
 
 fn convergence(data: &RunData) -> Markup {

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 
 use super::circuits::circuits;
 use super::data::RunData;
+use super::iron;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use crate::build::{Audited, Outline};
@@ -124,6 +125,8 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (circuits(result))
         (losses(&states))
+        (iron::forces(&result.forces))
+        (iron::saturation(result.saturation.as_ref()))
         (probes(&states))
     }
 }

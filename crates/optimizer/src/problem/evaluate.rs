@@ -2,10 +2,11 @@
 
 use std::time::Instant;
 
-use fluxmorph_geometry::NodeId;
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::linear::SolverEvent;
+use fluxmorph_solver::linear::{LinearSolverCache, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
@@ -76,11 +77,23 @@ impl Problem {
         cache: &mut SolverCache,
         progress: &mut dyn Progress,
     ) -> Result<Analysis, Error> {
+        let is_own_anchor = match (&self.shape, derivatives) {
+            (Some(shape), Derivatives::First) => {
+                self.anchor(shape.motion().reference(), &moved.mesh, cache, progress)?
+            }
+            _ => false,
+        };
         let mut work =
             Work { mesh: &moved.mesh, timings: Timings::default(), report: Worst::default(), progress };
         let shape = self.shape.as_ref().filter(|_| derivatives == Derivatives::First);
         let sums = self.sum_states(&mut work, cache, shape)?;
         let Work { mut timings, report, .. } = work;
+        if is_own_anchor {
+            let values = |(model, state): (&FieldModel, &FieldSolution)| {
+                (!model.is_linear()).then(|| state.values().to_vec())
+            };
+            cache.anchor_on(&moved.mesh, self.states.iter().zip(&sums.solutions).map(values).collect());
+        }
         let mut clock = Stopwatch::start();
         let terms = self.terms();
         let value = terms.iter().zip(&sums.objective.values).map(|(term, value)| term.weight * value).sum();
@@ -113,6 +126,37 @@ impl Problem {
         };
         finite::analysis(&analysis, &self.constraints)?;
         Ok(analysis)
+    }
+
+    /// Solves the states with B–H laws on a round's reference mesh, unless that has been done: others begin with these. Nothing
+    /// of other designs takes part. Whether the states of `mesh`, which is that one, are to be kept so instead.
+    fn anchor(
+        &self,
+        reference: &Mesh,
+        mesh: &Mesh,
+        cache: &mut SolverCache,
+        progress: &mut dyn Progress,
+    ) -> Result<bool, Error> {
+        if self.states.iter().all(FieldModel::is_linear) || cache.is_anchored_on(reference) {
+            return Ok(false);
+        }
+        cache.forget_anchor();
+        if mesh.points() == reference.points() && cache.methods().iter().all(Option::is_none) {
+            return Ok(true);
+        }
+        progress.stage(Stage::State);
+        let mut state = |model: &FieldModel| -> Result<Option<Vec<c64>>, Error> {
+            if model.is_linear() {
+                return Ok(None);
+            }
+            let begin = (&LinearSolverCache::default(), None);
+            let solved = model.solve_nonlinear(reference, begin, &mut |newton| progress.newton(newton));
+            let (state, _) = solved.map_err(finite::of_field("the state of the reference mesh", model))?;
+            Ok(Some(state.values().to_vec()))
+        };
+        let states = self.states.iter().map(state).collect::<Result<_, _>>()?;
+        cache.anchor_on(reference, states);
+        Ok(false)
     }
 
     pub(super) fn terms(&self) -> &[Term] {
@@ -218,8 +262,9 @@ fn solve_nonlinear_state<'a>(
     let mut clock = Stopwatch::start();
     work.progress.stage(Stage::State);
     let progress = &mut *work.progress;
-    let solved =
-        model.solve_nonlinear(work.mesh, cache.of_state(index), &mut |newton| progress.newton(newton));
+    let method = LinearSolverCache::with_method(cache.of_state(index).method());
+    let begin = (&method, cache.start(index));
+    let solved = model.solve_nonlinear(work.mesh, begin, &mut |newton| progress.newton(newton));
     let (state, system) = solved.map_err(finite::of_field("the state", model))?;
     finite::state(model, work.mesh, &state)?;
     work.report.include(&state);

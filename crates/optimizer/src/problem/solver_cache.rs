@@ -1,5 +1,8 @@
 //! What the linear solvers of all states keep from one design to the next.
 
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem};
 
 /// Factors and solutions of the design before, by state.
@@ -8,6 +11,15 @@ use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem};
 #[derive(Debug, Default)]
 pub struct SolverCache {
     states: Vec<LinearSolverCache>,
+    anchor: Option<Anchor>,
+}
+
+/// Where Newton's method begins: the states on a round's reference mesh, whose nodes these are. A state is then a function of its
+/// design in the round, and not of the designs before.
+#[derive(Debug, Clone)]
+struct Anchor {
+    nodes: Vec<Point>,
+    states: Vec<Option<Vec<c64>>>,
 }
 
 impl SolverCache {
@@ -24,7 +36,28 @@ impl SolverCache {
     ///
     /// With it an evaluation is a smooth function of the design, as differences need.
     pub fn without_initial_guess(&self) -> Self {
-        Self { states: self.states.iter().map(LinearSolverCache::without_initial_guess).collect() }
+        let states = self.states.iter().map(LinearSolverCache::without_initial_guess).collect();
+        Self { states, anchor: self.anchor.clone() }
+    }
+
+    /// Whether the states on this mesh are those that others begin with.
+    pub(super) fn is_anchored_on(&self, mesh: &Mesh) -> bool {
+        self.anchor.as_ref().is_some_and(|anchor| anchor.nodes == mesh.points())
+    }
+
+    /// Forgets what states begin with.
+    pub(super) fn forget_anchor(&mut self) {
+        self.anchor = None;
+    }
+
+    /// Keeps the states on a mesh as those that others begin with; `None` where one is linear.
+    pub(super) fn anchor_on(&mut self, mesh: &Mesh, states: Vec<Option<Vec<c64>>>) {
+        self.anchor = Some(Anchor { nodes: mesh.points().to_vec(), states });
+    }
+
+    /// What a state's Newton method begins with.
+    pub(super) fn start(&self, index: usize) -> Option<&[c64]> {
+        self.anchor.as_ref()?.states.get(index)?.as_deref()
     }
 
     /// The methods that worked last, by state; `None` where it is the first one tried.
@@ -34,7 +67,8 @@ impl SolverCache {
 
     /// A cache of nothing but methods, by state.
     pub fn with_methods(methods: &[Option<Method>]) -> Self {
-        Self { states: methods.iter().map(|&method| LinearSolverCache::with_method(method)).collect() }
+        let states = methods.iter().map(|&method| LinearSolverCache::with_method(method)).collect();
+        Self { states, anchor: None }
     }
 
     /// Keeps what a solved system leaves.
