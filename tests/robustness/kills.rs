@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use crate::support::device::{Device, block, shipped};
+use crate::support::device::{Device, SATURATED, block, shipped, written};
 use crate::support::essence::{assert_same, essence};
 use crate::support::folder::files;
 use crate::support::program::{end_of, finish, folder, resume, send};
@@ -74,6 +74,16 @@ pub(crate) fn torture(device: &Device, home: &Path, kills: usize, seed: u64) -> 
 fn a_run_that_is_killed_again_and_again_ends_as_if_it_had_not_been() {
     let home = folder();
     torture(&block(home.path(), 12), home.path(), 8, 1);
+}
+
+/// Nearly all of the time of such a run is in Newton's method.
+#[test]
+fn a_run_that_is_killed_within_newtons_method_ends_as_if_it_had_not_been() {
+    let home = folder();
+    let cells = ("cells = [2, 2, 1]", "cells = [4, 4, 2]");
+    let [steel, field, force, at_rest] = SATURATED;
+    let device = written("saturated", home.path(), &[steel, field, force, at_rest, cells]);
+    torture(&device, home.path(), 6, 2);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::support::device::{Device, block, shipped};
+use crate::support::device::{Device, SATURATED, block, shipped, written};
 use crate::support::essence::{Essence, assert_same, essence};
 use crate::support::folder::{files, read_text};
 use crate::support::program::{Finished, command, finish, folder, program, resume};
@@ -132,6 +132,28 @@ fn another_configuration_is_refused_and_what_does_not_matter_is_not() {
     // The file that the run was started with has no say any more.
     std::fs::write(&run.device.config, "nonsense").expect("written");
     run.goes_on("restored");
+}
+
+#[test]
+fn a_table_that_has_changed_is_refused() {
+    let home = folder();
+    let table = home.path().join("steel.csv");
+    let text = "# H [A/m], B [T]\n100, 0.5\n1000, 1.5\n100000, 2.2\n";
+    std::fs::write(&table, text).expect("written");
+    let [(permeability, _), further @ ..] = SATURATED;
+    let changes = [&[(permeability, "bh_file = \"steel.csv\"\n")], &further[..]].concat();
+    let device = written("steel", home.path(), &changes);
+    let out = home.path().join("out");
+    let run = finish(device.command("run", &out).args(["--max-evaluations", "2"]));
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    let manifest = read_text(&out.join("manifest.json"));
+    assert!(manifest.contains("steel.csv") && manifest.contains("\"tables\""), "{manifest}");
+    std::fs::write(&table, text.replace("1.5", "1.50001")).expect("written");
+    finish(resume(&out).args(["--max-evaluations", "4"])).with(3, &["other B–H tables", "restore it"]);
+    // What is read counts, and a comment is read too.
+    std::fs::write(&table, text).expect("written");
+    let resumed = finish(resume(&out).args(["--max-evaluations", "4"]));
+    assert_eq!(resumed.code, Some(1), "{}", resumed.stderr);
 }
 
 #[test]

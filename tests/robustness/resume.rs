@@ -9,6 +9,7 @@ use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
 use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, with_rounds};
+use crate::support::device::{ROUNDS, SATURATED};
 use crate::support::essence::{Essence, assert_same, essence};
 
 /// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
@@ -63,6 +64,9 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("plain", block(&[])),
         ("constrained", constrained()),
         ("rounds", with_rounds()),
+        ("saturated", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3]])),
+        ("saturated, with rounds", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3], ROUNDS])),
+        ("saturated at 50 Hz", block(&SATURATED[..3])),
         ("last", kept("first_last")),
         ("none", kept("none")),
         ("shield", shipped("shield_quick.toml")),

@@ -19,6 +19,14 @@ pub(crate) const CONSTRAINT: (&str, &str) =
 /// Steps of the block so cautious that the mesh has several references.
 pub(crate) const ROUNDS: (&str, &str) = ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = [");
 
+/// The block of steel, in a field that saturates it, with the force on it; with the last change at rest.
+pub(crate) const SATURATED: [(&str, &str); 4] = [
+    ("relative_permeability = 100\n", "bh = \"team20_steel\"\n"),
+    ("b = [0.0, 0.0, 0.1]", "b = [0.0, 0.0, 1.5]"),
+    ("[objective]", "[[forces]]\nname = \"iron\"\nregions = [\"iron\"]\n\n[objective]"),
+    ("frequency = \"50 Hz\"", "frequency = 0"),
+];
+
 /// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
 pub(crate) const MOTION: &str = r#"title = "lifted"
 [mesh]

@@ -145,7 +145,7 @@ impl Problem {
             return Ok(true);
         }
         progress.stage(Stage::State);
-        let mut state = |model: &FieldModel| -> Result<Option<Vec<c64>>, Error> {
+        let state = |model: &FieldModel| -> Result<Option<Vec<c64>>, Error> {
             if model.is_linear() {
                 return Ok(None);
             }
