@@ -17,6 +17,9 @@ use crate::files::blake3_hex;
 /// Largest table that is read [bytes]: a thousand times the longest one that was ever measured.
 const LARGEST_FILE: u64 = 1024 * 1024;
 
+/// Largest saturation polarisation [T]: four times that of iron and cobalt. More is another unit.
+const LARGEST_POLARISATION: f64 = 10.0;
+
 /// Curves by the name of their material.
 #[derive(Debug, Default)]
 pub(super) struct Curves {
@@ -102,7 +105,8 @@ fn closed(
         None | Some(KneeWord::Sharp) => Knee::Sharp,
         Some(KneeWord::Arctangent) => Knee::Arctangent,
     };
-    Analytic::new(material.relative_permeability, saturation, knee).map(BhCurve::analytic).ok_or_else(|| {
+    let law = Analytic::new(material.relative_permeability, saturation, knee);
+    law.filter(|_| saturation <= LARGEST_POLARISATION).map(BhCurve::analytic).ok_or_else(|| {
         let path = format!("materials.{name}.saturation");
         let message = format!("{saturation} T is beyond any material");
         Box::new(source.diagnostic(&path, message).expected("at most 10 T: iron and cobalt have 2.4 T"))

@@ -9,10 +9,6 @@ use crate::config::section::Section;
 use crate::config::table::rules::{Rules, present};
 use crate::config::table::{one_of, table};
 use crate::config::value::choice::choice;
-use crate::config::value::range::Range;
-
-/// Saturation polarisations of any material [T]: iron and cobalt have 2.4 T.
-const POLARISATIONS: Range = Range::closed(1e-3, 10.0);
 
 table! {
     /// An isotropic material: linear, or with a B–H curve. Any number of them, each with a name of its own. A list or table in
@@ -39,7 +35,7 @@ table! {
         bh_file: Option<PathBuf> = TEXT;
         /// Polarisation B − μ0 H at which iron is saturated [T]: a curve in closed form, of which `relative_permeability` is the
         /// initial permeability. Instead of `bh`.
-        saturation: Option<f64> = quantity(FluxDensity, POLARISATIONS);
+        saturation: Option<f64> = quantity(FluxDensity, POSITIVE);
         /// With `saturation`: how the curve comes to it. Default `"sharp"`.
         knee: Option<KneeWord> = WORD;
         /// Electric conductivity [S/m]. A material conducts only when it is told to.
