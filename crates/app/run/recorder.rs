@@ -126,7 +126,12 @@ pub(super) fn write_field(
         return pieces.write(directory, evaluation, problem, analysis);
     }
     let thickness = thickness(problem, analysis);
-    let data = FieldData { error, thickness: thickness.as_deref(), bodies: problem.bodies(), ..FieldData::of(analysis) };
+    let data = FieldData {
+        error,
+        thickness: thickness.as_deref(),
+        bodies: problem.bodies(),
+        ..FieldData::of(analysis)
+    };
     let bytes = fields::vtu(problem.states(), &data)?;
     Ok(directory.write_field(evaluation, &bytes)?)
 }

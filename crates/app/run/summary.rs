@@ -10,9 +10,7 @@ use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shape, Timings};
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::multipole::Harmonic;
-use fluxmorph_solver::{
-    FieldModel, FieldSolution, Functional, SolverError, recovery, saturation,
-};
+use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery, saturation};
 
 use super::Session;
 use super::reservations::reservations;
