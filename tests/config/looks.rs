@@ -123,7 +123,11 @@ fn nothing_is_written_for_a_wrong_input() {
 fn the_bound_that_a_message_offers_can_be_used() {
     let home = folder();
     let config = repository_text("configs/shield_quick.toml");
-    write(home.path(), "device.toml", config.replacen("[remesh]\n", "[remesh]\nrounds = 0\n", 1));
+    write(
+        home.path(),
+        "device.toml",
+        config.replacen("[remesh]\n", "[remesh]\nlaw = \"linear\"\nrounds = 0\n", 1),
+    );
     let check = |millimetres: f64, further: &[&str]| {
         let bound = format!("design.upper={millimetres:?} mm");
         limited(home.path(), None, &[&["check", "device.toml", "--set", &bound], further].concat())

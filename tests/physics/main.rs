@@ -16,6 +16,7 @@ mod paper;
 mod prisms;
 mod problems;
 mod references;
+mod skins;
 mod solvers;
 mod starts;
 #[path = "../support/mod.rs"]

@@ -17,7 +17,8 @@ pub(crate) const CONSTRAINT: (&str, &str) =
     ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]");
 
 /// Steps of the block so cautious that the mesh has several references.
-pub(crate) const ROUNDS: (&str, &str) = ("slide = [", "rounds = 4\ninversion_share = 0.1\nslide = [");
+pub(crate) const ROUNDS: (&str, &str) =
+    ("slide = [", "law = \"linear\"\nrounds = 4\ninversion_share = 0.1\nslide = [");
 
 /// The block of steel, in a field that saturates it, with the force on it; with the last change at rest.
 pub(crate) const SATURATED: [(&str, &str); 4] = [

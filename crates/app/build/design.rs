@@ -6,6 +6,7 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
+    default_filter_radius,
 };
 
 use super::millimetres;
@@ -48,8 +49,9 @@ pub(super) fn surface(
         },
         control: match (design.grid, design.filter_radius) {
             (Some(counts), _) => Control::Grid(counts),
+            (None, Some(0.0)) => Control::Nodes,
             (None, Some(radius)) => Control::Filter(radius),
-            (None, None) => Control::Nodes,
+            (None, None) => Control::Filter(default_filter_radius(mesh, &triangles)),
         },
         mirrors: design.symmetry.iter().map(mirror).collect(),
         boundary: match design.rim {

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::tet4::{Point, centroid};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, KinematicConstraint, MotionLaw, RemeshSetup, SolverChoice, StiffnessPolicy,
-    Subregion,
+    Boundary, BoundaryKind, KinematicConstraint, Motion, MotionLaw, RemeshSetup, SolverChoice,
+    StiffnessPolicy, Subregion,
 };
 
 use crate::config::{
@@ -141,8 +141,7 @@ pub(super) fn motion_law(
     axis: Option<usize>,
     default: config::MotionLaw,
 ) -> Result<MotionLaw, Error> {
-    let own = remesh.subregions.iter().filter_map(|own| own.force);
-    let has_force = own.chain([remesh.force]).any(|force| force != [0.0; 3]);
+    let has_force = has_force(remesh);
     let message = match (remesh.law.unwrap_or(default), axis) {
         (config::MotionLaw::Linear, _) => return Ok(MotionLaw::Linear),
         (config::MotionLaw::Rails, Some(axis)) if !has_force => return Ok(MotionLaw::Rails(axis)),
@@ -154,6 +153,29 @@ pub(super) fn motion_law(
     Err(source
         .error(vec![fault.expected("law = \"linear\", or a motion along one axis without `force`")])
         .into())
+}
+
+/// How the mesh of a design moves, and why so where the configuration leaves it open.
+pub(crate) fn motion_in_words(remesh: &Remesh, motion: &Motion) -> String {
+    let why = |reason: &str| if remesh.law.is_none() { format!(", as {reason}") } else { String::new() };
+    match (motion.is_one_function(), motion.map().kinematic_constraint()) {
+        (true, KinematicConstraint::Axis(axis)) => {
+            let axis = ["x", "y", "z"][axis];
+            let why = why(&format!("the design moves along {axis} alone"));
+            format!("rails along {axis}, one mesh a design{why}")
+        }
+        _ => {
+            let reason =
+                if has_force(remesh) { "a force acts" } else { "the design moves in several directions" };
+            format!("linear elasticity, at most {} rounds{}", remesh.rounds, why(reason))
+        }
+    }
+}
+
+/// Whether a fictitious force acts on some part of the body.
+fn has_force(remesh: &Remesh) -> bool {
+    let own = remesh.subregions.iter().filter_map(|own| own.force);
+    own.chain([remesh.force]).any(|force| force != [0.0; 3])
 }
 
 /// The axis of the design's direction where the motion is to follow it.

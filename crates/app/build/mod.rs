@@ -26,6 +26,7 @@ pub(crate) mod steels;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
+pub(crate) use elastic_body::motion_in_words;
 pub(crate) use field::remaining_nodes;
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};

@@ -79,8 +79,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
-    let law =
-        motion_law(source, inputs.remesh, common_axis(surface.directions()), config::MotionLaw::Linear)?;
+    let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), config::MotionLaw::Rails)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), (law, guidance), warnings)?;
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;

@@ -277,6 +277,8 @@ fn fresh_configuration(config: &Config) -> Config {
     if let Some(design) = &mut fresh.design {
         // A list has one value for every node of the old surface.
         design.initial = crate::config::InitialDesign::Uniform(0.0);
+        // The old surface's displacements are taken over as they are.
+        design.filter_radius = design.grid.is_none().then_some(0.0);
     }
     if let Some(remesh) = &mut fresh.remesh {
         remesh.rounds = remesh.rounds.max(LEAST_ROUNDS);

@@ -38,7 +38,7 @@ use prepared::Prepared;
 use recorder::DirectoryRecorder;
 
 use crate::build::locate_error::attribute_error;
-use crate::build::{Mode, Setup, set_up_watched};
+use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{
@@ -134,12 +134,15 @@ impl Session<'_> {
     /// Reports what is set up.
     fn announce(&self, observer: &mut dyn RunObserver) {
         let Self { command, config, setup, directory, .. } = self;
-        let mesh = setup.problem.original().topology();
+        let (mesh, shape) = (setup.problem.original().topology(), setup.problem.shape());
+        let moves = config.remesh.as_ref().zip(shape);
         observer.started(&Started {
             title: &config.title,
             optimizer: (*command == "run").then_some(&config.optimizer),
             objective: config.objective.as_ref(),
-            variables: setup.problem.shape().map_or(0, |s| s.surface().variable_count()),
+            variables: shape.map_or(0, |shape| shape.surface().variable_count()),
+            filter_radius: shape.and_then(|shape| shape.surface().filter_radius()),
+            motion: moves.map(|(remesh, shape)| motion_in_words(remesh, shape.motion())),
             nodes: mesh.node_count(),
             tets: mesh.tets().len(),
             unknowns: setup.problem.states().iter().map(|model| model.unknown_count()).sum(),

@@ -241,6 +241,8 @@ mod tests {
             optimizer: Some(optimizer),
             objective: None,
             variables: 91,
+            filter_radius: None,
+            motion: None,
             nodes: 100,
             tets: 400,
             unknowns: 350,

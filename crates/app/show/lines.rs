@@ -33,7 +33,14 @@ impl Lines {
         ];
         if let Some(optimizer) = started.optimizer {
             let algorithm = optimizer.algorithm.name();
-            lines.push(format!("optimisation: {variables} design variables, {algorithm}"));
+            // To a micrometre.
+            let millimetres = |radius: f64| (radius * 1e6).round() / 1e3;
+            let filter = started.filter_radius.map(|r| format!(", filtered over {} mm", millimetres(r)));
+            let filter = filter.unwrap_or_default();
+            lines.push(format!("optimisation: {variables} design variables{filter}, {algorithm}"));
+            if let Some(motion) = &started.motion {
+                lines.push(format!("mesh motion: {motion}"));
+            }
         }
         if let Some(directory) = started.directory {
             let is_part = started.optimizer.is_some() && started.fields == FieldsKept::Improved;

@@ -27,7 +27,7 @@ pub use quiet::{Quiet, Results};
 pub use styles::Styles;
 
 /// What is known when a run starts.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Started<'a> {
     /// Title of the configuration.
     pub title: &'a str,
@@ -37,6 +37,10 @@ pub struct Started<'a> {
     pub objective: Option<&'a Objective>,
     /// Design variables.
     pub variables: usize,
+    /// Radius of the filter of the design [m], where there is one.
+    pub filter_radius: Option<f64>,
+    /// How the mesh follows the design, and why so; `None` without a design.
+    pub motion: Option<String>,
     /// Nodes of the mesh.
     pub nodes: usize,
     /// Tetrahedra of the mesh.

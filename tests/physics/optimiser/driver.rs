@@ -26,6 +26,9 @@ fn every_algorithm_improves_the_shield_within_its_bounds() {
     }
 }
 
+/// The law whose meshes go in rounds.
+const LINEAR: [&str; 1] = ["remesh.law=\"linear\""];
+
 /// The round events of a run.
 #[derive(Default)]
 struct Events(Vec<RoundEvent>);
@@ -54,10 +57,10 @@ fn shape(problem: &mut Problem) -> &mut Shape {
 
 #[test]
 fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let (free, free_rows) = optimised(&mut problem, &settings, &mut Silent);
     assert_eq!(free_rows.last().unwrap().round, 0, "the shipped case needs one reference");
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let used = free_rows.iter().filter_map(|row| row.step_to_inversion).fold(f64::INFINITY, f64::min);
     // Half of the way that the free run took.
     shape(&mut problem).limits.inversion_share = 0.5 / used;
@@ -81,7 +84,7 @@ fn a_design_too_far_from_the_reference_starts_a_round_at_the_best_mesh() {
 
 #[test]
 fn the_gradient_is_exact_in_a_later_round() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     shape(&mut problem).limits.inversion_share = 0.3;
     let (optimised, _) = optimised(&mut problem, &Optimizer { max_evaluations: 12, ..settings }, &mut Silent);
     assert!(shape(&mut problem).motion().round() >= 1);
@@ -93,7 +96,7 @@ fn the_gradient_is_exact_in_a_later_round() {
 
 #[test]
 fn a_quality_that_stops_the_search_is_never_passed() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     // The free run falls to 0.094.
     shape(&mut problem).limits.least_quality = 0.15;
     let mut events = Events::default();
@@ -107,7 +110,7 @@ fn a_quality_that_stops_the_search_is_never_passed() {
 
 #[test]
 fn without_rounds_the_box_shrinks_and_the_reference_stays() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     shape(&mut problem).limits.least_quality = 0.15;
     shape(&mut problem).limits.rounds = 0;
     let mut events = Events::default();
@@ -125,7 +128,7 @@ fn without_rounds_the_box_shrinks_and_the_reference_stays() {
 
 #[test]
 fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let initial = problem.quality(problem.original()).worst;
     // A millionth below the initial quality: the first real step is refused, and every smaller one of note too.
     let least = initial * (1.0 - 1e-6);
@@ -143,7 +146,7 @@ fn a_quality_that_no_step_keeps_climbs_the_ladder_and_ends_at_the_mesh_limit() {
 
 #[test]
 fn a_search_that_a_small_trust_region_ends_has_not_converged() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     // A thousandth of the bound range, within which nothing changes by as much as the tolerance.
     shape(&mut problem).limits.inversion_share = 1e-5;
     let mut events = Events::default();
@@ -153,7 +156,7 @@ fn a_search_that_a_small_trust_region_ends_has_not_converged() {
     assert_eq!(optimised.stop_reason, StopReason::MeshLimited);
     assert!(rows[optimised.best.evaluation].ratio > 0.9);
     // The same tolerance in the whole of the bounds is convergence.
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let (optimised, _) = self::optimised(
         &mut problem,
         &Optimizer { max_evaluations: 60, ftol_rel: 0.01, ..settings },
@@ -164,7 +167,7 @@ fn a_search_that_a_small_trust_region_ends_has_not_converged() {
 
 #[test]
 fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are_compared() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let n = shape(&mut problem).surface().variable_count();
     shape(&mut problem).set_bounds([vec![-9e-3; n], vec![35e-3; n]]);
     let mut events = Events::default();
@@ -195,7 +198,7 @@ fn bounds_far_beyond_the_mesh_climb_the_ladder_and_no_two_meshes_of_a_design_are
 
 #[test]
 fn a_first_design_far_away_is_approached_in_steps() {
-    let (mut problem, settings) = quick(&[]);
+    let (mut problem, settings) = quick(&LINEAR);
     let far = shape(&mut problem).upper().to_vec();
     shape(&mut problem).set_initial(far);
     shape(&mut problem).limits.inversion_share = 0.1;

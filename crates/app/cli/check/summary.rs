@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::advice::advice;
 use super::truncation::Truncation;
-use crate::build::{Audited, Mode, Setup, memory_limit, set_up_watched};
+use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched};
 use crate::config::{
     Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Open, Optimizer, Probe, RegionModel,
     Remesh, SourceMap,
@@ -40,6 +40,10 @@ pub(super) struct Summary<'a> {
     pub(super) unknowns: usize,
     pub(super) elastic_equations: usize,
     pub(super) design_variables: usize,
+    /// Radius of the filter of the design [m].
+    pub(super) filter_radius_m: Option<f64>,
+    /// How the mesh follows the design, and why so.
+    pub(super) mesh_motion: Option<String>,
     pub(super) bounding_box_m: [[f64; 3]; 2],
     pub(super) regions: Vec<RegionSummary>,
     pub(super) surfaces: Vec<SurfaceSummary>,
@@ -174,6 +178,7 @@ pub(super) fn summary<'a>(
     let motions = morph::inspect(config, source)?;
     let mesh = &setup.full_mesh;
     let problem = &setup.problem;
+    let moves = config.remesh.as_ref().zip(problem.shape());
     let skin = setup.audits.iter().map(SkinSummary::of).collect();
     let reference = problem.original().topology();
     let mut warnings = advice(config, &setup);
@@ -195,6 +200,8 @@ pub(super) fn summary<'a>(
         unknowns: problem.states().iter().map(|model| model.unknown_count()).sum(),
         elastic_equations: problem.shape().map_or(0, |shape| shape.motion().map().equation_count()),
         design_variables: problem.shape().map_or(0, |shape| shape.surface().variable_count()),
+        filter_radius_m: problem.shape().and_then(|shape| shape.surface().filter_radius()),
+        mesh_motion: moves.map(|(remesh, shape)| motion_in_words(remesh, shape.motion())),
         bounding_box_m: mesh.bounding_box(),
         regions: regions(config, mesh),
         surfaces: surfaces(mesh)?,

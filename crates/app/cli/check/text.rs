@@ -121,8 +121,10 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     if let Some(design) = summary.design {
         let grid = design.grid.map(|[n, m]| format!(", grid {n} x {m}")).unwrap_or_default();
-        let surfaces = design.surface.join(", ");
-        row("design variables", format!("{} on {surfaces}{grid}", summary.design_variables));
+        let filter =
+            summary.filter_radius_m.map(|radius| format!(", filtered over {} mm", millimetre(radius)));
+        let (surfaces, smoothed) = (design.surface.join(", "), filter.unwrap_or(grid));
+        row("design variables", format!("{} on {surfaces}{smoothed}", summary.design_variables));
         let way = match design.direction {
             DesignDirection::Vector([x, y, z]) => format!("along ({}, {}, {})", x + 0.0, y + 0.0, z + 0.0),
             DesignDirection::Word(word) => format!("along the {}", word.name()),
@@ -141,6 +143,9 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
             count => format!(": {count} equations"),
         };
         row("mesh motion", format!("{body}, stiffness {}{equations}", remesh.stiffness.name()));
+    }
+    if let Some(motion) = &summary.mesh_motion {
+        row("law of motion", motion.clone());
     }
     if summary.design.is_some() && summary.objective.is_some() {
         let optimizer = summary.optimizer;

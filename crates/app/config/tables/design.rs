@@ -47,9 +47,10 @@ table! {
         /// the surface must not turn back over it. Default: every node of the surface is a variable.
         grid: Option<[usize; 2]> = integer(2, 300);
         /// The displacement of a node is the mean of the variables at the nodes around it, with the weight (1 − distance /
-        /// radius) × area: shapes stay smooth, and the same on a finer mesh. Two to four sizes of a cell are a good start. Not
-        /// with `grid`, which is smooth already. Default: a node follows its own variable.
-        filter_radius: Option<f64> = length(POSITIVE);
+        /// radius) × area: shapes stay smooth, and the same on a finer mesh. Two to four sizes of a cell are a good start. 0: a
+        /// node follows its own variable. Not with `grid`, which is smooth already. Default: 1.5 sizes of a cell of the surface,
+        /// a length that the log and `check` name.
+        filter_radius: Option<f64> = length(NOT_NEGATIVE);
         /// What the nodes on the edge of the surface do.
         rim: RimMotion = WORD => RimMotion::Free;
         /// Least displacement [m]; below `upper`.

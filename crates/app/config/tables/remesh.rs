@@ -26,7 +26,8 @@ table! {
         /// The part of the mesh that moves.
         #[serde(flatten)]
         extent: RemeshExtent = KEYS;
-        /// How the mesh follows the design; `"rails"` for one that moves along x, y or z, without `force`. Default `"linear"`.
+        /// How the mesh follows the design. Default: `"rails"` where all nodes of the design move along one of x, y and z and no
+        /// `force` acts, else `"linear"`; for `[morph]` `"linear"`.
         law: Option<MotionLaw> = WORD;
         /// Poisson's ratio of the body, with the law `"linear"`. The default is the paper's.
         poisson: f64 = number(POISSON) => 0.3;

@@ -104,10 +104,11 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
     }
     match (design.grid, design.filter_radius) {
         (Some([n, m]), _) => text += &format!(" (control grid {n} × {m})"),
+        (None, Some(0.0)) => text += " (one a node)",
         (None, Some(radius)) => {
             text += &format!(" (nodes, filtered over {} mm)", trim_zeros(1e3 * radius, 3))
         }
-        (None, None) => text += " (one a node)",
+        (None, None) => text += " (nodes, filtered over 1.5 cells)",
     }
     Some(text)
 }

@@ -20,6 +20,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
+use fluxmorph_geometry::fem::scalar::ordered_sum;
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -27,6 +28,24 @@ use super::{DesignError, Mirror, Row};
 
 /// Most entries of the filter matrix: 0.8 GB.
 const LARGEST: usize = 50_000_000;
+
+/// Radius of the filter over the size of a cell where none is asked for: what is rough from node to node is smooth then, and
+/// designs of two cells are still seen. With it rails carry 20 of 20 random designs (docs/torture.md).
+const CELLS: f64 = 1.5;
+
+/// Size of a cell of a surface [m]: the mean over its area of the side of a square that two triangles would fill.
+///
+/// Fine strips beside edges have little area, and hardly count.
+pub fn cell_size(mesh: &Mesh, triangles: &[[NodeId; 3]]) -> f64 {
+    let areas: Vec<f64> = triangles.iter().map(|t| norm(area_vector(t.map(|n| mesh.point(n))))).collect();
+    let sum = ordered_sum(areas.len(), |i| areas[i]);
+    ordered_sum(areas.len(), |i| areas[i] * (2.0 * areas[i]).sqrt()) / sum.max(f64::MIN_POSITIVE)
+}
+
+/// The radius of the filter on a surface where none is asked for [m]: 1.5 cells.
+pub fn default_filter_radius(mesh: &Mesh, triangles: &[[NodeId; 3]]) -> f64 {
+    CELLS * cell_size(mesh, triangles)
+}
 
 /// What the filter needs of the design surface, by its nodes.
 pub(super) struct Surface<'a> {

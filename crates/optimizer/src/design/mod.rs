@@ -19,6 +19,7 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::tet4::{Point, dot};
 use fluxmorph_geometry::{Mesh, NodeId};
 
+pub use filter::{cell_size, default_filter_radius};
 pub use grid::dominant_axis;
 pub use transfer::{SurfaceMismatch, Triangulation};
 
@@ -185,6 +186,7 @@ pub struct DesignSurface {
     directions: Vec<Point>,
     rows: Vec<Row>,
     points: Vec<Point>,
+    filter_radius: Option<f64>,
 }
 
 impl DesignSurface {
@@ -240,7 +242,11 @@ impl DesignSurface {
                 row.clear();
             }
         }
-        let mut surface = Self { nodes, directions, rows, points };
+        let filter_radius = match setup.control {
+            Control::Filter(radius) => Some(radius),
+            Control::Nodes | Control::Grid(_) => None,
+        };
+        let mut surface = Self { nodes, directions, rows, points, filter_radius };
         if on_nodes {
             surface.drop_idle();
         }
@@ -291,6 +297,11 @@ impl DesignSurface {
     /// Number of design variables.
     pub fn variable_count(&self) -> usize {
         self.points.len()
+    }
+
+    /// Radius of the filter [m], where there is one.
+    pub fn filter_radius(&self) -> Option<f64> {
+        self.filter_radius
     }
 
     /// Where the variables sit on the undeformed surface [m], shape `(n_variables, 3)`.

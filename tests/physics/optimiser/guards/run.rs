@@ -200,15 +200,18 @@ fn a_panic_in_any_evaluation_of_any_algorithm_comes_out_on_this_side() {
 
 #[test]
 fn a_mesh_that_inverts_under_a_bound_ends_at_the_mesh_limit_with_numbers_alone() {
-    let (mut problem, settings) = quick(&["remesh.rounds=0"]);
-    let shape = problem.shape_mut().unwrap();
-    let n = shape.surface().variable_count();
-    shape.set_bounds([vec![-9.9e-3; n], vec![60e-3; n]]);
-    let settings = Optimizer { max_evaluations: 30, ..settings };
-    let mut rows = Rows::default();
-    let optimised = run(problem, &settings, &mut rows).0.unwrap();
-    println!("{:?} after {} evaluations", optimised.stop_reason, optimised.evaluations);
-    assert_ne!(optimised.stop_reason, StopReason::NumericalFailure);
-    assert_eq!(optimised.best.objective, rows.rows[optimised.best.evaluation].objective);
-    assert!(rows.rows.iter().all(|row| row.objective.is_finite() && row.worst_quality > 0.0));
+    for law in ["linear", "rails"] {
+        let law = format!("remesh.law=\"{law}\"");
+        let (mut problem, settings) = quick(&["remesh.rounds=0", &law]);
+        let shape = problem.shape_mut().unwrap();
+        let n = shape.surface().variable_count();
+        shape.set_bounds([vec![-9.9e-3; n], vec![60e-3; n]]);
+        let settings = Optimizer { max_evaluations: 30, ..settings };
+        let mut rows = Rows::default();
+        let optimised = run(problem, &settings, &mut rows).0.unwrap();
+        println!("{:?} after {} evaluations", optimised.stop_reason, optimised.evaluations);
+        assert_ne!(optimised.stop_reason, StopReason::NumericalFailure);
+        assert_eq!(optimised.best.objective, rows.rows[optimised.best.evaluation].objective);
+        assert!(rows.rows.iter().all(|row| row.objective.is_finite() && row.worst_quality > 0.0));
+    }
 }
