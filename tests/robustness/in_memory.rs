@@ -9,7 +9,7 @@ use fluxmorph::files::{Disk, OverwritePolicy, RunResult};
 use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::Silent;
 
-use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS};
+use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS, THROUGH_THE_GAP};
 use crate::support::{self, changed, parsed};
 
 /// Where the runs write.
@@ -38,6 +38,11 @@ pub(crate) fn with_rounds() -> (Config, SourceMap) {
         ("ftol_rel = 0", "ftol_rel = 1e-4"),
         ("verify_refinement = 0", "verify_refinement = 0\nfields = \"improved\""),
     ])
+}
+
+/// The block with a face that the mesh does not carry to its bound: on rails, steps are cut short.
+pub(crate) fn throttled() -> (Config, SourceMap) {
+    block(&[THROUGH_THE_GAP, ("max_evaluations = 6", "max_evaluations = 12")])
 }
 
 /// A shipped configuration.

@@ -8,8 +8,8 @@ use fluxmorph::files::Disk;
 use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
-use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, with_rounds};
 use crate::support::device::{ROUNDS, SATURATED};
+use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, throttled, with_rounds};
 use crate::support::essence::{Essence, assert_same, essence};
 
 /// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
@@ -67,6 +67,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("saturated", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3]])),
         ("saturated, with rounds", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3], ROUNDS])),
         ("saturated at 50 Hz", block(&SATURATED[..3])),
+        ("throttled", throttled()),
         ("last", kept("first_last")),
         ("none", kept("none")),
         ("shield", shipped("shield_quick.toml")),
@@ -100,7 +101,7 @@ fn the_rounds_of_the_device_are_there_to_be_tested() {
 
 #[test]
 fn a_run_may_be_cut_again_and_again() {
-    for device in [constrained(), with_rounds(), shipped_with(8)] {
+    for device in [constrained(), with_rounds(), throttled(), shipped_with(8)] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.jsonl")]);
         let mut disk = cut_behind(&files, 0);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::device::{Device, ROUNDS, shipped, written};
+use crate::support::device::{Device, ROUNDS, THROUGH_THE_GAP, shipped, written};
 use crate::support::folder::{RunFolder, count, number};
 use crate::support::program::{finish, folder};
 
@@ -27,6 +27,28 @@ fn the_result_of_a_run_in_rounds_is_solved_again_to_the_last_bit() {
         assert_eq!(own["mesh"]["worst_quality_final"], result["mesh"]["worst_quality_final"]);
         assert_eq!(own["design"], result["design"]);
     }
+}
+
+/// Throttled by its mesh, a run ends with 1, says so, and its result is solved again as it is.
+#[test]
+fn a_run_that_the_mesh_holds_back_never_says_converged() {
+    let home = folder();
+    let device = written(
+        "device",
+        home.path(),
+        &[
+            THROUGH_THE_GAP,
+            ("max_evaluations = 6", "max_evaluations = 30"),
+            ("ftol_rel = 0", "ftol_rel = 1e-4"),
+        ],
+    );
+    let [run, solved] = ["run", "solved"].map(|name| home.path().join(name));
+    finish(&mut device.command("run", &run)).exits_with(1);
+    let result = RunFolder(run.clone()).result();
+    assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limited".into()));
+    assert!(count(&result, "/evaluations") < 30, "it ends by itself");
+    finish(device.command("solve", &solved).arg("--design").arg(run.join("result.json"))).exits_with(0);
+    assert_eq!(number(&RunFolder(solved).result(), "/objective/best"), number(&result, "/objective/best"));
 }
 
 #[test]

@@ -28,6 +28,9 @@ pub(crate) const SATURATED: [(&str, &str); 4] = [
     ("frequency = \"50 Hz\"", "frequency = 0"),
 ];
 
+/// A face that may move through all of the gap below it, which no mesh carries.
+pub(crate) const THROUGH_THE_GAP: (&str, &str) = ("upper = \"4 mm\"", "upper = \"11 mm\"");
+
 /// A block of 4 × 4 × 4 cells of 10 mm whose middle top node is lifted.
 pub(crate) const MOTION: &str = r#"title = "lifted"
 [mesh]

@@ -82,7 +82,8 @@ fn wavy(problem: &Problem) -> Vec<f64> {
 
 #[test]
 fn the_gradient_is_exact_in_both_models_flat_and_wavy() {
-    for overrides in [&[][..], &MESHED] {
+    let linear = ["remesh.law=\"linear\""];
+    for overrides in [&[][..], &MESHED, &linear, &[&MESHED[..], &linear].concat()] {
         let problem = setup("shield_quick.toml", overrides).problem;
         holds(&problem, &initial(&problem));
         holds(&problem, &wavy(&problem));
@@ -138,6 +139,18 @@ fn the_gradient_is_exact_with_filtered_nodes_along_normals() {
         let problem = designed(FILTERED, overrides);
         holds(&problem, &wavy(&problem));
     }
+}
+
+#[test]
+fn the_gradient_is_exact_with_the_filter_of_no_key_and_without_one() {
+    let [own, none] = ["", "\nfilter_radius = 0"].map(|filter| {
+        let problem = designed(&format!("direction = [0, 0, -1]{filter}"), &[]);
+        holds(&problem, &wavy(&problem));
+        problem.shape().expect("a shape").surface().filter_radius()
+    });
+    // Cells of 20 mm, cut at the lines of coil and observation region.
+    assert!(own.is_some_and(|radius| (0.01..=0.03).contains(&radius)), "{own:?}");
+    assert_eq!(none, None);
 }
 
 #[test]

@@ -33,6 +33,20 @@ const LINEAR: [&str; 1] = ["remesh.law=\"linear\""];
 #[derive(Default)]
 struct Events(Vec<RoundEvent>);
 
+/// The lines of a run.
+#[derive(Default)]
+struct Notes(Vec<String>);
+
+impl Observer for Notes {
+    fn note(&mut self, message: &str) {
+        self.0.push(message.to_owned());
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.0.push(message.to_owned());
+    }
+}
+
 impl Observer for Events {
     fn round(&mut self, event: &RoundEvent) {
         self.0.push(event.clone());
@@ -211,4 +225,39 @@ fn a_first_design_far_away_is_approached_in_steps() {
         "{:?}",
         events.0
     );
+}
+
+/// The mesh that moves ends 15 mm below a face that would move by 20 mm.
+const LID: &str = "mesh.shield.remesh_z=[\"-25 mm\", \"30 mm\"]";
+
+#[test]
+fn a_face_that_meets_a_lid_gains_up_to_it_and_ends_at_the_mesh_limit() {
+    let (mut problem, settings) = quick(&[LID]);
+    let mut notes = Notes::default();
+    let (optimised, rows) =
+        optimised(&mut problem, &Optimizer { max_evaluations: 60, ..settings }, &mut notes);
+    let ratio = rows[optimised.best.evaluation].ratio;
+    println!("{:?} after {} evaluations, {ratio:.4}: {:#?}", optimised.stop_reason, rows.len(), notes.0);
+    check_rows(&optimised, &rows, 0.0);
+    assert!(rows.iter().all(|row| row.worst_quality > 0.0 && row.round == 0));
+    assert_eq!(optimised.stop_reason, StopReason::MeshLimited);
+    assert!(rows.len() < 40, "it does not creep along the lid: {}", rows.len());
+    // A plate with all of its room but a twentieth, 14 mm thicker, has 0.79: the frame below the lid is better.
+    assert!(ratio < 0.68, "{ratio}");
+    // What would help is said, and once.
+    let said = |words: &str| notes.0.iter().filter(|note| note.contains(words)).count();
+    assert_eq!(said("a larger remesh region or narrower bounds give it"), 1, "{:?}", notes.0);
+}
+
+#[test]
+fn other_methods_do_not_converge_at_the_lid_either() {
+    for algorithm in [Algorithm::Lbfgs, Algorithm::Slsqp] {
+        let (mut problem, settings) = quick(&[LID]);
+        let settings = Optimizer { algorithm, max_evaluations: 40, ..settings };
+        let (optimised, rows) = optimised(&mut problem, &settings, &mut Silent);
+        println!("{algorithm:?}: {:?} after {}", optimised.stop_reason, rows.len());
+        check_rows(&optimised, &rows, 0.0);
+        assert!(rows.iter().all(|row| row.worst_quality > 0.0));
+        assert!(!optimised.stop_reason.is_converged(), "{algorithm:?}: {:?}", optimised.stop_reason);
+    }
 }

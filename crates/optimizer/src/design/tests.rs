@@ -178,6 +178,19 @@ fn a_node_in_a_corner_of_three_planes_stays() {
 }
 
 #[test]
+fn a_cell_is_the_square_of_two_triangles_and_thin_strips_hardly_count() {
+    let even = moved_block(10, |x| x);
+    let own = outward(&even, "z_max");
+    assert!((cell_size(&even, &own) - 0.1).abs() < 1e-14);
+    assert!((default_filter_radius(&even, &own) - 0.15).abs() < 1e-14);
+    // The last cell along x is a tenth as wide, and the others are 1.1 times as wide.
+    let strip = |x: Point| [if x[0] < 0.95 { 1.1 * x[0] } else { x[0] }, x[1], x[2]];
+    let graded = moved_block(10, strip);
+    let wide = cell_size(&graded, &outward(&graded, "z_max"));
+    assert!((wide / (0.1 * 1.1_f64.sqrt()) - 1.0).abs() < 0.01, "{wide}");
+}
+
+#[test]
 fn the_filter_keeps_the_bounds_and_sums_to_one() {
     let mesh = moved_block(9, cap);
     for radius in [0.05, 0.2, 5.0] {

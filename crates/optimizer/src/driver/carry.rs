@@ -11,12 +11,12 @@
 
 use std::time::Instant;
 
-use fluxmorph_geometry::tet4::centroid;
+use fluxmorph_geometry::tet4::{centroid, dot, norm, sub};
 use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
 use super::run::Run;
-use super::search::{Refusal, Stop};
+use super::search::{LEAST_GAIN, Refusal, Stop};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::between;
@@ -38,7 +38,7 @@ pub(super) struct Carriage {
     /// Its mesh.
     pub(super) moved: Moved,
     /// What holds the mesh back, and what would help, where it does not carry what was asked for.
-    cut: Option<String>,
+    cut: Option<Cut>,
     /// Room of the design asked for.
     room: f64,
     /// Derivatives of the room by the variables [1/m].
@@ -47,11 +47,27 @@ pub(super) struct Carriage {
     pub(super) seconds: f64,
 }
 
+/// Why a step is cut short.
+struct Cut {
+    /// In words, with what would help.
+    cause: String,
+    /// What would help.
+    cure: &'static str,
+}
+
 impl Carriage {
     /// Whether the mesh holds the evaluated design back.
     pub(super) fn is_held_back(&self) -> bool {
         self.cut.is_some() || self.room < LEAST_ROOM + HELD_BACK
     }
+}
+
+/// Where a run stands before an evaluation.
+pub(super) struct Standing {
+    /// The evaluation of the best design.
+    pub(super) best: Option<usize>,
+    /// Evaluations, with violation and objective of the best design.
+    pub(super) values: (usize, Option<(f64, f64)>),
 }
 
 impl Run<'_> {
@@ -83,20 +99,24 @@ impl Run<'_> {
         Ok(Some(Carriage { design, moved, cut, room: room.value, room_gradient, seconds }))
     }
 
-    /// What the method is given for the design `p` that it asked for, from the sample of the one that was evaluated; `best` is
-    /// the evaluation of the best design before it.
+    /// What the method is given for the design `p` that it asked for, from the sample of the one that was evaluated; `before`
+    /// are the evaluations and the best design before it.
     pub(super) fn answer(
         &mut self,
         p: &[f64],
-        (carried, best): (&Carriage, Option<usize>),
+        (carried, before): (&Carriage, Standing),
         mut sample: Sample,
     ) -> Result<Sample, Stop> {
-        let has_gained = self.best_evaluation() != best;
-        if has_gained {
+        if self.best_evaluation() != before.best {
             self.is_held_back = carried.is_held_back();
         }
-        if let Some(cause) = &carried.cut {
-            self.observer.note(cause);
+        // With less, a search creeps along the boundary in ever smaller steps.
+        let least = LEAST_GAIN.max(self.settings.ftol_rel);
+        let has_gained = before.best.is_none() || self.has_gained(before.values, least);
+        if let Some(Cut { cause, cure }) = &carried.cut {
+            if self.cures.insert(cure) {
+                self.observer.note(cause);
+            }
             if !self.takes_constraints() {
                 return Err(Stop::Mesh(Refusal { cause: cause.clone(), wanted: p.to_vec() }));
             }
@@ -119,28 +139,30 @@ impl Run<'_> {
     }
 
     /// Which element a design asks too much of, why, and what would help.
-    fn why_cut(&self, p: &[f64], element: ElementId) -> String {
+    fn why_cut(&self, p: &[f64], element: ElementId) -> Cut {
         let (shape, mesh) = (self.shape(), self.problem.original());
         let (surface, map) = (shape.surface(), shape.motion().map());
         let displacements = surface.normal_displacements(p);
         let nodes = mesh.topology().tet(element);
-        let moved: Vec<f64> = nodes
-            .iter()
-            .filter_map(|node| surface.nodes().binary_search(node).ok())
-            .map(|row| displacements[row])
-            .collect();
-        let is_held = |node: &NodeId| {
-            surface.nodes().binary_search(node).is_err() && (0..3).all(|c| !map.is_unknown(*node, c))
+        let row = |node: &NodeId| surface.nodes().binary_search(node).ok();
+        let rows: Vec<usize> = nodes.iter().filter_map(row).collect();
+        let is_held = |node: &&NodeId| row(node).is_none() && (0..3).all(|c| !map.is_unknown(**node, c));
+        // Beside the surface rather than in front of it.
+        let is_beside = |held: &NodeId, row: usize| {
+            let way = sub(mesh.point(*held), mesh.point(surface.nodes()[row]));
+            dot(way, surface.directions()[row]).abs() < 0.5 * norm(way)
         };
+        let is_at_held_rim =
+            nodes.iter().filter(is_held).any(|held| rows.iter().any(|&row| is_beside(held, row)));
+        let moved = || rows.iter().map(|&row| displacements[row]);
         let (least, most) =
-            moved.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), &x| (l.min(x), m.max(x)));
-        let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);
-        let (why, cure) = if !moved.is_empty() && nodes.iter().any(is_held) {
+            moved().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(x), m.max(x)));
+        let (why, cure) = if is_at_held_rim {
             (
                 "nodes beside the design surface are held there".to_owned(),
                 "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)",
             )
-        } else if most - least > 0.5 * most.abs().max(least.abs()) && moved.len() > 1 {
+        } else if rows.len() > 1 && most - least > 0.5 * most.abs().max(least.abs()) {
             let step = 1e3 * (most - least);
             (
                 format!("neighbouring nodes of the design lie {step:.1} mm apart"),
@@ -152,11 +174,13 @@ impl Run<'_> {
                 "a larger remesh region or narrower bounds give it",
             )
         };
+        let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);
         let region = mesh.topology().region_name_at(element);
-        format!(
+        let cause = format!(
             "the mesh carries a part of the step: element {element} of region `{region}` at ({x:.1}, {y:.1}, {z:.1}) mm would be \
              squeezed, as {why}; {cure}"
-        )
+        );
+        Cut { cause, cure }
     }
 }
 

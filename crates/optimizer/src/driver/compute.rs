@@ -6,6 +6,7 @@ use std::time::Instant;
 use fluxmorph_geometry::ElementId;
 use fluxmorph_remesh::{Moved, RemeshError};
 
+use super::carry::Standing;
 use super::incumbent::{BestField, Comparison, Initial};
 use super::run::Run;
 use super::search::{Refusal, Stop};
@@ -20,9 +21,10 @@ impl Run<'_> {
     /// know of it (`carry`).
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         let Some(carried) = self.carry(p)? else { return self.sample_of(p, None) };
-        let best = self.best_evaluation();
+        let before =
+            Standing { best: self.best_evaluation(), values: (self.evaluations, self.incumbent_values()) };
         let sample = self.sample_of(&carried.design, Some((&carried.moved, carried.seconds)))?;
-        self.answer(p, (&carried, best), sample)
+        self.answer(p, (&carried, before), sample)
     }
 
     /// ±F/|F0| and the constraints of a design, on its mesh where that is known, and the seconds that it took.

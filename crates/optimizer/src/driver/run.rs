@@ -1,5 +1,6 @@
 //! The state of one optimisation: counts and limits, rounds of the mesh motion, the best design, the outcome.
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
@@ -17,7 +18,7 @@ use crate::problem::{Analysis, Problem, RoundEvent, RoundStart, Shape, SolverCac
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
     pub(super) goal: Goal,
-    settings: &'a Settings,
+    pub(super) settings: &'a Settings,
     /// What the linear solvers keep of the designs before: which methods work.
     pub(super) cache: SolverCache,
     pub(super) observer: &'a mut dyn Observer,
@@ -35,6 +36,8 @@ pub(super) struct Run<'a> {
     pub(super) best_is_stale: bool,
     /// On rails: whether the mesh holds the best design back.
     pub(super) is_held_back: bool,
+    /// On rails: what would help the mesh, each of which is said once.
+    pub(super) cures: BTreeSet<&'static str>,
     worst_residual: f64,
     timings: Timings,
     rounds: Vec<RoundEvent>,
@@ -76,6 +79,7 @@ impl<'a> Run<'a> {
             best: None,
             best_is_stale: false,
             is_held_back: false,
+            cures: BTreeSet::new(),
             worst_residual: 0.0,
             timings: Timings::default(),
             rounds: Vec::new(),

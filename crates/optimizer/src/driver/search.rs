@@ -18,7 +18,7 @@ const SHRINK: f64 = 0.5;
 const MAX_SHRINKS: usize = 3;
 
 /// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
-const LEAST_GAIN: f64 = 1e-6;
+pub(super) const LEAST_GAIN: f64 = 1e-6;
 
 /// Factor on `ftol_rel` after the first search, and where a method ends after its first steps: it begins with a cautious
 /// step, whose small gain is no convergence.
@@ -169,7 +169,9 @@ impl<'a> Search<'a> {
 
     /// After a method that ended by itself.
     fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
-        let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS;
+        // A method that was given nothing new will not be at its next start either.
+        let is_stuck = run.is_held_back && evaluations == 0;
+        let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS && !is_stuck;
         if is_cautious && self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS {
             return NextStep::TightenTolerance;
         }
