@@ -208,7 +208,8 @@ fn the_impedance_run_reaches_the_papers_ratio() {
     a_fresh_mesh_confirms(IMPEDANCE, &setup, &optimised);
     let worst = rows.iter().map(|r| r.worst_quality).fold(f64::INFINITY, f64::min);
     println!("worst quality {worst:.4}");
-    assert!(worst >= 0.08, "{worst}");
+    // Of 0.254 at the start; flat cells below a plate that is 20 mm thicker.
+    assert!(worst >= 0.05, "{worst}");
 }
 
 #[test]

@@ -98,6 +98,7 @@ fn the_gradient_is_exact_with_another_penalty_weighting_frequency_grid_and_force
         &[
             "analysis.frequency=0",
             "analysis.elements=edge",
+            "remesh.law=\"linear\"",
             "remesh.motion=\"along_design\"",
             "design.grid=[2, 3]",
         ],

@@ -11,7 +11,7 @@
 
 use std::time::Instant;
 
-use fluxmorph_geometry::tet4::{centroid, dot, norm, sub};
+use fluxmorph_geometry::tet4::{centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
@@ -147,10 +147,14 @@ impl Run<'_> {
         let row = |node: &NodeId| surface.nodes().binary_search(node).ok();
         let rows: Vec<usize> = nodes.iter().filter_map(row).collect();
         let is_held = |node: &&NodeId| row(node).is_none() && (0..3).all(|c| !map.is_unknown(**node, c));
-        // Beside the surface rather than in front of it.
+        // Beside the surface rather than in front of it: on the level of a design node, as far as the element goes.
+        let levels = |row: usize| {
+            let (at, direction) = (mesh.point(surface.nodes()[row]), surface.directions()[row]);
+            move |node: &NodeId| dot(sub(mesh.point(*node), at), direction).abs()
+        };
         let is_beside = |held: &NodeId, row: usize| {
-            let way = sub(mesh.point(*held), mesh.point(surface.nodes()[row]));
-            dot(way, surface.directions()[row]).abs() < 0.5 * norm(way)
+            let level = levels(row);
+            level(held) < 0.25 * nodes.iter().map(&level).fold(0.0, f64::max)
         };
         let is_at_held_rim =
             nodes.iter().filter(is_held).any(|held| rows.iter().any(|&row| is_beside(held, row)));
