@@ -49,7 +49,9 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     };
     let (mut config, source) = support::config(name, &[overrides, &[initial.as_str()]].concat());
     if start == Start::FlatNodes {
-        config.design.as_mut().expect("a design").grid = None;
+        let design = config.design.as_mut().expect("a design");
+        // As rough as the nodes allow.
+        (design.grid, design.filter_radius) = (None, Some(0.0));
     }
     let mut setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
     let settings = Optimizer { max_evaluations: ENOUGH, ..config.optimizer };
