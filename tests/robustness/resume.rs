@@ -8,8 +8,8 @@ use fluxmorph::files::Disk;
 use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
-use crate::support::device::{ROUNDS, SATURATED};
 use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, throttled, with_rounds};
+use crate::support::device::{ROUNDS, SATURATED};
 use crate::support::essence::{Essence, assert_same, essence};
 
 /// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
