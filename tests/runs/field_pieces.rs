@@ -32,12 +32,6 @@ fn run(disk: &Arc<dyn Disk>, directory: &Path) -> (Problem, Analysis) {
     (problem, analysis)
 }
 
-/// Thickness of the plate at all nodes.
-fn thickness(problem: &Problem, analysis: &Analysis) -> Vec<f64> {
-    let shape = problem.shape().unwrap();
-    shape.thickness().unwrap().over_nodes(shape.surface(), &analysis.mesh)
-}
-
 /// The elements of every rank; the last one owns none.
 fn parts(analysis: &Analysis) -> Vec<Vec<ElementId>> {
     let topology = analysis.mesh.topology();
@@ -48,7 +42,7 @@ fn parts(analysis: &Analysis) -> Vec<Vec<ElementId>> {
 }
 
 fn write_pieces(directory: &RunDirectory, problem: &Problem, analysis: &Analysis) {
-    let thickness = thickness(problem, analysis);
+    let thickness = fields::thickness(problem, analysis).unwrap();
     let data = FieldData { thickness: Some(&thickness), ..FieldData::of(analysis) };
     directory.begin_pieces(0).unwrap();
     for (rank, elements) in parts(analysis).iter().enumerate() {
@@ -82,7 +76,7 @@ fn fields_in_pieces_are_those_of_the_whole_and_are_reported_alike() {
     };
 
     let whole = std::fs::read(directory.field(0)).unwrap();
-    let thickness = thickness(&problem, &analysis);
+    let thickness = fields::thickness(&problem, &analysis).unwrap();
     let data = FieldData { thickness: Some(&thickness), ..FieldData::of(&analysis) };
     assert!(whole == fields::vtu(problem.states(), &data).unwrap(), "the run's file");
     let whole = vtu_contents(&whole).unwrap();

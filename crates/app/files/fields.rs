@@ -7,7 +7,7 @@ use fluxmorph_geometry::quality::qualities_of;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
 use fluxmorph_optimizer::body::Body;
-use fluxmorph_optimizer::problem::Analysis;
+use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
 
@@ -43,6 +43,12 @@ impl<'a> FieldData<'a> {
             bodies: &[],
         }
     }
+}
+
+/// Thickness of the designed body at the nodes of a design [m], where it has one.
+pub fn thickness(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
+    let shape = problem.shape()?;
+    Some(shape.thickness()?.over_nodes(shape.surface(), &analysis.mesh))
 }
 
 /// The VTU file of an analysed design: the moved mesh, potentials, displacement and sensitivity at its nodes; fields,

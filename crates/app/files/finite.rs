@@ -12,7 +12,8 @@ const SUM: &str = "expected a finite number; check weights, currents and units";
 /// # Errors
 /// [`Error::NotFinite`] names the first that is not finite.
 pub(crate) fn check_finite(result: &RunResult) -> Result<(), Error> {
-    let RunResult { objective, constraints, design, mesh, probes, losses_w, states, .. } = result;
+    let RunResult { objective, constraints, design, mesh, probes, losses_w, states, initial, .. } = result;
+    let states = || states.iter().chain(initial);
     let mut numbers: Vec<(String, f64)> = vec![
         ("worst_quality_initial".to_owned(), mesh.worst_quality_initial),
         ("worst_quality_final".to_owned(), mesh.worst_quality_final),
@@ -31,9 +32,9 @@ pub(crate) fn check_finite(result: &RunResult) -> Result<(), Error> {
     }
     let values = design.iter().flat_map(|design| design.values_m.iter().enumerate());
     numbers.extend(values.map(|(k, &value)| (format!("design variable {k}"), value)));
-    let probes = probes.iter().chain(states.iter().flat_map(|state| &state.probes));
+    let probes = probes.iter().chain(states().flat_map(|state| &state.probes));
     numbers.extend(probes.flat_map(at_probe));
-    let losses = losses_w.iter().chain(states.iter().flat_map(|state| &state.losses_w));
+    let losses = losses_w.iter().chain(states().flat_map(|state| &state.losses_w));
     numbers.extend(losses.map(|(region, &loss)| (format!("the loss of `{region}`"), loss)));
     match numbers.into_iter().find(|(_, value)| !value.is_finite()) {
         Some((what, value)) => Err(Error::NotFinite { what, value, expected: SUM }),

@@ -58,6 +58,9 @@ pub struct RunResult {
     /// Losses and probes at every frequency; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateResult>,
+    /// Losses and probes of the initial design at every frequency, of a run.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub initial: Vec<StateResult>,
     /// Open space, where the mesh has a shell that stands for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub open: Option<OpenResult>,
@@ -423,6 +426,7 @@ pub(crate) mod tests {
             forces: Vec::new(),
             saturation: None,
             states: vec![],
+            initial: vec![],
             open: None,
             coils: vec![],
             inductance_h: vec![],

@@ -191,6 +191,7 @@ impl Session<'_> {
         let optimum = self.directory.optimum();
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
+        let initial = self.initial_states(first.clone(), optimised.stop_reason, observer)?;
         let errors = self.estimate_errors(first, (&best.analysis, optimised.stop_reason), observer)?;
         let problem = &self.setup.problem;
         let result = RunResult {
@@ -207,6 +208,7 @@ impl Session<'_> {
                 terms: terms(problem, &best.analysis),
             }),
             accuracy: None,
+            initial,
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
             rounds: self.continuation.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),

@@ -13,7 +13,6 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
-use super::recorder::thickness;
 use crate::error::Error;
 use crate::files::fields::{self, FieldData};
 use crate::files::{RunDirectory, system_disk};
@@ -47,7 +46,7 @@ impl SharedPieces {
         problem: &Problem,
         analysis: &Analysis,
     ) -> Result<(), Error> {
-        let thickness = thickness(problem, analysis);
+        let thickness = fields::thickness(problem, analysis);
         let data = FieldData { thickness: thickness.as_deref(), ..FieldData::of(analysis) };
         directory.begin_pieces(evaluation)?;
         let mut numbers = vec![evaluation as f64];

@@ -125,7 +125,7 @@ pub(super) fn write_field(
     if let Some(pieces) = pieces {
         return pieces.write(directory, evaluation, problem, analysis);
     }
-    let thickness = thickness(problem, analysis);
+    let thickness = fields::thickness(problem, analysis);
     let data = FieldData {
         error,
         thickness: thickness.as_deref(),
@@ -134,12 +134,6 @@ pub(super) fn write_field(
     };
     let bytes = fields::vtu(problem.states(), &data)?;
     Ok(directory.write_field(evaluation, &bytes)?)
-}
-
-/// Thickness of the designed body at the nodes of a design [m], where it has one.
-pub(super) fn thickness(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
-    let shape = problem.shape()?;
-    Some(shape.thickness()?.over_nodes(shape.surface(), &analysis.mesh))
 }
 
 /// Writes the PVD file over all field files; its time is the evaluation number.

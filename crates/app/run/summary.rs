@@ -7,7 +7,10 @@ use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, RoundStart, Shape, Timings};
+use fluxmorph_optimizer::problem::{
+    Analysis, Derivatives, Measured, NoProgress, Problem, RoundStart, Shape, SolverCache, Timings,
+};
+use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery, saturation};
@@ -37,11 +40,7 @@ impl Session<'_> {
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
         let mesh = &analysis.mesh;
-        let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
-        let located = locate(mesh, &places);
-        let states: Vec<_> = (0..problem.states().len())
-            .map(|index| self.state_result(index, analysis, &located, observer))
-            .collect();
+        let states = self.state_results(analysis, observer);
         let StateResult { probes, losses_w, .. } = states[0].clone();
         let design =
             problem.shape().zip(design).map(|(shape, (values, rounds))| design_result(shape, values, rounds));
@@ -74,6 +73,7 @@ impl Session<'_> {
             forces: analysis.forces.clone(),
             saturation: saturation(problem, analysis),
             states: if states.len() > 1 { states } else { Vec::new() },
+            initial: Vec::new(),
             open: open(problem, analysis)?,
             coils: coils(&terminals, problem.states()[0].angular_frequency()),
             coupling: coupling(&terminals.inductance),
@@ -121,6 +121,36 @@ impl Session<'_> {
             ]
             .map(|(stage, seconds)| (stage.to_owned(), seconds)),
         )
+    }
+
+    /// Losses and probes of the initial design at every frequency; nothing where a run was interrupted, or has neither.
+    pub(super) fn initial_states(
+        &self,
+        initial: Moved,
+        stop_reason: StopReason,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Vec<StateResult>, Error> {
+        let problem = &self.setup.problem;
+        let has_neither = self.config.probes.is_empty() && self.setup.audits.is_empty();
+        if stop_reason == StopReason::Interrupted || has_neither {
+            return Ok(Vec::new());
+        }
+        let cache = &mut SolverCache::default();
+        let analysis = problem.analyse(initial, Derivatives::None, cache, &mut NoProgress)?;
+        Ok(self.state_results(&analysis, observer))
+    }
+
+    /// Losses and probes of a design at every frequency.
+    pub(super) fn state_results(
+        &self,
+        analysis: &Analysis,
+        observer: &mut dyn RunObserver,
+    ) -> Vec<StateResult> {
+        let places: Vec<Point> = self.config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
+        let located = locate(&analysis.mesh, &places);
+        (0..self.setup.problem.states().len())
+            .map(|index| self.state_result(index, analysis, &located, observer))
+            .collect()
     }
 
     /// Losses and probes of one state; `located` has an entry for every point of every probe.

@@ -11,7 +11,7 @@ use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use crate::build::{Audited, Outline};
 use crate::config::{BodyKind, Constraint, Limit, Objective, RegionModel};
-use crate::files::{ConstraintResult, ProbeResult, RunResult, TermResult};
+use crate::files::{ConstraintResult, ProbeResult, RunResult, StateResult, TermResult};
 use crate::show::Evaluation;
 
 /// Rows of a table that is shown at once; a longer one is opened by the reader.
@@ -112,6 +112,11 @@ pub(super) fn evaluations(data: &RunData) -> Markup {
 /// Losses and probes of a field, at its frequency [Hz].
 type State<'a> = (f64, &'a BTreeMap<String, f64>, &'a [ProbeResult]);
 
+/// What the result says of a frequency of the initial design; `None` for an analysis.
+fn initial_of(result: &RunResult, frequency: f64) -> Option<&StateResult> {
+    result.initial.iter().find(|state| state.frequency_hz == frequency)
+}
+
 /// What the result says beside the objective: constraints and terms of the objective, losses and probes.
 pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     let states: Vec<State<'_>> = if result.states.is_empty() {
@@ -124,10 +129,10 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         (constraints(&result.constraints, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (circuits(result))
-        (losses(&states))
+        (losses(result, &states))
         (iron::forces(&result.forces))
         (iron::saturation(result.saturation.as_ref()))
-        (probes(&states))
+        (probes(result, &states))
     }
 }
 
@@ -183,20 +188,36 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
     titled_table("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
 }
 
-fn losses(states: &[State<'_>]) -> Markup {
+fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
     let row = |frequency: f64, (region, loss): (&String, &f64)| {
-        vec![region.clone(), hertz(frequency), number(*loss, 5)]
+        let before = initial_of(result, frequency).and_then(|state| state.losses_w.get(region));
+        let before = before.map_or(String::new(), |before| number(*before, 5));
+        vec![region.clone(), hertz(frequency), before, number(*loss, 5)]
     };
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|(f, losses, _)| losses.iter().map(|entry| row(*f, entry))).collect();
-    let head = ["region", "frequency", "loss [W]"];
+    let head = ["region", "frequency", "initial [W]", "loss [W]"];
     titled_table("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
 }
 
-fn probes(states: &[State<'_>]) -> Markup {
-    let rows: Vec<Vec<String>> =
-        states.iter().flat_map(|(f, _, probes)| probes.iter().flat_map(|probe| rows_of(*f, probe))).collect();
-    let head = ["probe", "x, y, z [mm]", "frequency", "|B| [mT]", "Bx [mT]", "By [mT]", "Bz [mT]"];
+fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
+    let before = |frequency: f64, probe: &ProbeResult| {
+        initial_of(result, frequency)?.probes.iter().find(|initial| initial.name == probe.name)
+    };
+    let rows: Vec<Vec<String>> = states
+        .iter()
+        .flat_map(|(f, _, probes)| probes.iter().flat_map(|probe| rows_of(*f, probe, before(*f, probe))))
+        .collect();
+    let head = [
+        "probe",
+        "x, y, z [mm]",
+        "frequency",
+        "initial |B| [mT]",
+        "|B| [mT]",
+        "Bx [mT]",
+        "By [mT]",
+        "Bz [mT]",
+    ];
     titled_table("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
 }
 
@@ -204,8 +225,14 @@ fn hertz(frequency: f64) -> String {
     format!("{} Hz", trim_zeros(frequency, 6))
 }
 
-/// The rows of one probe.
-fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
+/// Magnitude of B at a point of a probe [T]; `None` outside the mesh, and where a file was cut short.
+fn magnitude(probe: &ProbeResult, k: usize) -> Option<f64> {
+    let (re, im) = (probe.b_re_t.get(k)?.as_ref()?, probe.b_im_t.get(k)?.as_ref()?);
+    Some(re.iter().chain(im).map(|c| c * c).sum::<f64>().sqrt())
+}
+
+/// The rows of one probe, with its field at the initial design.
+fn rows_of(frequency: f64, probe: &ProbeResult, initial: Option<&ProbeResult>) -> Vec<Vec<String>> {
     // A file may be cut short.
     let count = probe.points_m.len().min(probe.b_re_t.len()).min(probe.b_im_t.len());
     let component = |re: f64, im: f64| {
@@ -216,9 +243,10 @@ fn rows_of(frequency: f64, probe: &ProbeResult) -> Vec<Vec<String>> {
     let row = |k: usize| {
         let place = probe.points_m[k].map(|c| trim_zeros(1e3 * c, 2)).join(", ");
         let mut cells = vec![probe.name.clone(), place, hertz(frequency)];
+        let millitesla = |size: Option<f64>| size.map_or(String::new(), |size| number(1e3 * size, 4));
+        cells.push(millitesla(initial.and_then(|initial| magnitude(initial, k))));
         if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {
-            let size = re.iter().chain(&im).map(|c| c * c).sum::<f64>().sqrt();
-            cells.push(number(1e3 * size, 4));
+            cells.push(millitesla(magnitude(probe, k)));
             cells.extend((0..3).map(|d| component(re[d], im[d])));
         } else {
             cells.extend(["outside the moved mesh", "", "", ""].map(str::to_owned));
