@@ -53,6 +53,7 @@ fn record(number: usize, p: &[f64], constrained: bool) -> Record {
         inversion_element: None,
         inversion_region: None,
         round: 0,
+        level: 0,
         forces: Vec::new(),
         constraints: Default::default(),
     };

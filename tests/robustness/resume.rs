@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use fluxmorph::config::{Config, SourceMap};
-use fluxmorph::files::Disk;
+use fluxmorph::files::{Disk, Refinements};
 use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
@@ -116,4 +116,65 @@ fn a_run_may_be_cut_again_and_again() {
         assert!(count > 5);
         assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, "at last");
     }
+}
+
+/// A mesh that is refined before the search, and again for the best design.
+fn refined() -> (Config, SourceMap) {
+    block(&[
+        ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"\norder = 1\n\n[accuracy]\ntolerance = \"4.5 %\""),
+        ("max_evaluations = 6", "max_evaluations = 8"),
+        ("ftol_rel = 0", "ftol_rel = 1e-2"),
+    ])
+}
+
+#[test]
+fn a_run_cut_anywhere_makes_its_refinements_again() {
+    let (files, expected) = whole_run(&refined());
+    let history = String::from_utf8_lossy(&files[Path::new("history.csv")]).into_owned();
+    println!("{history}");
+    let kept: Refinements = serde_json::from_slice(&files[Path::new("refinements.json")]).expect("JSON");
+    let evaluations: Vec<usize> = kept.refinements.iter().map(|step| step.evaluations).collect();
+    assert!(evaluations[0] == 0 && *evaluations.last().expect("some") > 0, "{evaluations:?}");
+    let count = count(&files[Path::new("journal.jsonl")]);
+    for cut in 0..=count {
+        // What was marked is known, or the process ended before that was written.
+        for steps in 0..=kept.refinements.len() {
+            let is_early = kept.refinements.get(steps).is_some_and(|next| next.evaluations < cut);
+            // Marks are written before the evaluations that follow them.
+            if is_early || (cut > 0 && steps == 0) {
+                continue;
+            }
+            let refinements = kept.refinements[..steps].to_vec();
+            let mut files = files.clone();
+            if steps == 0 {
+                files.remove(Path::new("refinements.json"));
+            } else {
+                let mut bytes = serde_json::to_vec_pretty(&Refinements { refinements }).expect("JSON");
+                bytes.push(b'\n');
+                files.insert(PathBuf::from("refinements.json"), bytes);
+            }
+            let disk = cut_behind(&files, cut);
+            let context = format!("cut at {cut} with {steps} refinements");
+            resume(&disk.shared(), RunLimits::default()).unwrap_or_else(|e| panic!("{context}: {e}"));
+            assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, &context);
+        }
+    }
+}
+
+#[test]
+fn refinements_that_are_not_those_of_the_run_are_refused() {
+    let (files, _) = whole_run(&refined());
+    let damaged = |change: &dyn Fn(&mut Refinements)| {
+        let path = Path::new("refinements.json");
+        let mut kept: Refinements = serde_json::from_slice(&files[path]).expect("JSON");
+        change(&mut kept);
+        let mut files = files.clone();
+        files.insert(path.to_owned(), serde_json::to_vec(&kept).expect("JSON"));
+        let disk = cut_behind(&files, 1);
+        resume(&disk.shared(), RunLimits::default()).expect_err("another mesh").to_string()
+    };
+    let error = damaged(&|kept| kept.refinements[0].marked.push(1_000_000));
+    assert!(error.contains("refinements.json") && error.contains("an element that the mesh does not have"), "{error}");
+    let error = damaged(&|kept| drop(kept.refinements[0].marked.pop()));
+    assert!(error.contains("it makes another mesh than it says"), "{error}");
 }

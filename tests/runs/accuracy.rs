@@ -62,3 +62,39 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);
     assert!(result["accuracy"]["verdict"].is_string());
 }
+
+/// A pole of coarse first-order elements, with a tolerance: what it reports of itself has to hold against second order.
+#[test]
+fn a_run_with_a_tolerance_refines_its_mesh_until_its_error_bar_is_within() {
+    let home = folder();
+    let out = home.path().join("out");
+    let options = ["--set", "analysis.order=1", "--set", "accuracy.tolerance=0.05", "--max-evaluations", "4"];
+    finish(&mut shipped("pole", &options).command("run", &out)).says(&[
+        "the error bar of the initial design is",
+        "refinement 1,",
+        "tolerance",
+    ]);
+    let result = read_json(&out.join("result.json"));
+    let refinements = count(&result, "/accuracy/refinements") as usize;
+    assert!(refinements >= 1, "the mesh as shipped is too coarse");
+    assert_eq!(result["accuracy"]["within_tolerance"], true);
+    assert!(out.join("optimum_refined.msh").exists() && !out.join("optimum.msh").exists());
+    let levels = result["accuracy"]["levels"].as_array().expect("a list");
+    assert_eq!(levels.len(), refinements);
+    for level in levels {
+        println!(
+            "{} tetrahedra after {} evaluations: F {:.5e}, {:.2} % off",
+            level["tets"],
+            level["evaluations"],
+            level["objective"].as_f64().expect("a number"),
+            100.0 * level["error_estimate_relative"].as_f64().expect("a number"),
+        );
+    }
+    let history = std::fs::read_to_string(out.join("history.csv")).expect("a history");
+    let header = history.lines().next().expect("a header");
+    let column = header.split(',').position(|name| name == "level").expect("a column");
+    let last = history.lines().last().expect("a row").split(',').nth(column).expect("a cell");
+    assert_eq!(last.parse::<usize>().expect("a number"), refinements);
+    let page = std::fs::read_to_string(out.join("report.html")).expect("a report");
+    assert!(page.contains("within the tolerance") && !page.contains("do not belong together"));
+}

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Facet, Mesh, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
     default_filter_radius,
@@ -87,7 +87,7 @@ pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Tria
 }
 
 /// The triangles themselves.
-pub(super) fn triangles(design: &config::Design, mesh: &Mesh) -> Result<Vec<[NodeId; 3]>, Error> {
+pub(super) fn triangles(design: &config::Design, mesh: &Mesh) -> Result<Vec<[NodeId; 3]>, MeshError> {
     let mut own = BTreeSet::new();
     let mut triangles = Vec::new();
     for name in &design.surface {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
-use fluxmorph_geometry::{Mesh, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
 use fluxmorph_solver::linear::{
@@ -51,13 +51,18 @@ pub(super) fn without_replaced_regions(
 /// The nodes that are left without the regions that their surfaces replace, ascending: those of the mesh that is solved on,
 /// in its order.
 pub(crate) fn remaining_nodes(config: &Config, full: &Topology) -> Vec<NodeId> {
-    let is_meshed = |name: &String| config.regions.get(name).is_none_or(|r| r.model == RegionModel::Volume);
-    let meshed: Vec<bool> = full.region_names().iter().map(is_meshed).collect();
     let mut remains = vec![false; full.node_count()];
-    for (tet, region) in full.tets().iter().zip(full.region_of()) {
-        tet.iter().for_each(|n| remains[n.index()] |= meshed[region.index()]);
+    for e in remaining_elements(config, full) {
+        full.tet(e).iter().for_each(|n| remains[n.index()] = true);
     }
     full.nodes().filter(|n| remains[n.index()]).collect()
+}
+
+/// The elements that are left without those regions, ascending.
+pub(crate) fn remaining_elements(config: &Config, full: &Topology) -> Vec<ElementId> {
+    let is_meshed = |name: &String| config.regions.get(name).is_none_or(|r| r.model == RegionModel::Volume);
+    let meshed: Vec<bool> = full.region_names().iter().map(is_meshed).collect();
+    full.elements().filter(|e| meshed[full.region_of()[e.index()].index()]).collect()
 }
 
 /// The faces of `mesh` that the region `name` of `full` covered, oriented out of `mesh`.

@@ -12,6 +12,7 @@ use fluxmorph_geometry::io::msh::{MshError, Place as MshPlace};
 use fluxmorph_geometry::io::read_msh_file;
 use fluxmorph_geometry::topology::{OUTSIDE, face_key};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
+use fluxmorph_optimizer::design::DesignSurface;
 
 use super::locate_error::with_advice;
 use super::open;
@@ -26,12 +27,20 @@ use crate::files::OutputError;
 pub(super) struct Built {
     pub(super) mesh: Mesh,
     pub(super) notices: Vec<String>,
+    /// The design surface, where it comes from a coarser mesh.
+    pub(super) surface: Option<DesignSurface>,
+}
+
+impl From<Mesh> for Built {
+    fn from(mesh: Mesh) -> Self {
+        Self { mesh, notices: Vec::new(), surface: None }
+    }
 }
 
 /// Builds or reads the mesh of a configuration.
 pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error> {
     let generated = |mesh: Result<Mesh, MeshError>| match mesh {
-        Ok(mesh) => Ok(Built { mesh, notices: Vec::new() }),
+        Ok(mesh) => Ok(Built::from(mesh)),
         Err(error) => Err(parameter_fault(error, source)),
     };
     let built = match &config.mesh {
@@ -44,8 +53,8 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
             source.check(loose_faults(config, source, &read.notices.loose_triangles))?;
             let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
             Ok(Built {
-                mesh: read.mesh,
                 notices: read.notices.messages().into_iter().map(with_file).collect(),
+                ..Built::from(read.mesh)
             })
         }
     }?;

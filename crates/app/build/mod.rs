@@ -18,6 +18,7 @@ pub(crate) mod multipole;
 mod open;
 mod outline;
 mod plausible;
+mod refined;
 mod shape;
 mod share;
 mod skin;
@@ -27,10 +28,11 @@ pub(crate) mod steels;
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::motion_in_words;
-pub(crate) use field::remaining_nodes;
+pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
 pub use outline::{Outline, OutlinedDesign, outline};
+pub(crate) use refined::RefinedMesh;
 pub use skin::Audited;
 pub(crate) use skin::result_warnings;
 
@@ -42,6 +44,7 @@ use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
+use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
 use fluxmorph_solver::{FieldModel, Material};
 
@@ -133,8 +136,7 @@ fn build_problem(
 /// # Errors
 /// As [`set_up`].
 pub(crate) fn set_up_on(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Setup, Error> {
-    let built = mesh::Built { mesh, notices: Vec::new() };
-    problem_on(built, config, source, Mode::Optimisation, None, &mut |_| ())
+    problem_on(mesh.into(), config, source, Mode::Optimisation, None, &mut |_| ())
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
@@ -143,13 +145,26 @@ pub(crate) fn set_up_on(mesh: Mesh, config: &Config, source: &SourceMap) -> Resu
 /// # Errors
 /// As [`set_up`].
 pub(crate) fn set_up_field(config: &Config, source: &SourceMap, mesh: Mesh) -> Result<Setup, Error> {
-    let built = mesh::Built { mesh, notices: Vec::new() };
-    problem_on(built, config, source, Mode::Analysis, None, &mut |_| ())
+    problem_on(mesh.into(), config, source, Mode::Analysis, None, &mut |_| ())
+        .map_err(|error| locate_error::attribute_error(error, config, source))
+}
+
+/// Sets up an optimisation on a finer mesh of the configuration's own, with the design surface of that.
+///
+/// # Errors
+/// As [`set_up`].
+pub(crate) fn set_up_refined(
+    config: &Config,
+    source: &SourceMap,
+    (mesh, surface): (Mesh, Option<DesignSurface>),
+) -> Result<Setup, Error> {
+    let built = mesh::Built { surface, ..mesh.into() };
+    problem_on(built, config, source, Mode::Optimisation, None, &mut |_| ())
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
 fn problem_on(
-    mesh::Built { mesh: full_mesh, notices: mut warnings }: mesh::Built,
+    mesh::Built { mesh: full_mesh, notices: mut warnings, surface }: mesh::Built,
     config: &Config,
     source: &SourceMap,
     mode: Mode,
@@ -200,6 +215,7 @@ fn problem_on(
         remesh,
         full_mesh: full,
         mesh: remaining,
+        surface: surface.as_ref(),
         share: owned,
     });
     let body = match &design {

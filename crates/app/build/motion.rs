@@ -44,7 +44,7 @@ pub fn set_up_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup,
 
 fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Error> {
     let Morphing { morph, remesh } = config.morphing(source)?;
-    let mesh::Built { mesh: full_mesh, notices: mut warnings } = mesh::build(config, source)?;
+    let mesh::Built { mesh: full_mesh, notices: mut warnings, .. } = mesh::build(config, source)?;
     warnings.extend_from_slice(source.notices());
     source.check(name_faults(config, source, full_mesh.topology()))?;
     source.check(soundness::contact_faults(config, source, &full_mesh))?;

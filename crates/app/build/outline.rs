@@ -9,6 +9,7 @@ use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 
+use super::RefinedMesh;
 use super::elastic_body::{regions_at, remesh_setup};
 use super::shape::thickened_region;
 use super::skin::{Audited, audits};
@@ -46,17 +47,27 @@ pub struct OutlinedDesign {
     pub moving: Vec<ElementId>,
 }
 
-/// Reads or generates the mesh of a configuration, and finds its design surface.
+/// Reads or generates the mesh of a configuration, refines it as a run has done, and finds its design surface.
 ///
 /// # Errors
-/// Faults of names and of the mesh, as [`super::set_up`].
-pub fn outline(config: &Config, source: &SourceMap) -> Result<Outline, Error> {
-    let full_mesh = mesh::build(config, source)?.mesh;
+/// Faults of names and of the mesh, as [`super::set_up`]; [`MeshError::RefinementLimit`] where the memory does not suffice, and
+/// for marks that are none of the mesh's elements.
+pub fn outline(config: &Config, source: &SourceMap, marks: &[Vec<ElementId>]) -> Result<Outline, Error> {
+    let mut full_mesh = mesh::build(config, source)?.mesh;
     source.check(name_faults(config, source, full_mesh.topology()))?;
+    let mut carried = None;
+    if !marks.is_empty() {
+        let mut refined = RefinedMesh::new(config, source, &full_mesh)?;
+        for marked in marks {
+            refined.halve(marked)?;
+        }
+        carried = refined.surface(config)?;
+        full_mesh = refined.mesh().clone();
+    }
     let (mesh, _) = field::without_replaced_regions(config, &full_mesh)?;
     let node_of = same_nodes(&full_mesh, &mesh);
     let design = match &config.design {
-        Some(_) => Some(outline_design(config, source, &full_mesh, &mesh, &node_of)?),
+        Some(_) => Some(outline_design((config, source), carried, &full_mesh, &mesh, &node_of)?),
         None => None,
     };
     let audits = audits(config, &full_mesh);
@@ -74,14 +85,17 @@ pub(super) fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
 }
 
 fn outline_design(
-    config: &Config,
-    source: &SourceMap,
+    (config, source): (&Config, &SourceMap),
+    carried: Option<DesignSurface>,
     full_mesh: &Mesh,
     mesh: &Mesh,
     node_of: &[Option<NodeId>],
 ) -> Result<OutlinedDesign, Error> {
     let design = config.design.as_ref().expect("asked for with a design");
-    let surface = design::surface(config, source, design, full_mesh)?;
+    let surface = match carried {
+        Some(surface) => surface,
+        None => design::surface(config, source, design, full_mesh)?,
+    };
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
     let body = thickened_region(full_mesh, &surface, config);
@@ -131,7 +145,7 @@ mod tests {
     fn the_outline_is_that_of_the_problem() {
         for name in ["shield.toml", "shield_impedance.toml"] {
             let (config, source) = shield(name);
-            let outline = outline(&config, &source).expect("an outline");
+            let outline = outline(&config, &source, &[]).expect("an outline");
             let setup = set_up(&config, &source, Mode::Optimisation).expect("a problem");
             assert_eq!(outline.mesh.points(), setup.problem.original().points());
             let shape = setup.problem.shape().expect("a shape");

@@ -29,6 +29,8 @@ pub(super) struct Inputs<'a> {
     pub(super) full_mesh: &'a Mesh,
     /// Without the regions that impedance surfaces replace.
     pub(super) mesh: &'a Mesh,
+    /// The design surface on the mesh with all regions, where it comes from a coarser mesh.
+    pub(super) surface: Option<&'a DesignSurface>,
     /// The ranks among which it is shared out.
     pub(super) share: Option<&'a Ownership>,
 }
@@ -53,7 +55,10 @@ impl Body {
 /// Makes the design surface and the elastic map.
 pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<String>) -> Result<Body, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
-    let full_surface = super::design::surface(config, source, design, full_mesh)?;
+    let full_surface = match inputs.surface {
+        Some(surface) => surface.clone(),
+        None => super::design::surface(config, source, design, full_mesh)?,
+    };
     let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
     let mut weights = vec![0.0; surface.variable_count()];
     surface.rows().iter().flatten().for_each(|&(k, weight)| weights[k] += weight);

@@ -204,6 +204,10 @@ pub struct CheckArgs {
     /// The common options.
     #[command(flatten)]
     pub common: CommonArgs,
+
+    /// Solve the field of the initial design, and estimate the error of the objective that comes from the mesh
+    #[arg(long)]
+    pub estimate: bool,
 }
 
 /// Options of `gradient`.

@@ -55,6 +55,7 @@ pub(super) const CHECK: &str = "\
 Examples:
   fluxmorph check shield.toml
   fluxmorph check shield.toml --set mesh.shield.refinement=2
+  fluxmorph check shield.toml --estimate
   fluxmorph check shield.toml --json | jq '.memory_estimate_bytes / 1e9'";
 
 pub(super) const GRADIENT: &str = "\

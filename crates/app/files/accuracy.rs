@@ -2,12 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::refinements::{RefinementStep, Refinements};
+
 /// Least share of a gain that must be left in another discretisation.
 const LEAST_SHARE: f64 = 0.5;
 
 /// What an estimate is multiplied by for an error bar: on meshes that show the device, estimates of 0.5 to 1.2 times the error
 /// have been measured (docs/verification.md, 2.12).
 pub const SAFETY: f64 = 2.0;
+
+/// The error bar of a value with an estimated error, relative to it: twice the estimate.
+pub fn relative_bar(error: f64, value: f64) -> Option<f64> {
+    relative(SAFETY * error, value)
+}
 
 /// How exact the objective is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
@@ -21,11 +28,30 @@ pub struct Accuracy {
     pub error_estimate: Option<[f64; 2]>,
     /// Times the mesh was refined to keep a tolerance.
     pub refinements: usize,
+    /// The meshes before these refinements, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<Level>,
+    /// Whether the error bars are within `accuracy.tolerance`; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub within_tolerance: Option<bool>,
     /// The same two shapes by other elements on the same mesh.
     pub cross_check: Option<CrossCheck>,
     /// Whether the gain of a run is the shape's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
+}
+
+/// A mesh that was not fine enough.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Level {
+    /// Evaluations of the run before it was refined: 0 before the search.
+    pub evaluations: usize,
+    /// Its tetrahedra.
+    pub tets: usize,
+    /// The objective on it, at the initial design before the search, at the best one after.
+    pub objective: f64,
+    /// Its estimated error relative to it.
+    pub error_estimate_relative: Option<f64>,
 }
 
 /// The gain of a run by other elements on its own mesh.
@@ -57,6 +83,18 @@ impl Accuracy {
             error_estimate: Some([error; 2]),
             ..Self::default()
         }
+    }
+
+    /// Enters how the mesh was refined.
+    pub fn refined(&mut self, refinements: &Refinements) {
+        self.refinements = refinements.refinements.len();
+        let level = |step: &RefinementStep| Level {
+            evaluations: step.evaluations,
+            tets: step.tets,
+            objective: step.objective,
+            error_estimate_relative: relative(step.error_estimate, step.objective),
+        };
+        self.levels = refinements.refinements.iter().map(level).collect();
     }
 
     /// Enters the estimated errors of the objective at both designs of a run; the ratio without them.

@@ -13,6 +13,7 @@ mod host;
 mod json_place;
 mod manifest;
 mod names;
+mod refinements;
 mod result;
 mod run_directory;
 mod run_files;
@@ -20,7 +21,7 @@ mod synced;
 
 use std::path::PathBuf;
 
-pub use accuracy::{Accuracy, CrossCheck, SAFETY, Verdict};
+pub use accuracy::{Accuracy, CrossCheck, Level, SAFETY, Verdict, relative_bar};
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, read_design};
 pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};
@@ -32,6 +33,7 @@ pub use host::{hostname, peak_memory_bytes, utc_timestamp};
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
 pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
+pub use refinements::{RefinementStep, Refinements};
 pub(crate) use result::to_json;
 pub use result::{
     Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,

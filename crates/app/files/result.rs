@@ -387,6 +387,8 @@ pub(crate) mod tests {
                 error_estimate_relative: Some(0.004),
                 error_estimate: Some([0.01, 0.001]),
                 refinements: 0,
+                levels: Vec::new(),
+                within_tolerance: None,
                 cross_check: Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio: 0.502 }),
                 verdict: Some(Verdict::Confirmed),
             }),

@@ -32,6 +32,8 @@ files! {
     journal = "journal.jsonl";
     /// `journal.damaged.jsonl`, what a damaged journal is kept as.
     damaged_journal = "journal.damaged.jsonl";
+    /// `refinements.json`, how the mesh was refined to keep a tolerance.
+    refinements = "refinements.json";
     /// `config.toml`, the configuration as given.
     config = "config.toml";
     /// `resolved.toml`, with every default.
@@ -40,6 +42,8 @@ files! {
     history_csv = "history.csv";
     /// `fields.pvd`, the collection of the field files.
     collection = "fields.pvd";
+    /// `error.vtu`, where the estimated error of the best design is made.
+    error_map = "error.vtu";
     /// `result.json`.
     result = "result.json";
     /// `morph.csv`, one row for each case of a prescribed motion.

@@ -7,18 +7,18 @@
 //! the run nothing else.
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::SolverError;
-use fluxmorph_solver::enrichment::Effort;
 
 use super::Session;
+use super::estimate::estimate;
 use super::finer::{Cut, FinerProblem};
-use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use crate::error::Error;
-use crate::files::{Accuracy, CrossCheck, ObjectiveResult, StopReason, Verdict};
+use crate::files::{
+    Accuracy, CrossCheck, ObjectiveResult, Refinements, StopReason, Verdict, relative_bar,
+};
 use crate::show::Observer;
 
 /// The meshes of the initial and of the best shape, and the one with all regions that both began as.
@@ -30,10 +30,6 @@ pub struct ShapeMeshes {
     pub solved: [Mesh; 2],
 }
 
-/// Bytes that an estimate takes for each tetrahedron beside the problem: pattern, matrix and incomplete factor of second
-/// order. Measured on the shield with edge elements: 9 kB.
-const ESTIMATE_BYTES_PER_TET: usize = 10_000;
-
 impl Session<'_> {
     /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
     pub(super) fn estimate_error(
@@ -41,57 +37,34 @@ impl Session<'_> {
         analysis: &Analysis,
         observer: &mut dyn Observer,
     ) -> Option<ErrorEstimate> {
-        let problem = &self.setup.problem;
-        let analysed = &self.config.analysis;
-        let is_wanted = self.config.accuracy.estimate != Some(false) && problem.objective().is_some();
-        if !is_wanted || problem.share().is_some() || analysed.order == ElementOrder::Quadratic {
-            return None;
-        }
-        let needed = analysis.mesh.topology().tets().len() * ESTIMATE_BYTES_PER_TET;
-        if let Some(shortage) = memory_limit::shortage(needed) {
-            observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
-            return None;
-        }
-        observer.phase("estimating the error of the mesh");
-        let effort = self.config.accuracy.estimate.map_or(Effort::Affordable, |_| Effort::Any);
-        match problem.estimate_error(analysis, effort) {
-            Ok(estimate) => Some(estimate),
-            Err(OptimizerError::Solver(SolverError::NotConverged { .. })) if effort == Effort::Affordable => {
-                observer.notice(
-                    "the error of the mesh is not estimated: that would cost more than three evaluations; \
-                     accuracy.estimate = true has the time",
-                );
-                None
-            }
-            Err(error) => {
-                observer.notice(&format!("the error of the mesh is not estimated: {error}"));
-                None
-            }
-        }
+        estimate((self.config, self.source), &self.setup, analysis, observer)
     }
 
-    /// The estimated errors of the objective at the initial and the best design of a run.
+    /// The estimated errors at the initial and the best design of a run; `at_best` where that is known.
     ///
     /// # Errors
     /// As [`fluxmorph_optimizer::problem::Problem::analyse`].
     pub(super) fn estimate_errors(
         &self,
         initial: Moved,
-        (best, stop_reason): (&Analysis, StopReason),
+        (best, stop_reason): (&Best, StopReason),
+        at_best: Option<ErrorEstimate>,
         observer: &mut dyn Observer,
-    ) -> Result<Option<[f64; 2]>, Error> {
-        if !self.is_checked(stop_reason) {
+    ) -> Result<Option<[ErrorEstimate; 2]>, Error> {
+        let is_wanted = self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
+        if self.is_cut_short(stop_reason) || !is_wanted {
             return Ok(None);
         }
-        let Some(at_best) = self.estimate_error(best, observer) else { return Ok(None) };
+        let best = &best.analysis;
+        let Some(at_best) = at_best.or_else(|| self.estimate_error(best, observer)) else { return Ok(None) };
         if best.mesh.points() == initial.mesh.points() {
-            return Ok(Some([at_best.objective; 2]));
+            return Ok(Some([at_best.clone(), at_best]));
         }
         let problem = &self.setup.problem;
         let cache = &mut SolverCache::default();
         let first = problem.analyse(initial, Derivatives::None, cache, &mut NoProgress)?;
         let at_first = self.estimate_error(&first, observer);
-        Ok(at_first.map(|at_first| [at_first.objective, at_best.objective]))
+        Ok(at_first.map(|at_first| [at_first, at_best]))
     }
 }
 
@@ -101,10 +74,18 @@ impl Session<'_> {
         &self,
         (objective, stop_reason): (&ObjectiveResult, StopReason),
         meshes: &ShapeMeshes,
-        errors: Option<[f64; 2]>,
+        (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
         let mut accuracy = Accuracy::default();
+        if let Some(refinements) = refinements {
+            accuracy.refined(refinements);
+        }
+        accuracy.within_tolerance = self.config.accuracy.tolerance.zip(errors).map(|(tolerance, errors)| {
+            let larger = objective.initial.abs().max(objective.best.abs());
+            let is_within = |scale, error| relative_bar(error, scale).is_some_and(|bar| bar <= tolerance);
+            is_within(objective.initial, errors[0]) && is_within(larger, errors[1])
+        });
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         if self.is_checked(stop_reason) && objective.ratio != 1.0 {
             observer.phase("checking the best shape by other elements");
@@ -133,8 +114,12 @@ impl Session<'_> {
 
     /// Whether the result of a run that has ended so is to be looked at again.
     fn is_checked(&self, stop_reason: StopReason) -> bool {
-        let is_cut_short = matches!(stop_reason, StopReason::Interrupted | StopReason::MaxTime);
-        self.config.output.verify_refinement != 0.0 && !is_cut_short && !(self.interrupted)()
+        self.config.output.verify_refinement != 0.0 && !self.is_cut_short(stop_reason)
+    }
+
+    /// Whether a run is to end now.
+    fn is_cut_short(&self, stop_reason: StopReason) -> bool {
+        matches!(stop_reason, StopReason::Interrupted | StopReason::MaxTime) || (self.interrupted)()
     }
 }
 

@@ -6,9 +6,11 @@
 //! final name is whole, and it can be resumed.
 
 pub mod confirmation;
+pub(crate) mod estimate;
 pub mod finer;
 pub mod journal;
 pub(crate) mod launcher;
+mod levels;
 pub mod mesh_independence;
 pub mod morph;
 mod pieces;
@@ -30,8 +32,9 @@ use confirmation::ShapeMeshes;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::problem::RoundEvent;
-use fluxmorph_optimizer::{Error as OptimizerError, driver};
+use fluxmorph_optimizer::Error as OptimizerError;
 use journal::{Identity, Journal};
+use levels::Searched;
 use mesh_independence::{Check, FreshMesh, MeshIndependence, ShapePair};
 use pieces::SharedPieces;
 use prepared::Prepared;
@@ -42,7 +45,7 @@ use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{
-    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory, RunResult, RunStatus,
+    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory, RunResult, RunStatus,
     check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
@@ -175,24 +178,22 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        self.continuation.iter().for_each(|event| observer.round(event));
-        let first = self.setup.problem.moved(self.initial_design())?;
-        let optimised = driver::optimise(
-            &mut self.setup.problem,
-            &config.optimizer.settings(),
-            observer,
-            &mut recorder,
-            self.interrupted,
-        )?;
+        let Searched { optimised, first, at_best, refinements } = self.search(&mut recorder, observer)?;
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, &self.setup.problem, &best.analysis)?;
         }
-        let optimum = self.directory.optimum();
+        let is_refined = Self::is_refined(refinements.as_ref());
+        let directory = &self.directory;
+        let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let initial = self.initial_states(first.clone(), optimised.stop_reason, observer)?;
-        let errors = self.estimate_errors(first, (&best.analysis, optimised.stop_reason), observer)?;
+        let errors = self.estimate_errors(first, (best, optimised.stop_reason), at_best, observer)?;
+        if let Some([_, at_best]) = &errors {
+            recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
+        }
+        let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let problem = &self.setup.problem;
         let result = RunResult {
             evaluations: optimised.evaluations,
@@ -226,7 +227,7 @@ impl Session<'_> {
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.confirm(result, (&shapes, &meshes, errors), observer)
+        self.confirm(result, (&shapes, &meshes), (errors, refinements.as_ref()), observer)
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.
@@ -287,13 +288,15 @@ impl Session<'_> {
     fn confirm(
         &mut self,
         mut result: RunResult,
-        (shapes, meshes, errors): (&ShapePair, &ShapeMeshes, Option<[f64; 2]>),
+        (shapes, meshes): (&ShapePair, &ShapeMeshes),
+        (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // The check may need more memory or patience than there is: what the run has found is safe before.
         check_finite(&result)?;
         result.write(&self.directory)?;
-        let fresh = FreshMesh::of(self.config, &self.setup.problem);
+        // A mesh that is refined where it counts may be finer there than one that is generated anew.
+        let fresh = if Self::is_refined(refinements) { None } else { FreshMesh::of(self.config, &self.setup.problem) };
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
@@ -311,7 +314,8 @@ impl Session<'_> {
                 // `resume` can do it later: the search is complete, the run is not.
                 result.status = RunStatus::Interrupted;
             }
-            result.accuracy = self.accuracy((objective, stop_reason), meshes, errors, observer);
+            result.accuracy =
+                self.accuracy((objective, stop_reason), meshes, (errors, refinements), observer);
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);

@@ -27,6 +27,8 @@ pub(super) struct DirectoryRecorder {
     kept: FieldsKept,
     /// Evaluations with a field file, ascending.
     written: Vec<usize>,
+    /// The level of the evaluation before.
+    level: Option<usize>,
     /// Evaluations of before that are still to be replayed.
     replayed: VecDeque<Record>,
     /// The most ranks that had a share in these; `None` where one process computed them.
@@ -46,7 +48,9 @@ impl DirectoryRecorder {
         let bodies: Vec<&str> = session.config.forces.iter().map(|body| body.name.as_str()).collect();
         let history = History::create(&directory, (&names, &bodies), &rows)?;
         let mut written = directory.evaluations_with_fields()?;
-        written.retain(|&evaluation| replayed.get(evaluation).is_some_and(|record| is_wanted(kept, record)));
+        let is_first = |k: usize| k == 0 || replayed[k - 1].row.level != replayed[k].row.level;
+        written.retain(|&k| k < replayed.len() && is_wanted(kept, &replayed[k], is_first(k)));
+        let level = replayed.last().map(|record| record.row.level);
         // No collection names a file that is removed.
         if written.is_empty() {
             directory.remove(&directory.collection())?;
@@ -54,9 +58,30 @@ impl DirectoryRecorder {
             write_collection(&directory, &written)?;
         }
         directory.remove_leftovers(&written)?;
+        // Of another best design, where the run has ended before.
+        directory.remove(&directory.error_map())?;
         let (pieces, ranks) = (session.pieces(), session.manifest.ranks);
         let replayed = replayed.into();
-        Ok(Self { directory, journal, history, kept, written, replayed, ranks, pieces })
+        Ok(Self { directory, journal, history, kept, written, level, replayed, ranks, pieces })
+    }
+
+    /// Whether there are evaluations of before that are still to be replayed.
+    pub(super) fn is_replaying(&self) -> bool {
+        !self.replayed.is_empty()
+    }
+
+    /// Writes the field of the best design with what each element adds to its estimated error, where fields are kept.
+    pub(super) fn write_error(
+        &self,
+        problem: &Problem,
+        analysis: &Analysis,
+        error: &[f64],
+    ) -> Result<(), Error> {
+        if self.kept == FieldsKept::Nothing || error.is_empty() {
+            return Ok(());
+        }
+        let bytes = field_bytes(problem, analysis, Some(error))?;
+        Ok(self.directory.write(&self.directory.error_map(), &bytes)?)
     }
 
     /// Writes the field of an evaluation, and the collection of all.
@@ -76,7 +101,9 @@ impl DirectoryRecorder {
 
     /// Keeps a complete evaluation.
     fn keep(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {
-        if is_wanted(self.kept, record) {
+        let is_first = self.level != Some(record.row.level);
+        self.level = Some(record.row.level);
+        if is_wanted(self.kept, record, is_first) {
             self.write(record.row.evaluation, problem, analysis)?;
         }
         self.journal.append(record)?;
@@ -89,8 +116,9 @@ impl Recorder for DirectoryRecorder {
         self.ranks.is_none()
     }
 
-    fn replay(&mut self) -> Option<Record> {
-        self.replayed.pop_front()
+    fn replay(&mut self, level: usize) -> Option<Record> {
+        let is_of_level = self.replayed.front().is_some_and(|record| record.row.level == level);
+        if is_of_level { self.replayed.pop_front() } else { None }
     }
 
     fn record(
@@ -103,12 +131,12 @@ impl Recorder for DirectoryRecorder {
     }
 }
 
-/// Whether the field of an evaluation is written when it is computed.
-fn is_wanted(kept: FieldsKept, record: &Record) -> bool {
+/// Whether the field of an evaluation is written when it is computed; the first one on a mesh is that of the initial design.
+fn is_wanted(kept: FieldsKept, record: &Record, is_first: bool) -> bool {
     match kept {
         FieldsKept::Every => true,
         FieldsKept::Improved => record.improved,
-        FieldsKept::FirstLast => record.row.evaluation == 0,
+        FieldsKept::FirstLast => is_first,
         FieldsKept::Nothing => false,
     }
 }
@@ -125,6 +153,11 @@ pub(super) fn write_field(
     if let Some(pieces) = pieces {
         return pieces.write(directory, evaluation, problem, analysis);
     }
+    Ok(directory.write_field(evaluation, &field_bytes(problem, analysis, error)?)?)
+}
+
+/// The VTU file of a field.
+fn field_bytes(problem: &Problem, analysis: &Analysis, error: Option<&[f64]>) -> Result<Vec<u8>, Error> {
     let thickness = fields::thickness(problem, analysis);
     let data = FieldData {
         error,
@@ -132,8 +165,7 @@ pub(super) fn write_field(
         bodies: problem.bodies(),
         ..FieldData::of(analysis)
     };
-    let bytes = fields::vtu(problem.states(), &data)?;
-    Ok(directory.write_field(evaluation, &bytes)?)
+    Ok(fields::vtu(problem.states(), &data)?)
 }
 
 /// Writes the PVD file over all field files; its time is the evaluation number.

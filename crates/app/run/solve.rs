@@ -125,6 +125,7 @@ impl Session<'_> {
         let estimate = self.estimate_error(analysis, observer);
         if config.output.fields != FieldsKept::Nothing {
             let error = estimate.as_ref().map(|estimate| estimate.by_element.as_slice());
+            let error = error.filter(|by_element| !by_element.is_empty());
             write_field(&self.directory, self.pieces().as_ref(), 0, problem, (analysis, error))?;
             write_collection(&self.directory, &[0])?;
         }

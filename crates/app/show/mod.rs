@@ -96,6 +96,7 @@ mod tests {
             inversion_element: Some(17),
             inversion_region: Some("plate".to_owned()),
             round: 0,
+            level: 0,
             forces: Vec::new(),
             constraints: BTreeMap::new(),
         }

@@ -205,6 +205,23 @@ fn all_elements_thrice_halve_every_edge_at_least() {
 }
 
 #[test]
+fn halved_elements_have_eight_parts_and_the_mesh_conforms() {
+    for (seed, mesh) in (1..).zip(meshes()) {
+        let mut random = Random(seed);
+        let marked: Vec<ElementId> = mesh.topology().elements().filter(|_| random.below(10) == 0).collect();
+        let mut bisection = Bisection::new(&mesh, RefineLimits::default());
+        bisection.halve(&marked).expect("no limit is near");
+        let refinement = bisection.refinement().expect("sound elements");
+        assert_sound(&mesh, &refinement);
+        let mut parts = vec![0; mesh.topology().tets().len()];
+        refinement.ancestors().iter().for_each(|e| parts[e.index()] += 1);
+        assert!(marked.iter().all(|e| parts[e.index()] >= 8), "{parts:?}");
+        // Others are cut where they must be, and not all of them.
+        assert!(parts.contains(&1) || marked.is_empty(), "{parts:?}");
+    }
+}
+
+#[test]
 fn the_same_marks_give_the_same_bits_for_any_number_of_threads() {
     let mesh = crooked(3);
     let refined = || {

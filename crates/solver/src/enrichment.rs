@@ -11,10 +11,14 @@
 //! exact for a quadratic `F`. Since `r` vanishes on the first-order space, `2 Re zᵀr` comes from the functions that only the
 //! second order has, and `Σ_i 2 Re z_i r_i` over those of an element's carriers says where the error is made.
 //!
+//! With B–H curves `K` is the tangent at `u`, and what is left after the correction is the residual itself at `u + e`: what
+//! its curvature makes of `e` is weighed too.
+//!
 //! Does not live here: sums over terms and frequencies, and what is done with the number.
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::fem::scalar::axpy;
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 
@@ -22,6 +26,7 @@ use crate::circuit::Excitation;
 use crate::error::SolverError;
 use crate::linear::{LinearSolver, LinearSolverSettings, Method, PreparedSystem, Reuse};
 use crate::model::{FieldModel, FieldModelSetup};
+use crate::nonlinear;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::solution::FieldSolution;
 use crate::space::{ElementFamily, Order};
@@ -60,6 +65,8 @@ pub struct Enrichment {
     prolongation: CsrMatrix<f64>,
     field: Vec<c64>,
     residual: Vec<c64>,
+    /// What the correction leaves of it.
+    rest: Vec<c64>,
     correction: Vec<c64>,
     /// Currents that voltages drive [A]: of the first order, and their corrections.
     currents: [Vec<c64>; 2],
@@ -80,7 +87,7 @@ struct Response {
 /// What the dual problem says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightedResidual {
-    /// `2 Re zᵀ(r − K e)` [unit of F].
+    /// `2 Re zᵀ(r − K e)` [unit of F]; with B–H curves the residual of `u + e` in place of `r − K e`.
     pub remainder: f64,
     /// What every element adds to `2 Re zᵀr` [unit of F], shape `(n_tets,)`.
     pub by_element: Vec<f64>,
@@ -90,7 +97,8 @@ impl FieldModel {
     /// The same problem in second order, to be solved roughly and with so much effort.
     ///
     /// # Errors
-    /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks.
+    /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks, for a B–H curve with a
+    /// frequency, and for nodal elements at re-entrant edges of walls.
     pub fn enriched(&self, mesh: &Mesh, effort: Effort) -> Result<Self, SolverError> {
         let refuse = |what: &str, value: &str, expected: &str| SolverError::Parameter {
             what: what.to_owned(),
@@ -100,11 +108,14 @@ impl FieldModel {
         if self.setup().order != Order::Linear {
             return Err(refuse("order", "2", "first order: there is no third one to estimate an error from"));
         }
-        if !self.is_linear() {
+        if !self.is_linear() && self.angular_frequency() > 0.0 {
+            return Err(refuse("bh", "a curve", "statics: with a frequency the tangent is none of the field alone"));
+        }
+        if self.has_reentrant_walls() {
             return Err(refuse(
-                "bh",
-                "a curve",
-                "linear materials: the tangent of second order is not known",
+                "elements",
+                "nodal, beside a re-entrant edge of a wall that no flux passes",
+                "edge elements: nodal ones of second order are as far off there as those of first, and an estimate says too little",
             ));
         }
         if self.setup().ownership.is_some() {
@@ -149,20 +160,42 @@ impl Enrichment {
         };
         let mut field = vec![c64::default(); fine.dofs.count()];
         prolongation.mul(state.values(), &mut field);
-        let matrix = model.assemble(mesh);
+        let linear = model.assemble(mesh);
         let mut residual = model.load(mesh);
         let currents = state.currents().to_vec();
         model.windings().add_driven_load(&currents, &mut residual);
-        subtract_product(&matrix, &field, &mut residual);
-        let mut system = model.prepare(matrix)?;
+        subtract_product(&linear, &field, &mut residual);
+        let (mut system, linear) = if model.is_linear() {
+            (model.prepare(linear)?, None)
+        } else {
+            let added = nonlinear::added(&model, mesh, &FieldSolution::of_state(field.clone()));
+            axpy(c64::from(-1.0), &added.residual, &mut residual);
+            (model.prepare(model.assemble_tangent(mesh, &added.tangents))?, Some((linear, added.residual)))
+        };
         // First-order functions are second-order ones, so that the circuits' equations hold as they did.
         let (correction, report, driven) = system.solve_with(&residual, Excitation::Given(&[]))?;
+        let mut rest = residual.clone();
+        model.windings().add_driven_load(&driven, &mut rest);
+        match linear {
+            None => {
+                let matrix = system.matrix().expect("an estimate is made in one process");
+                subtract_product(matrix, &correction, &mut rest);
+            }
+            Some((linear, before)) => {
+                subtract_product(&linear, &correction, &mut rest);
+                let corrected = field.iter().zip(&correction).map(|(u, e)| u + e).collect();
+                let after = nonlinear::added(&model, mesh, &FieldSolution::of_state(corrected));
+                axpy(c64::from(1.0), &before, &mut rest);
+                axpy(c64::from(-1.0), &after.residual, &mut rest);
+            }
+        }
         Ok(Self {
             model,
             system,
             prolongation,
             field,
             residual,
+            rest,
             correction,
             currents: [currents, driven],
             responses: BTreeMap::new(),
@@ -244,11 +277,7 @@ impl Enrichment {
     ) -> Result<WeightedResidual, SolverError> {
         let (dual, report) = self.system.solve(derivative)?;
         self.iterations += report.iterations;
-        let mut rest = self.residual.clone();
-        self.model.windings().add_driven_load(&self.currents[1], &mut rest);
-        let matrix = self.system.matrix().expect("an estimate is made in one process");
-        subtract_product(matrix, &self.correction, &mut rest);
-        let remainder = dual.iter().zip(&rest).map(|(z, r)| 2.0 * (z * r).re).sum();
+        let remainder = dual.iter().zip(&self.rest).map(|(z, r)| 2.0 * (z * r).re).sum();
         let surplus = self.without_first_order(coarse.unknowns(), dual);
         let weighted: Vec<f64> = surplus.iter().zip(&self.residual).map(|(z, r)| 2.0 * (z * r).re).collect();
         Ok(WeightedResidual { remainder, by_element: self.by_element(&weighted) })

@@ -219,6 +219,10 @@ impl FieldModel {
         Ok((angular_frequency, form.with_curves(&setup.bh)))
     }
 
+    pub(crate) fn has_reentrant_walls(&self) -> bool {
+        self.weak_form.has_reentrant_walls()
+    }
+
     /// Assembles the matrix on a mesh with this model's topology: the rows of this rank, where there are several. Of B–H
     /// laws it has the linear parts.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {

@@ -136,6 +136,14 @@ impl WeakForm {
         &self.surfaces.triangles
     }
 
+    /// Whether there are walls that no flux passes and that end at a re-entrant edge, where nodal elements have `ψ`.
+    pub(crate) fn has_reentrant_walls(&self) -> bool {
+        let is_wall = |((_, term), has_psi): ((_, SurfaceTerm), &bool)| {
+            *has_psi && matches!(term, SurfaceTerm::Perfect(_))
+        };
+        self.surface().zip(&self.surfaces.has_psi).any(is_wall)
+    }
+
     /// Where currents flow.
     pub(crate) fn conductors(&self) -> Conductors {
         let mut conductors = Conductors {

@@ -1,8 +1,10 @@
-//! `fluxmorph check`: what a configuration means, without solving.
+//! `fluxmorph check`: what a configuration means, without solving unless it is asked how exact the
+//! objective is.
 //!
-//! `summary` finds it, `text` puts it into words, `table` aligns columns.
+//! `summary` finds it, `estimate` solves, `text` puts it into words, `table` aligns columns.
 
 mod advice;
+mod estimate;
 mod summary;
 mod table;
 mod text;
@@ -34,7 +36,10 @@ pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
             None => Box::new(Silent),
         };
         let progress = &mut |stage| observer.stage(stage);
-        let summary = summary::summary(&config, &source, work.overwrite_policy(), progress)?;
+        let mut summary = summary::summary(&config, &source, work.overwrite_policy(), progress)?;
+        if args.estimate {
+            summary.estimate = Some(estimate::of_initial_design(&config, &source, &mut *observer)?);
+        }
         drop(observer);
         if work.json {
             stdout::print_json(&summary)?;

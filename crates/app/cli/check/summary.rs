@@ -11,6 +11,7 @@ use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
+use super::estimate::EstimateSummary;
 use super::truncation::Truncation;
 use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched};
 use crate::config::{
@@ -69,6 +70,9 @@ pub(super) struct Summary<'a> {
     pub(super) probes: &'a [Probe],
     pub(super) output_directory: String,
     pub(super) memory_estimate_bytes: usize,
+    /// Where `--estimate` asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) estimate: Option<EstimateSummary>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -224,6 +228,7 @@ pub(super) fn summary<'a>(
         output_directory: config.output.directory.display().to_string(),
         memory_estimate_bytes: of_evaluation(problem)
             .max(FreshMesh::of(config, problem).map_or(0, |fresh| fresh.memory())),
+        estimate: None,
         warnings,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::estimate::EstimateSummary;
 use super::summary::{FieldProblem, Summary};
 use super::table::{Align, Table};
 use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, ValueBound};
@@ -19,6 +20,9 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
     shape(summary, &mut row);
     row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
     row("output", summary.output_directory.clone());
+    if let Some(found) = &summary.estimate {
+        estimate(found, summary.objective_unit, &mut row);
+    }
     text += &region_table(summary).text();
     text += &surface_table(summary).text();
     text += &open_table(summary).text();
@@ -37,6 +41,18 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
         count => format!(", with {count} warnings"),
     };
     text + &format!("\nok{warnings}; next: fluxmorph {command} {}\n", shell_word(config))
+}
+
+/// The objective of the initial design with its error bar, or why there is none.
+fn estimate(found: &EstimateSummary, unit: Option<&str>, row: &mut impl FnMut(&str, String)) {
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    if let (Some(value), Some(error), Some(bar)) =
+        (found.objective, found.error_estimate, found.error_bar_relative)
+    {
+        let bar = 100.0 * bar;
+        row("initial design", format!("F = {value:.6e}{unit} ± {bar:.2} %, estimated error {error:+.1e}{unit}"));
+    }
+    found.notices.iter().for_each(|notice| row("initial design", notice.clone()));
 }
 
 fn mesh(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {

@@ -1,18 +1,52 @@
 //! `[accuracy]`: what is done to know how exact the objective is.
 
+use crate::config::section::Section;
 use crate::config::table::table;
+
+/// With more, the first element would be beyond the number of bisections that a mesh may have.
+const MOST_REFINEMENTS: usize = 19;
 
 table! {
     /// What is done to know how exact the objective is. `docs/theory.md` tells how the error is estimated.
     ///
+    /// With `tolerance` the mesh of a run is refined where its objective needs it: at the initial design until the error bar
+    /// there, twice the estimate, is within the tolerance; then comes the search; and where the error bar at the best design is
+    /// not, the mesh is refined for that design, and the search goes on from it. Nodes are put in the middle of edges: bodies,
+    /// facets and design variables stay what they are, `design.filter_radius` and `design.grid` too. All evaluations have one
+    /// history, in which `level` counts the refinements, and `optimizer.max_evaluations` and `max_time` limit them together.
+    /// Of the initial design every mesh has its own value, to which the ratios belong. Where the memory or `max_refinements` do
+    /// not suffice, the run goes on with the mesh that it has, and says so.
+    ///
     /// ```toml
     /// [accuracy]
-    /// estimate = true
+    /// tolerance = "2 %"
+    /// max_refinements = 6
     /// ```
     pub struct Accuracy: Default {
         /// Whether the error of the objective that comes from the mesh is estimated: by `solve`, and by `run` at the first and
-        /// the best design, unless `output.verify_refinement` is 0. With elements of first order and linear materials alone, and
-        /// in one process. Default: where it costs no more than three evaluations, or two seconds.
+        /// the best design, unless `output.verify_refinement` is 0. In one process. Default: of first order, where it costs no more
+        /// than three evaluations, or two seconds; `true`: whatever it costs, and of second order too, on eight times the
+        /// elements. B–H curves have one at 0 Hz.
         estimate: Option<bool> = FLAG;
+        /// `run`: largest error bar of the objective that the mesh may make: at the initial design relative to the objective there,
+        /// at the best one relative to the larger of both. With first order, in one process. Default: the mesh stays what it is,
+        /// and its error is reported.
+        tolerance: Option<f64> = quantity(Ratio, POSITIVE);
+        /// Most refinements of the mesh for `tolerance`, before and after the search. Default 8, which are enough from a mesh that
+        /// shows little more than the bodies to 1 %.
+        max_refinements: usize = integer(1, MOST_REFINEMENTS) => 8;
+    }
+    check = Accuracy::check;
+}
+
+impl Accuracy {
+    fn check(&mut self, section: &Section<'_>) {
+        if self.tolerance.is_some() && self.estimate == Some(false) {
+            section.clash(
+                ["estimate", "tolerance"],
+                "whether the tolerance is kept is what the estimate says".to_owned(),
+                "estimate = true, or no tolerance",
+            );
+        }
     }
 }

@@ -39,6 +39,7 @@ pub(super) fn record(number: usize) -> Record {
             inversion_element: None,
             inversion_region: Some("air,\"sum\":\"gap\"".to_owned()),
             round: 1,
+            level: 0,
             forces: Vec::new(),
             constraints: BTreeMap::from([("c_volume".to_owned(), -0.5)]),
         },

@@ -94,9 +94,11 @@ impl Series<'_> {
         let y = Scale::around(self.known().map(|(_, v)| v).chain(self.bound), [TOP + HEIGHT, TOP]);
         let point = |(row, value): (&Evaluation, f64)| [x.at(row.evaluation as f64), y.at(value)];
         let points: Vec<[f64; 2]> = self.known().map(point).collect();
-        let rounds = self.rows.windows(2).filter(|pair| pair[1].round > pair[0].round).map(|pair| &pair[1]);
-        let rounds = rounds.take(MOST_ROUNDS).map(|row| (row.round, x.at(row.evaluation as f64 - 0.5)));
-        let rounds = labelled(rounds);
+        let pairs = || self.rows.windows(2).map(|pair| (&pair[0], &pair[1]));
+        let before = |row: &Evaluation| x.at(row.evaluation as f64 - 0.5);
+        let rounds = pairs().filter(|(a, b)| a.level == b.level && b.round > a.round).map(|(_, b)| b);
+        let rounds = labelled(rounds.take(MOST_ROUNDS).map(|row| (row.round, before(row))));
+        let levels = pairs().filter(|(a, b)| b.level > a.level).map(|(_, b)| (b.level, before(b)));
         let best = self.known().find(|(row, _)| Some(row.evaluation) == self.best);
         let content = html! {
             (grid(&x, &y, 5))
@@ -104,6 +106,10 @@ impl Series<'_> {
             @for (round, at, is_labelled) in &rounds {
                 (line("round", [*at, y.pixels[0]], [*at, y.pixels[1]]))
                 @if *is_labelled { (text("tick", at + 3.0, TOP + 9.0, &format!("round {round}"))) }
+            }
+            @for (level, at) in levels {
+                (line("bound", [at, y.pixels[0]], [at, y.pixels[1]]))
+                (text("tick", at + 3.0, TOP + 21.0, &format!("mesh {level}")))
             }
             @if let Some(bound) = self.bound {
                 (line("bound", [x.pixels[0], y.at(bound)], [x.pixels[1], y.at(bound)]))
@@ -154,6 +160,9 @@ impl Series<'_> {
         }
         if self.rows.iter().any(|row| row.round > 0) {
             text += "; dotted lines: the mesh got a new reference";
+        }
+        if self.rows.windows(2).any(|pair| pair[1].level > pair[0].level) {
+            text += "; dashed upright lines: the mesh was refined, and the search goes on from the best design on it";
         }
         text + "."
     }

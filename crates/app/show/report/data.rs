@@ -7,11 +7,11 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::driver::Record;
 
 use super::ReportedRun;
-use super::field_file::field_contents;
+use super::field_file::{contents, field_contents};
 use crate::build::{Outline, outline};
 use crate::config::{Config, FieldsKept};
 use crate::error::Error;
-use crate::files::{Manifest, OutputError, RunDirectory, RunResult};
+use crate::files::{Manifest, OutputError, Refinements, RunDirectory, RunResult};
 use crate::run::journal::Journal;
 use crate::show::Evaluation;
 
@@ -38,6 +38,9 @@ pub(super) struct RunData {
     pub(super) outline: Result<Outline, String>,
     /// Fields before and after, or why there are none. A single analysis has only the second.
     pub(super) fields: [Result<Snapshot, String>; 2],
+    /// What every element adds to the estimated error of the best design, on the mesh of its field; `None` where that is not
+    /// there.
+    pub(super) error: Option<Vec<f64>>,
     /// Files of the directory that a reader may want to open, relative to it.
     pub(super) files: Vec<String>,
 }
@@ -71,10 +74,14 @@ impl RunData {
             Some(_) => Some(0),
             None => last_improved(&history),
         };
-        let outline = outline(&config, &source)
+        let refinements = Refinements::read(&directory)?;
+        // The best design is on the mesh of its level; the first evaluation there has the initial one on it.
+        let level = best.and_then(|best| history.get(best)).map_or(0, |row| row.level);
+        let first = history.iter().find(|row| row.level == level).map(|row| row.evaluation);
+        let outline = outline(&config, &source, &refinements.marks(level))
             .map_err(|error| format!("the mesh cannot be rebuilt: {}", reason(&error)));
         let kept = directory.evaluations_with_fields()?;
-        let fields = [Some(0).filter(|_| manifest.command == "run"), best].map(|evaluation| {
+        let fields = [first.or(Some(0)).filter(|_| manifest.command == "run"), best].map(|evaluation| {
             let Some(evaluation) = evaluation else { return Ok(Err(NO_EVALUATION.to_owned())) };
             if !kept.contains(&evaluation) {
                 return Ok(Err(not_kept(&config, evaluation)));
@@ -82,9 +89,14 @@ impl RunData {
             Snapshot::read(&directory, evaluation, &outline)
         });
         let [before, after] = fields;
-        let mut files = ["fields.pvd", "optimum.msh", "optimum_refined.msh"].map(str::to_owned).to_vec();
+        let (before, after) = (before?, after?);
+        let error = match &after {
+            Ok(after) => error_map(&directory, after.flux_density.len())?,
+            Err(_) => None,
+        };
+        let mut files = ["fields.pvd", "error.vtu", "optimum.msh", "optimum_refined.msh"].map(str::to_owned).to_vec();
         files.extend(manifest.surfaces.iter().cloned());
-        files.extend(["history.csv", "result.json", "resolved.toml", "config.toml"].map(str::to_owned));
+        files.extend(["history.csv", "result.json", "refinements.json", "resolved.toml", "config.toml"].map(str::to_owned));
         let there =
             directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
         files.retain(|file| there.contains(file));
@@ -94,7 +106,8 @@ impl RunData {
             directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
             resolved: text(&directory, &directory.resolved())?,
             designs: designs(&records, &config, result.as_ref(), best, &outline),
-            fields: [before?, after?],
+            fields: [before, after],
+            error,
             manifest,
             config,
             history,
@@ -120,6 +133,24 @@ impl RunData {
     pub(super) fn row(&self, evaluation: usize) -> Option<&Evaluation> {
         self.history.iter().find(|row| row.evaluation == evaluation)
     }
+}
+
+/// The estimated error of so many elements; `None` where there is none of this mesh.
+fn error_map(directory: &RunDirectory, count: usize) -> Result<Option<Vec<f64>>, Error> {
+    let path = directory.error_map();
+    let there = directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
+    if !there.iter().any(|name| path.ends_with(name)) {
+        return Ok(None);
+    }
+    let mut contents = contents(directory, &path)?;
+    let error = match contents.cell_data.remove("error_estimate") {
+        Some(VtuArray::Scalar(error)) => error,
+        _ => return Err(damaged(&path)("it has no array `error_estimate`").into()),
+    };
+    if !error.iter().all(|v| v.is_finite()) {
+        return Err(damaged(&path)("it holds a value that is not finite").into());
+    }
+    Ok(Some(error).filter(|error| error.len() == count))
 }
 
 /// Why there is no field.
@@ -158,7 +189,7 @@ pub(super) fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> Ou
 fn last_improved(history: &[Evaluation]) -> Option<usize> {
     let mut best: Option<&Evaluation> = None;
     for row in history {
-        if best.is_none_or(|best| row.iteration > best.iteration) {
+        if best.is_none_or(|best| row.iteration > best.iteration || row.level > best.level) {
             best = Some(row);
         }
     }

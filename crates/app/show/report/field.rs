@@ -14,7 +14,7 @@ use super::window::Window;
 use crate::build::Outline;
 
 /// Tallest drawing area.
-const TALLEST: f64 = 320.0;
+pub(super) const TALLEST: f64 = 320.0;
 
 /// Both figures with their caption.
 pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String> {
@@ -26,7 +26,7 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String
     let scale = colour_scale(data, outline, &cuts).ok_or("the plane of the figure meets no element")?;
     let caption = caption(data, outline, &window, &cuts, &scale);
     let frame = Frame::new(window.low, window.high, TALLEST);
-    let drawing = Drawing { data, outline, window, frame, scale };
+    let drawing = Drawing { data, outline, window, frame, scale, shown: FLUX_DENSITY };
     let title = |k: usize| match (cuts.len(), k) {
         (1, _) => "Flux density".to_owned(),
         (_, 0) => format!("Before (evaluation {})", cuts[0].field.evaluation),
@@ -44,21 +44,34 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String
     })
 }
 
-/// What both figures have in common.
-struct Drawing<'a> {
-    data: &'a RunData,
-    outline: &'a Outline,
-    window: Window,
-    frame: Frame,
-    scale: Scale,
+/// A quantity of the elements as it is drawn.
+pub(super) struct Shown {
+    /// Its name, with a capital.
+    pub(super) name: &'static str,
+    /// Its sign with the unit that is shown.
+    pub(super) sign: &'static str,
+    /// From the values of the field to that unit.
+    pub(super) factor: f64,
+}
+
+const FLUX_DENSITY: Shown = Shown { name: "Flux density", sign: "|B| [mT]", factor: 1e3 };
+
+/// What all figures of a plane have in common.
+pub(super) struct Drawing<'a> {
+    pub(super) data: &'a RunData,
+    pub(super) outline: &'a Outline,
+    pub(super) window: Window,
+    pub(super) frame: Frame,
+    pub(super) scale: Scale,
+    pub(super) shown: Shown,
 }
 
 impl Drawing<'_> {
-    fn draw(&self, cut: &FieldCut<'_>, id: &str) -> Markup {
-        let Self { window, frame, scale, .. } = self;
+    pub(super) fn draw(&self, cut: &FieldCut<'_>, id: &str) -> Markup {
+        let Self { window, frame, scale, shown, .. } = self;
         let coloured = cut.triangles.iter().map(|triangle| {
             let corners = triangle.patch.map(|(p, _)| window.page.flat(p));
-            (corners, triangle.patch.map(|(_, v)| scale.share((1e3 * v).max(0.0))))
+            (corners, triangle.patch.map(|(_, v)| scale.share((shown.factor * v).max(0.0))))
         });
         let lines = format!("{id}-lines");
         let inside = html! {
@@ -71,10 +84,10 @@ impl Drawing<'_> {
             (frame.image(ColourMap::Field, coloured))
             (frame.clip(&format!("{id}-frame"), &inside))
             (axes(&frame.x, &frame.y, window.page.titles.each_ref().map(String::as_str), [6, 5]))
-            (colour_bar(id, ColourMap::Field, scale, "|B| [mT]", frame.bar_top()))
+            (colour_bar(id, ColourMap::Field, scale, shown.sign, frame.bar_top()))
         };
         let plane = window.describe("millimetres");
-        let label = format!("Flux density in {plane} at evaluation {}", cut.field.evaluation);
+        let label = format!("{} in {plane} at evaluation {}", shown.name, cut.field.evaluation);
         svg(frame.height(), &label, &content)
     }
 

@@ -42,7 +42,11 @@ pub(super) fn field_contents(
     Ok((path, whole))
 }
 
-fn contents(directory: &RunDirectory, path: &Path) -> Result<VtuContents, OutputError> {
+/// The content of a VTU file.
+///
+/// # Errors
+/// [`OutputError`] names the file.
+pub(super) fn contents(directory: &RunDirectory, path: &Path) -> Result<VtuContents, OutputError> {
     let bytes = directory.disk().read(path, LARGEST_FIELD).map_err(OutputError::io("read", path))?;
     vtu_contents(&bytes).map_err(damaged(path))
 }

@@ -105,7 +105,12 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
     let other = accuracy.cross_check.as_ref().map(|check| {
         format!("{} by {} elements of order {}", number(check.ratio, 4), check.elements, check.order)
     });
-    let remark: Vec<String> = bar.into_iter().chain(other).collect();
+    let refined = match (accuracy.refinements, accuracy.within_tolerance) {
+        (_, None) => None,
+        (count, Some(true)) => Some(format!("within the tolerance after {count} refinements")),
+        (count, Some(false)) => Some(format!("beyond the tolerance after {count} refinements")),
+    };
+    let remark: Vec<String> = bar.into_iter().chain(other).chain(refined).collect();
     Some(("gain", verdict.to_owned(), remark.join("; ")))
 }
 

@@ -1,7 +1,7 @@
 //! `report.html`: one page about a run, made from its directory alone, that can be sent and read anywhere.
 //!
 //! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others show one
-//! thing each: `head`, `map`, `field`, `iron`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
+//! thing each: `head`, `map`, `field`, `iron`, `error_map`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
 //! `plot` (axes) and `frame` (pictures to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
 //! `field_cut`, `cut`, `coils` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
 //! configuration in plain words), `markup` (what the pages of this program share). The page holds its style and its script
@@ -16,6 +16,7 @@ mod colour;
 mod convergence;
 mod cut;
 mod data;
+mod error_map;
 mod facts;
 mod field;
 mod field_cut;

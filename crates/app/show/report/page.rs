@@ -9,7 +9,7 @@ use super::markup::{document, footer, json, missing, section};
 use super::surface::Surface;
 use super::ticks::{group_digits, trim_zeros};
 use super::words::capital;
-use super::{convergence, facts, field, histogram, iron, map, tables};
+use super::{convergence, error_map, facts, field, histogram, iron, map, tables};
 use crate::build::{Outline, OutlinedDesign};
 
 const VIEW: &str = include_str!("view.js");
@@ -45,6 +45,9 @@ fn body(data: &RunData, links: &str, detail: Detail) -> Markup {
         @if data.config.design.is_some() { (section("shape", "Shape", &shape(data, detail))) }
         @if data.is_run() { (section("convergence", "Convergence", &convergence(data))) }
         (section("field", "Field", &field(data)))
+        @if let Some(figure) = data.outline.as_ref().ok().and_then(|outline| error_map::figure(data, outline)) {
+            (section("error", "Error of the mesh", &or_missing("the map of the error", figure)))
+        }
         (section("results", "Results", &results(data)))
         @if !data.history.is_empty() { (section("evaluations", "Evaluations", &tables::evaluations(data))) }
         (section("mesh", "Mesh and equations", &mesh(data)))

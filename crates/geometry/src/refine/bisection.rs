@@ -55,25 +55,49 @@ impl Bisection {
     /// # Errors
     /// [`MeshError::RefinementLimit`]; nothing is refined then.
     pub fn refine(&mut self, marked: &[ElementId]) -> Result<(), MeshError> {
+        self.refine_so_often(marked, 1)
+    }
+
+    /// Bisects the elements that are `marked` three times, which halves most of their edges, and others as in
+    /// [`Bisection::refine`].
+    ///
+    /// # Errors
+    /// As [`Bisection::refine`].
+    pub fn halve(&mut self, marked: &[ElementId]) -> Result<(), MeshError> {
+        self.refine_so_often(marked, 3)
+    }
+
+    fn refine_so_often(&mut self, marked: &[ElementId], times: u16) -> Result<(), MeshError> {
         let before = (self.tets.clone(), self.points.len());
-        let mut chosen = vec![false; self.tets.len()];
-        marked.iter().for_each(|e| chosen[e.index()] = true);
+        for e in marked {
+            let tet = &mut self.tets[e.index()];
+            tet.goal = tet.level.saturating_add(times);
+        }
+        let outcome = self.refine_to_goals();
+        if outcome.is_err() {
+            let (tets, node_count) = before;
+            self.tets = tets;
+            self.points.truncate(node_count);
+            self.parents.truncate(node_count - self.coarse.node_count());
+            self.middle_of.retain(|_, node| node.index() < node_count);
+        }
+        outcome
+    }
+
+    /// Bisects what is below its goal, each time until the mesh conforms again.
+    fn refine_to_goals(&mut self) -> Result<(), MeshError> {
         let mut at_new_edge = vec![false; self.points.len()];
-        let mut outcome = self.bisect(&chosen, &mut at_new_edge);
-        while outcome.is_ok() {
-            let hanging: Vec<bool> =
+        loop {
+            let mut chosen: Vec<bool> =
                 self.tets.iter().map(|tet| self.has_cut_edge(tet, &at_new_edge)).collect();
-            if !hanging.contains(&true) {
+            if !chosen.contains(&true) {
+                chosen = self.tets.iter().map(|tet| tet.level < tet.goal).collect();
+            }
+            if !chosen.contains(&true) {
                 return Ok(());
             }
-            outcome = self.bisect(&hanging, &mut at_new_edge);
+            self.bisect(&chosen, &mut at_new_edge)?;
         }
-        let (tets, node_count) = before;
-        self.tets = tets;
-        self.points.truncate(node_count);
-        self.parents.truncate(node_count - self.coarse.node_count());
-        self.middle_of.retain(|_, node| node.index() < node_count);
-        outcome
     }
 
     /// Whether an edge of the element has a node in its middle; only edges between ends of those cut last are looked up.

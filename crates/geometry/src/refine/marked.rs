@@ -20,6 +20,8 @@ pub(super) struct MarkedTet {
     pub(super) ancestor: ElementId,
     /// Bisections since then.
     pub(super) level: u16,
+    /// Bisections that it is to have at least.
+    pub(super) goal: u16,
 }
 
 /// The flag of the paper: it matters where the three marked edges lie in one plane.
@@ -46,7 +48,7 @@ impl MarkedTet {
             let mark = longest(&[[a, b], [a, c], [b, c]]).expect("a face has edges");
             face.into_iter().find(|&v| !mark.contains(&places[v])).expect("one vertex is left") as u8
         });
-        Self { nodes: places.map(|v| tet[v]), spare, stage: Stage::Unflagged, ancestor, level: 0 }
+        Self { nodes: places.map(|v| tet[v]), spare, stage: Stage::Unflagged, ancestor, level: 0, goal: 0 }
     }
 
     /// The edge that is bisected next.
@@ -80,7 +82,7 @@ impl MarkedTet {
             Stage::Unflagged if is_planar => Stage::Flagged,
             _ => Stage::Unflagged,
         };
-        Self { nodes, spare, stage, ancestor: self.ancestor, level: self.level + 1 }
+        Self { nodes, spare, stage, level: self.level + 1, ..*self }
     }
 }
 

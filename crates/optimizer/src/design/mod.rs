@@ -5,12 +5,14 @@
 //! a smoothing filter (`filter`); mirror images may be constrained to be equal (`symmetry`), and the free boundary edges
 //! held (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at
 //! a node that stays. So the displacements keep the bounds of the variables, and the transpose, which takes derivatives at
-//! the nodes to those with respect to `p`, is exact.
+//! the nodes to those with respect to `p`, is exact. On a finer mesh of the same body the variables stay what they are
+//! (`refined`).
 
 mod boundary_edges;
 mod filter;
 mod grid;
 mod normal;
+mod refined;
 mod symmetry;
 mod transfer;
 

@@ -204,6 +204,7 @@ impl Run<'_> {
             inversion_element: analysis.inversion.element.map(ElementId::index),
             inversion_region: analysis.inversion.element.map(region),
             round: shape.motion().round(),
+            level: self.level,
             forces: analysis.forces.clone(),
             constraints: BTreeMap::new(),
         };

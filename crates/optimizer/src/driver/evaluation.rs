@@ -39,6 +39,9 @@ pub struct Evaluation {
     pub inversion_region: Option<String>,
     /// Rounds of the mesh motion begun so far (see [`fluxmorph_optimizer::driver`]).
     pub round: usize,
+    /// Times the mesh had been refined.
+    #[serde(default)]
+    pub level: usize,
     /// Force and torque on every body whose force is reported.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<BodyForce>,
@@ -54,7 +57,7 @@ pub fn column(constraint: &str) -> String {
 
 impl Evaluation {
     /// The columns of `history.csv` before those of the constraints.
-    pub const COLUMNS: [&'static str; 15] = [
+    pub const COLUMNS: [&'static str; 16] = [
         "evaluation",
         "iteration",
         "objective",
@@ -70,5 +73,6 @@ impl Evaluation {
         "inversion_element",
         "inversion_region",
         "round",
+        "level",
     ];
 }

@@ -16,6 +16,7 @@
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit, in the same rounds on the same meshes, they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
+//! * On a finer mesh a search goes on from the best design of the one before (`start`).
 //! * Limits of evaluations and time are checked before each evaluation but the first, and before each fallback: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
@@ -33,6 +34,7 @@ mod replay;
 mod run;
 mod search;
 mod settings;
+mod start;
 mod stop_reason;
 mod trust_region;
 
@@ -45,6 +47,7 @@ pub use outcome::{Best, Optimised};
 pub use record::{Record, reference_hash};
 pub use recorder::{Recorder, Unrecorded};
 pub use settings::Settings;
+pub use start::Start;
 pub use stop_reason::StopReason;
 
 use run::Run;
@@ -68,17 +71,44 @@ pub fn optimise(
     recorder: &mut dyn Recorder,
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
-    let mut run = Run::new(problem, settings, observer, recorder, interrupted);
+    optimise_from(&Start::default(), problem, settings, observer, recorder, interrupted)
+}
+
+/// As [`optimise`], with what a search on a coarser mesh has left.
+///
+/// # Errors
+/// As [`optimise`].
+///
+/// # Panics
+/// As [`optimise`], and if the design to go on from has another length than there are variables.
+pub fn optimise_from(
+    start: &Start,
+    problem: &mut Problem,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+    recorder: &mut dyn Recorder,
+    interrupted: &dyn Fn() -> bool,
+) -> Result<Optimised, Error> {
+    let mut run = Run::new(problem, settings, observer, recorder, interrupted).taking_over(start);
     run.continue_to_start()?;
-    let mut search = Search::new(&run, settings)?;
-    let reason = loop {
-        match advance(&mut search, &mut run) {
-            Ok(None) => {}
-            Ok(Some(reason)) => break reason,
-            Err(error) => break run.salvage(error)?,
-        }
+    let reason = match run.take_up(start.design.as_deref()) {
+        Ok(None) => search(&mut run, settings)?,
+        Ok(Some(reason)) => reason,
+        Err(error) => run.salvage(error)?,
     };
     run.finish(reason)
+}
+
+/// One search after the other, until there is a reason to stop.
+fn search(run: &mut Run<'_>, settings: &Settings) -> Result<StopReason, Error> {
+    let mut search = Search::new(run, settings)?;
+    loop {
+        match advance(&mut search, run) {
+            Ok(None) => {}
+            Ok(Some(reason)) => return Ok(reason),
+            Err(error) => return run.salvage(error),
+        }
+    }
 }
 
 /// One search of the method, and what follows from it; a reason where nothing does.

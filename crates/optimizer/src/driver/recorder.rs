@@ -6,8 +6,10 @@ use crate::problem::{Analysis, Problem};
 
 /// Keeps what is computed, and replays what was kept before the run was interrupted.
 pub trait Recorder {
-    /// The next evaluation kept before, in their order; `None` once all are replayed.
-    fn replay(&mut self) -> Option<Record> {
+    /// The next evaluation kept before, in their order, of those after so many refinements of the mesh; `None` once these are
+    /// replayed.
+    fn replay(&mut self, level: usize) -> Option<Record> {
+        let _ = level;
         None
     }
 

@@ -8,7 +8,7 @@ use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
 use super::promised_gain::promised_gain;
 use super::search::Stop;
-use super::{Observer, Optimised, Record, Recorder, Settings, StopReason};
+use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::objective::Goal;
@@ -45,6 +45,10 @@ pub(super) struct Run<'a> {
     begun: usize,
     /// What the gradient promised at the first design.
     promised: Option<f64>,
+    /// Times the mesh has been refined.
+    pub(super) level: usize,
+    /// Evaluations on coarser meshes.
+    pub(super) first_evaluation: usize,
     /// How every round began.
     pub(super) starts: Vec<RoundStart>,
     /// Whether several ranks compute, or computed what is replayed.
@@ -85,9 +89,17 @@ impl<'a> Run<'a> {
             rounds: Vec::new(),
             begun: 0,
             promised: None,
+            level: 0,
+            first_evaluation: 0,
             starts: Vec::new(),
             is_shared_out,
         }
+    }
+
+    /// Goes on counting where a search on a coarser mesh ended.
+    pub(super) fn taking_over(self, start: &Start) -> Self {
+        let Start { level, evaluations, iterations, .. } = *start;
+        Self { level, evaluations, first_evaluation: evaluations, iterations, ..self }
     }
 
     pub(super) fn shape(&self) -> &Shape {
@@ -241,7 +253,7 @@ impl<'a> Run<'a> {
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
         // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end.
         let is_over =
-            self.evaluations > 0 && self.settings.max_time.is_some_and(over) && !self.is_replaying();
+            self.initial.is_some() && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
     }
 
@@ -257,7 +269,7 @@ impl<'a> Run<'a> {
     /// Whether there are evaluations of before that are still to be replayed.
     pub(super) fn is_replaying(&mut self) -> bool {
         if self.next.is_none() {
-            self.next = self.recorder.replay();
+            self.next = self.recorder.replay(self.level);
         }
         self.next.is_some()
     }
@@ -328,7 +340,7 @@ impl<'a> Run<'a> {
         if is_cut {
             return Err(Error::InterruptedRun);
         }
-        if let Some(record) = self.next.take().or_else(|| self.recorder.replay()) {
+        if let Some(record) = self.next.take().or_else(|| self.recorder.replay(self.level)) {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }

@@ -1,0 +1,315 @@
+//! A run with a tolerance: its mesh is refined before the search, and after it for the best design, until the error bars of the
+//! objective are small enough.
+//!
+//! Every mesh is a *level*. The journal has the evaluations of all levels one after the other, `refinements.json` the elements
+//! that were marked: a resumed run makes the same meshes again, and what was cut short before its marks were written is
+//! estimated again, with the same bits. Variables mean the same on every level ([`RefinedMesh`]).
+//!
+//! Does not live here: the estimate and the marks (`fluxmorph_optimizer::problem::ErrorEstimate`), the way of a search from the
+//! best design of the one before (`fluxmorph_optimizer::driver::Start`).
+
+use std::time::Instant;
+
+use fluxmorph_geometry::ElementId;
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
+use fluxmorph_optimizer::memory_estimate::of_other_mesh;
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, RoundEvent, SolverCache};
+use fluxmorph_remesh::Moved;
+
+use super::Session;
+use super::journal::mesh_hash;
+use super::recorder::DirectoryRecorder;
+use crate::build::{RefinedMesh, Setup, memory_limit, remaining_elements, set_up_refined};
+use crate::config::ElementOrder;
+use crate::error::Error;
+use crate::files::{OutputError, RefinementStep, Refinements, relative_bar};
+use crate::show::RunObserver;
+
+/// The mesh of a run with a tolerance.
+pub(super) struct Levels {
+    mesh: RefinedMesh,
+    /// The refinements so far; behind them, while a run is resumed, those that are still to be made again.
+    kept: Refinements,
+    made: usize,
+    tolerance: f64,
+    most: usize,
+}
+
+/// What all searches of a run have come to.
+pub(super) struct Searched {
+    /// The last search, with the timings of all.
+    pub(super) optimised: Optimised,
+    /// The initial shape on the mesh of the last search.
+    pub(super) first: Moved,
+    /// The estimated error of the best design, where it is known already.
+    pub(super) at_best: Option<ErrorEstimate>,
+    /// How the mesh was refined; `None` without a tolerance.
+    pub(super) refinements: Option<Refinements>,
+}
+
+impl Levels {
+    /// Those of a run that is begun or resumed; `None` without a tolerance.
+    fn of(session: &Session<'_>) -> Result<Option<Self>, Error> {
+        let accuracy = &session.config.accuracy;
+        let Some(tolerance) = accuracy.tolerance else { return Ok(None) };
+        let mesh = RefinedMesh::new(session.config, session.source, &session.setup.full_mesh)?;
+        let kept = Refinements::read(&session.directory)?;
+        Ok(Some(Self { mesh, kept, made: 0, tolerance, most: accuracy.max_refinements }))
+    }
+
+    /// The refinement that the run before its interruption made after so many evaluations.
+    fn next_kept(&self, evaluations: usize) -> Option<RefinementStep> {
+        self.kept.refinements.get(self.made).filter(|step| step.evaluations == evaluations).cloned()
+    }
+}
+
+impl Session<'_> {
+    /// Whether its mesh is not that of the configuration any more.
+    pub(super) fn is_refined(refinements: Option<&Refinements>) -> bool {
+        refinements.is_some_and(|refinements| !refinements.refinements.is_empty())
+    }
+
+    /// Searches on one mesh after the other.
+    ///
+    /// # Errors
+    /// As [`driver::optimise`], and what the analysis of a design fails with.
+    pub(super) fn search(
+        &mut self,
+        recorder: &mut DirectoryRecorder,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Searched, Error> {
+        let settings = self.config.optimizer.settings();
+        self.continuation.iter().for_each(|event| observer.round(event));
+        let mut levels = Levels::of(self)?;
+        let is_shared_out = self.setup.problem.share().is_some();
+        let is_second_order = self.config.analysis.order == ElementOrder::Quadratic;
+        if levels.is_some() && (is_shared_out || is_second_order) {
+            let needs = if is_shared_out { "one process" } else { "analysis.order = 1" };
+            observer.warning(&format!("accuracy.tolerance needs {needs}: the mesh of this run is not refined"));
+            levels = None;
+        }
+        if let Some(levels) = &mut levels {
+            self.refine_before_search(levels, recorder.is_replaying(), observer)?;
+        }
+        let clock = Instant::now();
+        let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
+        let mut before: Option<Optimised> = None;
+        loop {
+            let first = self.setup.problem.moved(self.initial_design())?;
+            let max_time = settings.max_time.map(|time| (time - clock.elapsed().as_secs_f64()).max(0.0));
+            let settings = Settings { max_time, ..settings.clone() };
+            let optimised = driver::optimise_from(
+                &start,
+                &mut self.setup.problem,
+                &settings,
+                observer,
+                recorder,
+                self.interrupted,
+            )?;
+            let optimised = sum(before.take(), optimised);
+            let (is_refined, at_best) = match &mut levels {
+                Some(levels) => self.refine_after_search(levels, &optimised, observer)?,
+                None => (false, None),
+            };
+            if !is_refined {
+                let refinements = levels.map(|levels| levels.kept);
+                return Ok(Searched { optimised, first, at_best, refinements });
+            }
+            self.continuation.iter().for_each(|event| observer.round(event));
+            start = Start {
+                level: start.level + 1,
+                evaluations: optimised.evaluations,
+                iterations: optimised.iterations,
+                design: Some(optimised.best.values.clone()),
+            };
+            before = Some(optimised);
+        }
+    }
+
+    /// Refines the mesh until the error bar of the initial design is within the tolerance.
+    fn refine_before_search(
+        &mut self,
+        levels: &mut Levels,
+        has_begun: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        loop {
+            OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)?;
+            if let Some(step) = levels.next_kept(0) {
+                self.refine_again(levels, &step)?;
+                continue;
+            }
+            if has_begun {
+                return Ok(());
+            }
+            observer.phase("solving the field of the initial design");
+            let problem = &self.setup.problem;
+            let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
+            let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
+            let Some(estimate) = self.estimate_error(&analysis, observer) else {
+                observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
+                return Ok(());
+            };
+            let scale = analysis.objective.map_or(f64::NAN, f64::abs);
+            if !self.refine(levels, 0, (&analysis, &estimate, scale), observer)? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Refines the mesh for the best design, where its error bar is beyond the tolerance and there is time to go on: whether it
+    /// was, and the estimate where it was made.
+    fn refine_after_search(
+        &mut self,
+        levels: &mut Levels,
+        optimised: &Optimised,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(bool, Option<ErrorEstimate>), Error> {
+        let reason = optimised.stop_reason;
+        let is_over = matches!(
+            reason,
+            StopReason::MaxEvaluations | StopReason::MaxTime | StopReason::Interrupted | StopReason::NumericalFailure
+        );
+        if is_over || (self.interrupted)() {
+            return Ok((false, None));
+        }
+        if let Some(step) = levels.next_kept(optimised.evaluations) {
+            self.refine_again(levels, &step)?;
+            return Ok((true, None));
+        }
+        let analysis = &optimised.best.analysis;
+        let Some(estimate) = self.estimate_error(analysis, observer) else { return Ok((false, None)) };
+        let scale = optimised.initial.abs().max(optimised.best.objective.abs());
+        let of_best = (analysis, &estimate, scale);
+        let is_refined = self.refine(levels, optimised.evaluations, of_best, observer)?;
+        Ok((is_refined, Some(estimate).filter(|_| !is_refined)))
+    }
+
+    /// Refines the mesh where a design needs it, for an error relative to `scale`; whether it was refined. Why not is reported.
+    fn refine(
+        &mut self,
+        levels: &mut Levels,
+        evaluations: usize,
+        (analysis, estimate, scale): (&Analysis, &ErrorEstimate, f64),
+        observer: &mut dyn RunObserver,
+    ) -> Result<bool, Error> {
+        let objective = analysis.objective.unwrap_or(f64::NAN);
+        let what = if evaluations == 0 { "initial" } else { "best" };
+        let Some(bar) = relative_bar(estimate.objective, scale) else {
+            observer.warning(&format!("the objective of the {what} design is zero: accuracy.tolerance means nothing"));
+            return Ok(false);
+        };
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        let said = format!(
+            "the error bar of the {what} design is {}, accuracy.tolerance {}",
+            percent(bar),
+            percent(levels.tolerance)
+        );
+        if bar <= levels.tolerance {
+            observer.note(&format!("{said}: the mesh is fine enough"));
+            return Ok(false);
+        }
+        if levels.made >= levels.most {
+            observer.warning(&format!(
+                "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
+                 begin with a finer mesh",
+                levels.most
+            ));
+            return Ok(false);
+        }
+        observer.phase("refining the mesh");
+        let full = levels.mesh.mesh().topology();
+        let in_full = remaining_elements(self.config, full);
+        let marked: Vec<ElementId> =
+            estimate.marked(1.0 - levels.tolerance / bar).into_iter().map(|e| in_full[e.index()]).collect();
+        let tets = full.tets().len();
+        match self.refined(&levels.mesh, &marked) {
+            Ok((mesh, setup)) => {
+                (levels.mesh, self.setup) = (mesh, setup);
+            }
+            Err(cause) => {
+                observer.warning(&format!(
+                    "{said}, and the mesh cannot be refined further: {cause}; the tolerance is not kept"
+                ));
+                return Ok(false);
+            }
+        }
+        levels.made += 1;
+        levels.kept.refinements.truncate(levels.made - 1);
+        levels.kept.refinements.push(RefinementStep {
+            evaluations,
+            tets,
+            objective,
+            error_estimate: estimate.objective,
+            blake3: mesh_hash(levels.mesh.mesh()),
+            marked: marked.into_iter().map(ElementId::index).collect(),
+        });
+        levels.kept.write(&self.directory)?;
+        observer.note(&format!(
+            "{said}: refinement {}, {tets} → {} tetrahedra",
+            levels.made,
+            levels.mesh.mesh().topology().tets().len()
+        ));
+        self.continue_to_initial()?;
+        Ok(true)
+    }
+
+    /// Makes a refinement of before the interruption again.
+    fn refine_again(&mut self, levels: &mut Levels, step: &RefinementStep) -> Result<(), Error> {
+        let damaged = |message: &str| {
+            let message = format!("{message} (without the file `resume` estimates the errors anew)");
+            Error::from(OutputError::Damaged { path: self.directory.refinements(), message })
+        };
+        let tets = levels.mesh.mesh().topology().tets().len();
+        if step.marked.iter().any(|&e| e >= tets) {
+            return Err(damaged("it names an element that the mesh does not have"));
+        }
+        let marked: Vec<ElementId> = step.marked.iter().copied().map(ElementId::new).collect();
+        let mut mesh = levels.mesh.clone();
+        mesh.halve(&marked)?;
+        if mesh_hash(mesh.mesh()) != step.blake3 {
+            return Err(damaged("it makes another mesh than it says"));
+        }
+        self.setup = self.set_up(&mesh)?;
+        (levels.mesh, levels.made) = (mesh, levels.made + 1);
+        self.continue_to_initial()
+    }
+
+    /// A finer mesh, and the problem on it; else why there is none.
+    fn refined(&self, mesh: &RefinedMesh, marked: &[ElementId]) -> Result<(RefinedMesh, Setup), String> {
+        let mut finer = mesh.clone();
+        finer.halve(marked).map_err(|error| error.to_string())?;
+        let count = |mesh: &RefinedMesh| mesh.mesh().topology().tets().len() as f64;
+        let growth = count(&finer) / count(mesh);
+        if let Some(shortage) = memory_limit::shortage(of_other_mesh(&self.setup.problem, growth)) {
+            return Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
+        }
+        let setup = self.set_up(&finer).map_err(|error| error.to_string())?;
+        Ok((finer, setup))
+    }
+
+    fn set_up(&self, mesh: &RefinedMesh) -> Result<Setup, Error> {
+        set_up_refined(self.config, self.source, (mesh.mesh().clone(), mesh.surface(self.config)?))
+    }
+
+    /// Takes the new mesh near the initial design.
+    fn continue_to_initial(&mut self) -> Result<(), Error> {
+        let initial = self.initial_design().to_vec();
+        let continued = self.setup.problem.continue_to(&initial, self.interrupted);
+        self.continuation = continued.map_err(|error| match error {
+            OptimizerError::Interrupted => OptimizerError::InterruptedRun,
+            other => other,
+        })?;
+        Ok(())
+    }
+}
+
+/// The last search, with what those before it took.
+fn sum(before: Option<Optimised>, last: Optimised) -> Optimised {
+    let Some(before) = before else { return last };
+    let mut timings = before.timings;
+    timings += last.timings;
+    let rounds: Vec<RoundEvent> = before.rounds.into_iter().chain(last.rounds).collect();
+    Optimised { timings, rounds, worst_residual: before.worst_residual.max(last.worst_residual), ..last }
+}

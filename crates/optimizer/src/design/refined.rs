@@ -1,0 +1,149 @@
+//! The same design variables on a finer mesh: the shape stays what it is.
+//!
+//! The variables live on the surface of the mesh that was refined. A new node lies in the middle of an edge, and moves by the
+//! mean of what the ends of that edge move: the facets of a design are the same on any of its meshes. Where all directions are
+//! one, that holds to the last bit; between nodes with normals `a` and `b` the new direction is that of `a + b`, and differs
+//! by the product of how much the directions and the displacements differ.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::NodeId;
+use fluxmorph_geometry::tet4::{Point, norm};
+
+use super::{DesignSurface, Row};
+
+impl DesignSurface {
+    /// The surface on a finer mesh, whose triangles are `triangles` and whose nodes from number `coarse_nodes` on have
+    /// `parents`, with lower numbers.
+    ///
+    /// # Panics
+    /// If a new node on an edge of the surface has parents that are none of its nodes.
+    #[must_use]
+    pub fn refined(
+        &self,
+        triangles: &[[NodeId; 3]],
+        coarse_nodes: usize,
+        parents: &[[NodeId; 2]],
+    ) -> Self {
+        let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
+        let mut fine = Self { points: self.points.clone(), ..Self::empty() };
+        for node in nodes {
+            let (direction, row) = match node.index().checked_sub(coarse_nodes) {
+                None => self.at(node),
+                Some(new) => mean(parents[new].map(|parent| fine.at(parent))),
+            };
+            fine.nodes.push(node);
+            fine.directions.push(direction);
+            fine.rows.push(row);
+        }
+        fine
+    }
+
+    fn empty() -> Self {
+        Self { nodes: Vec::new(), directions: Vec::new(), rows: Vec::new(), points: Vec::new() }
+    }
+
+    /// Direction and weights at one of its nodes.
+    fn at(&self, node: NodeId) -> (Point, Row) {
+        let place = self.nodes.binary_search(&node).expect("a node of the surface");
+        (self.directions[place], self.rows[place].clone())
+    }
+}
+
+/// Direction and weights between two nodes.
+fn mean([(a, row_a), (b, row_b)]: [(Point, Row); 2]) -> (Point, Row) {
+    let between: Point = std::array::from_fn(|d| 0.5 * (a[d] + b[d]));
+    let length = norm(between);
+    let (direction, share) = match [a, b].map(|direction| direction == [0.0; 3]) {
+        [true, _] => (b, 1.0),
+        [_, true] => (a, 1.0),
+        _ if a == b => (a, 1.0),
+        // Of a surface that folds back nothing is left to move along.
+        _ if length < f64::EPSILON => ([0.0; 3], 0.0),
+        _ => (between.map(|c| c / length), length),
+    };
+    let mut row: Row = Vec::with_capacity(row_a.len() + row_b.len());
+    for (variable, weight) in row_a.into_iter().chain(row_b) {
+        row.push((variable, 0.5 * share * weight));
+    }
+    row.sort_by_key(|(variable, _)| *variable);
+    row.dedup_by(|next, kept| {
+        let is_same = next.0 == kept.0;
+        if is_same {
+            kept.1 += next.1;
+        }
+        is_same
+    });
+    if direction == [0.0; 3] {
+        row.clear();
+    }
+    (direction, row)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fluxmorph_geometry::Mesh;
+    use fluxmorph_geometry::generate::{SphereParameters, sphere};
+    use fluxmorph_geometry::refine::{RefineLimits, uniform};
+
+    use super::super::{DesignSetup, Direction};
+    use super::*;
+
+    /// The surface of a ball and of its finer mesh.
+    fn surfaces(direction: Direction) -> (DesignSurface, DesignSurface, fluxmorph_geometry::refine::Refinement) {
+        let name = "sphere|air";
+        let mesh = sphere(&SphereParameters { divisions: 4, ..SphereParameters::default() }).expect("a ball");
+        let faces = mesh.topology().faces_between(name).expect("they touch");
+        let topology = mesh.topology().as_ref().clone().with_surface(name, faces).expect("faces of the mesh");
+        let mesh = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("as it was");
+        let refinement = uniform(&mesh, RefineLimits::default()).expect("eight for each");
+        let triangles = mesh.topology().surface(name).expect("it is there");
+        let coarse = DesignSurface::new(&mesh, &DesignSetup::new(triangles, direction)).expect("a surface");
+        let fine = refinement.mesh().topology().surface(name).expect("inherited");
+        let fine = coarse.refined(fine, mesh.points().len(), refinement.parents());
+        (coarse, fine, refinement)
+    }
+
+    /// The largest difference of what a finer surface does to what its facets do.
+    fn difference(direction: Direction) -> f64 {
+        let (coarse, fine, refinement) = surfaces(direction);
+        assert_eq!(fine.variable_count(), coarse.variable_count());
+        let p: Vec<f64> = coarse.points().iter().map(|x| 1e-3 * (x[0] - 2.0 * x[1]) / norm(*x)).collect();
+        let count = refinement.mesh().points().len() - refinement.parents().len();
+        let mut all = vec![[0.0; 3]; count];
+        for (node, displacement) in coarse.nodes().iter().zip(coarse.displacement(&p)) {
+            all[node.index()] = displacement;
+        }
+        let facets = refinement.prolong(&all);
+        let found = fine.displacement(&p);
+        fine.nodes().iter().zip(found).fold(0.0, |largest: f64, (node, found)| {
+            let of_facets = facets[node.index()];
+            largest.max(norm(std::array::from_fn(|d| found[d] - of_facets[d])))
+        })
+    }
+
+    #[test]
+    fn a_shape_is_the_same_on_a_finer_mesh() {
+        // Displacements of a millimetre, rounded a few times.
+        assert!(difference(Direction::Along([0.6, 0.0, 0.8])) < 1e-17);
+        // Normals and displacements of neighbours differ by a part of themselves: a small part is left.
+        let normal = difference(Direction::Normal);
+        assert!(normal < 2e-4, "{normal}");
+    }
+
+    #[test]
+    fn what_a_variable_does_to_new_nodes_is_in_the_gradient() {
+        let (_, fine, _) = surfaces(Direction::Normal);
+        let nodal: Vec<Point> = (0..fine.nodes().len()).map(|i| [1.0, 0.1 * i as f64, -2.0]).collect();
+        let gradient = fine.gradient(&nodal);
+        for k in [0, 3] {
+            let mut unit = vec![0.0; fine.variable_count()];
+            unit[k] = 1.0;
+            let along: f64 = fine.displacement(&unit).iter().zip(&nodal).map(|(x, g)| (0..3).map(|d| x[d] * g[d]).sum::<f64>()).sum();
+            // Sums of some dozen terms.
+            assert!((gradient[k] - along).abs() < 1e-12 * along.abs(), "{k}");
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Where a search begins: at the initial design, or with the best one of a search on a coarser mesh.
+
+use super::run::Run;
+use super::search::{Refusal, Stop};
+use super::stop_reason::StopReason;
+use crate::error::Error;
+use crate::problem::RoundStart;
+
+/// What a search takes over from one on a coarser mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Start {
+    /// Times the mesh has been refined.
+    pub level: usize,
+    /// Evaluations before.
+    pub evaluations: usize,
+    /// Of these, the ones that improved on those before them.
+    pub iterations: usize,
+    /// The design to go on from [m]; `None` for the initial one. The initial one is evaluated before it: it fixes the scale of
+    /// the objective and the bounds of the constraints on this mesh.
+    pub design: Option<Vec<f64>>,
+}
+
+impl Run<'_> {
+    /// Evaluates the initial design and the one to go on from; where the latter is no better on this mesh, or cannot be reached,
+    /// the search begins at the initial one. A reason where that is not the end of it.
+    ///
+    /// # Errors
+    /// As an evaluation; [`Error::FirstDesign`] where the mesh does not carry the initial design.
+    pub(super) fn take_up(&mut self, design: Option<&[f64]>) -> Result<Option<StopReason>, Error> {
+        let Some(design) = design else { return Ok(None) };
+        let initial = self.shape().initial().to_vec();
+        if let Some(reason) = self.evaluated(&initial)? {
+            return Ok(Some(reason));
+        }
+        match self.problem.continue_to(design, self.interrupted) {
+            Ok(events) => events.into_iter().for_each(|event| self.report(event)),
+            Err(Error::DesignUnreached { .. } | Error::Remesh(_)) => return self.begin_at_initial(),
+            Err(Error::Interrupted) => return Ok(Some(StopReason::Interrupted)),
+            Err(other) => return Err(other),
+        }
+        if self.shape().limits.rounds > 0 {
+            self.starts.push(RoundStart::Reference { design_m: design.to_vec() });
+        }
+        if let Some(reason) = self.evaluated(design)? {
+            return Ok(Some(reason));
+        }
+        let has_gained = self.best_evaluation().is_some_and(|best| best > self.first_evaluation);
+        if has_gained || design == initial { Ok(None) } else { self.begin_at_initial() }
+    }
+
+    /// The limit that an evaluation runs into, if it does.
+    fn evaluated(&mut self, p: &[f64]) -> Result<Option<StopReason>, Error> {
+        match self.evaluate(p) {
+            Ok(_) | Err(Stop::CutShort) => Ok(None),
+            Err(Stop::Limit(reason)) => Ok(Some(reason)),
+            Err(Stop::Mesh(_)) if self.has_best() => Ok(None),
+            Err(Stop::Mesh(Refusal { cause, .. })) => Err(Error::FirstDesign { cause }),
+            Err(Stop::Error(error)) => Err(*error),
+        }
+    }
+
+    /// Begins at the initial design after all.
+    fn begin_at_initial(&mut self) -> Result<Option<StopReason>, Error> {
+        self.warn(
+            "the best design of the coarser mesh is no better than the initial one on this mesh, or out of its reach: the \
+             search begins anew",
+        );
+        self.starts.clear();
+        self.problem.restart()?;
+        self.continue_to_start()?;
+        Ok(None)
+    }
+}
