@@ -39,7 +39,7 @@ fn a_run_leaves_files_that_agree_and_fields_that_hold_its_design_and_its_objecti
 
 fn all_files_are_there(run: &RunFolder) {
     let fields = (0..EVALUATIONS).map(|e| format!("fields/eval_{e:04}.vtu"));
-    let others = "config.toml fields.pvd history.csv journal.jsonl manifest.json optimum.msh \
+    let others = "config.toml error.vtu fields.pvd history.csv journal.jsonl manifest.json optimum.msh \
                   optimum_plate_bottom.stl report.html resolved.toml result.json";
     let mut expected: Vec<String> = others.split(' ').map(str::to_owned).chain(fields).collect();
     expected.sort();
