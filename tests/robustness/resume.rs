@@ -121,7 +121,10 @@ fn a_run_may_be_cut_again_and_again() {
 /// A mesh that is refined before the search, and again for the best design.
 fn refined() -> (Config, SourceMap) {
     block(&[
-        ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"\norder = 1\n\n[accuracy]\ntolerance = \"4.5 %\""),
+        (
+            "frequency = \"50 Hz\"",
+            "frequency = \"50 Hz\"\nelements = \"edge\"\norder = 1\n\n[accuracy]\ntolerance = \"4.5 %\"",
+        ),
         ("max_evaluations = 6", "max_evaluations = 8"),
         ("ftol_rel = 0", "ftol_rel = 1e-2"),
     ])
@@ -174,7 +177,10 @@ fn refinements_that_are_not_those_of_the_run_are_refused() {
         resume(&disk.shared(), RunLimits::default()).expect_err("another mesh").to_string()
     };
     let error = damaged(&|kept| kept.refinements[0].marked.push(1_000_000));
-    assert!(error.contains("refinements.json") && error.contains("an element that the mesh does not have"), "{error}");
+    assert!(
+        error.contains("refinements.json") && error.contains("an element that the mesh does not have"),
+        "{error}"
+    );
     let error = damaged(&|kept| drop(kept.refinements[0].marked.pop()));
     assert!(error.contains("it makes another mesh than it says"), "{error}");
 }

@@ -16,9 +16,7 @@ use super::estimate::estimate;
 use super::finer::{Cut, FinerProblem};
 use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use crate::error::Error;
-use crate::files::{
-    Accuracy, CrossCheck, ObjectiveResult, Refinements, StopReason, Verdict, relative_bar,
-};
+use crate::files::{Accuracy, CrossCheck, ObjectiveResult, Refinements, StopReason, Verdict, relative_bar};
 use crate::show::Observer;
 
 /// The meshes of the initial and of the best shape, and the one with all regions that both began as.
@@ -51,7 +49,8 @@ impl Session<'_> {
         at_best: Option<ErrorEstimate>,
         observer: &mut dyn Observer,
     ) -> Result<Option<[ErrorEstimate; 2]>, Error> {
-        let is_wanted = self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
+        let is_wanted =
+            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
         if self.is_cut_short(stop_reason) || !is_wanted {
             return Ok(None);
         }

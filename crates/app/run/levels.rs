@@ -14,7 +14,9 @@ use fluxmorph_geometry::ElementId;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
 use fluxmorph_optimizer::memory_estimate::of_other_mesh;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, RoundEvent, SolverCache};
+use fluxmorph_optimizer::problem::{
+    Analysis, Derivatives, ErrorEstimate, NoProgress, RoundEvent, SolverCache,
+};
 use fluxmorph_remesh::Moved;
 
 use super::Session;
@@ -86,7 +88,8 @@ impl Session<'_> {
         let is_second_order = self.config.analysis.order == ElementOrder::Quadratic;
         if levels.is_some() && (is_shared_out || is_second_order) {
             let needs = if is_shared_out { "one process" } else { "analysis.order = 1" };
-            observer.warning(&format!("accuracy.tolerance needs {needs}: the mesh of this run is not refined"));
+            observer
+                .warning(&format!("accuracy.tolerance needs {needs}: the mesh of this run is not refined"));
             levels = None;
         }
         if let Some(levels) = &mut levels {
@@ -135,7 +138,8 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         loop {
-            OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)?;
+            OptimizerError::check_interrupted(self.interrupted)
+                .map_err(|_| OptimizerError::InterruptedRun)?;
             if let Some(step) = levels.next_kept(0) {
                 self.refine_again(levels, &step)?;
                 continue;
@@ -169,7 +173,10 @@ impl Session<'_> {
         let reason = optimised.stop_reason;
         let is_over = matches!(
             reason,
-            StopReason::MaxEvaluations | StopReason::MaxTime | StopReason::Interrupted | StopReason::NumericalFailure
+            StopReason::MaxEvaluations
+                | StopReason::MaxTime
+                | StopReason::Interrupted
+                | StopReason::NumericalFailure
         );
         if is_over || (self.interrupted)() {
             return Ok((false, None));
@@ -197,7 +204,9 @@ impl Session<'_> {
         let objective = analysis.objective.unwrap_or(f64::NAN);
         let what = if evaluations == 0 { "initial" } else { "best" };
         let Some(bar) = relative_bar(estimate.objective, scale) else {
-            observer.warning(&format!("the objective of the {what} design is zero: accuracy.tolerance means nothing"));
+            observer.warning(&format!(
+                "the objective of the {what} design is zero: accuracy.tolerance means nothing"
+            ));
             return Ok(false);
         };
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);

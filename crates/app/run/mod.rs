@@ -31,8 +31,8 @@ use std::time::Instant;
 use confirmation::ShapeMeshes;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
-use fluxmorph_optimizer::problem::RoundEvent;
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::problem::RoundEvent;
 use journal::{Identity, Journal};
 use levels::Searched;
 use mesh_independence::{Check, FreshMesh, MeshIndependence, ShapePair};
@@ -45,8 +45,8 @@ use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{
-    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory, RunResult, RunStatus,
-    check_finite, exports, peak_memory_bytes, resume_command,
+    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory,
+    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -296,7 +296,11 @@ impl Session<'_> {
         check_finite(&result)?;
         result.write(&self.directory)?;
         // A mesh that is refined where it counts may be finer there than one that is generated anew.
-        let fresh = if Self::is_refined(refinements) { None } else { FreshMesh::of(self.config, &self.setup.problem) };
+        let fresh = if Self::is_refined(refinements) {
+            None
+        } else {
+            FreshMesh::of(self.config, &self.setup.problem)
+        };
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);

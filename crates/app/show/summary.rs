@@ -132,8 +132,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         rows.push(("error bar of F/F0", format!("± {:.1e} (estimated)", SAFETY * error * ratio.abs())));
     }
     if let Some(is_within) = accuracy.within_tolerance {
-        let verdict =
-            if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
+        let verdict = if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
         rows.push(("tolerance", format!("{verdict} after {} refinements of the mesh", accuracy.refinements)));
     }
     if let Some(CrossCheck { elements, order, ratio }) = &accuracy.cross_check {

@@ -109,7 +109,11 @@ impl FieldModel {
             return Err(refuse("order", "2", "first order: there is no third one to estimate an error from"));
         }
         if !self.is_linear() && self.angular_frequency() > 0.0 {
-            return Err(refuse("bh", "a curve", "statics: with a frequency the tangent is none of the field alone"));
+            return Err(refuse(
+                "bh",
+                "a curve",
+                "statics: with a frequency the tangent is none of the field alone",
+            ));
         }
         if self.has_reentrant_walls() {
             return Err(refuse(

@@ -12,7 +12,8 @@ use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::functional::{Observed, Weighting};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
-    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
+    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
+    SurfaceLaw,
 };
 
 /// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
@@ -100,7 +101,10 @@ fn nodal_elements_at_a_singular_edge_have_no_estimate_and_say_so() {
         };
         let [first, second] = [Order::Linear, Order::Quadratic].map(|o| solved(&mesh, &of(o), &functional));
         println!("first order {first:.4e}, second {second:.4e}, exact {exact:.4e}");
-        assert!((second - first).abs() < 0.2 * (exact - first).abs(), "an estimate would have been worth something");
+        assert!(
+            (second - first).abs() < 0.2 * (exact - first).abs(),
+            "an estimate would have been worth something"
+        );
         let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
         let error = model.enriched(&mesh, Effort::Any).expect_err("no estimate").to_string();
         assert!(error.contains("re-entrant edge") && error.contains("edge elements"), "{error}");

@@ -50,7 +50,8 @@ pub(super) fn of_initial_design(
     source: &SourceMap,
     observer: &mut dyn Observer,
 ) -> Result<EstimateSummary, Error> {
-    let config = Config { accuracy: Accuracy { estimate: Some(true), ..config.accuracy.clone() }, ..config.clone() };
+    let config =
+        Config { accuracy: Accuracy { estimate: Some(true), ..config.accuracy.clone() }, ..config.clone() };
     let mut setup = set_up(&config, source, Mode::Analysis)?;
     let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
     setup.problem.continue_to(&initial, &|| false)?;
@@ -65,6 +66,7 @@ pub(super) fn of_initial_design(
         notices.push("there is no [objective] whose error could be estimated".to_owned());
     }
     let error = estimated.map(|estimate| estimate.objective);
-    let error_bar_relative = analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
+    let error_bar_relative =
+        analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
     Ok(EstimateSummary { objective: analysis.objective, error_estimate: error, error_bar_relative, notices })
 }

@@ -50,7 +50,10 @@ fn estimate(found: &EstimateSummary, unit: Option<&str>, row: &mut impl FnMut(&s
         (found.objective, found.error_estimate, found.error_bar_relative)
     {
         let bar = 100.0 * bar;
-        row("initial design", format!("F = {value:.6e}{unit} ± {bar:.2} %, estimated error {error:+.1e}{unit}"));
+        row(
+            "initial design",
+            format!("F = {value:.6e}{unit} ± {bar:.2} %, estimated error {error:+.1e}{unit}"),
+        );
     }
     found.notices.iter().for_each(|notice| row("initial design", notice.clone()));
 }

@@ -94,9 +94,13 @@ impl RunData {
             Ok(after) => error_map(&directory, after.flux_density.len())?,
             Err(_) => None,
         };
-        let mut files = ["fields.pvd", "error.vtu", "optimum.msh", "optimum_refined.msh"].map(str::to_owned).to_vec();
+        let mut files =
+            ["fields.pvd", "error.vtu", "optimum.msh", "optimum_refined.msh"].map(str::to_owned).to_vec();
         files.extend(manifest.surfaces.iter().cloned());
-        files.extend(["history.csv", "result.json", "refinements.json", "resolved.toml", "config.toml"].map(str::to_owned));
+        files.extend(
+            ["history.csv", "result.json", "refinements.json", "resolved.toml", "config.toml"]
+                .map(str::to_owned),
+        );
         let there =
             directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
         files.retain(|file| there.contains(file));
@@ -138,7 +142,8 @@ impl RunData {
 /// The estimated error of so many elements; `None` where there is none of this mesh.
 fn error_map(directory: &RunDirectory, count: usize) -> Result<Option<Vec<f64>>, Error> {
     let path = directory.error_map();
-    let there = directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
+    let there =
+        directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
     if !there.iter().any(|name| path.ends_with(name)) {
         return Ok(None);
     }

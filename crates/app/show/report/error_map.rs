@@ -30,22 +30,19 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
     };
     let densities: Vec<f64> = outline.mesh.topology().tets().iter().zip(error).map(density).collect();
     let sum: f64 = error.iter().sum();
-    let shares = Snapshot {
-        evaluation: field.evaluation,
-        points: field.points.clone(),
-        flux_density: densities,
-    };
+    let shares =
+        Snapshot { evaluation: field.evaluation, points: field.points.clone(), flux_density: densities };
     let window = Window::new(data, outline, field);
     let cut = FieldCut::new(&window, outline, &shares);
     let values = cut.triangles.iter().flat_map(|triangle| triangle.patch.map(|(_, value)| value));
     // Per cent in a cubic centimetre.
-    let shown = Shown { name: "Share of the estimated error", sign: "share of the error [%/cm³]", factor: 1e-4 };
+    let shown =
+        Shown { name: "Share of the estimated error", sign: "share of the error [%/cm³]", factor: 1e-4 };
     let high = shown.factor * values.fold(0.0, f64::max);
     if !(high.is_finite() && high > 0.0) {
         return Err("the estimated error is zero in the plane of the figure".to_owned());
     }
-    let scale =
-        Scale { low: high / RANGE, high, count: Count::Logarithmic, pixels: [LEFT, WIDTH - RIGHT] };
+    let scale = Scale { low: high / RANGE, high, count: Count::Logarithmic, pixels: [LEFT, WIDTH - RIGHT] };
     let frame = Frame::new(window.low, window.high, TALLEST);
     let caption = format!(
         "Where the estimated error of the objective at the best design is made, in {}: the sizes of what all elements add, \

@@ -19,12 +19,7 @@ impl DesignSurface {
     /// # Panics
     /// If a new node on an edge of the surface has parents that are none of its nodes.
     #[must_use]
-    pub fn refined(
-        &self,
-        triangles: &[[NodeId; 3]],
-        coarse_nodes: usize,
-        parents: &[[NodeId; 2]],
-    ) -> Self {
+    pub fn refined(&self, triangles: &[[NodeId; 3]], coarse_nodes: usize, parents: &[[NodeId; 2]]) -> Self {
         let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
         let mut fine = Self { points: self.points.clone(), ..Self::empty() };
         for node in nodes {
@@ -92,7 +87,9 @@ mod tests {
     use super::*;
 
     /// The surface of a ball and of its finer mesh.
-    fn surfaces(direction: Direction) -> (DesignSurface, DesignSurface, fluxmorph_geometry::refine::Refinement) {
+    fn surfaces(
+        direction: Direction,
+    ) -> (DesignSurface, DesignSurface, fluxmorph_geometry::refine::Refinement) {
         let name = "sphere|air";
         let mesh = sphere(&SphereParameters { divisions: 4, ..SphereParameters::default() }).expect("a ball");
         let faces = mesh.topology().faces_between(name).expect("they touch");
@@ -141,7 +138,12 @@ mod tests {
         for k in [0, 3] {
             let mut unit = vec![0.0; fine.variable_count()];
             unit[k] = 1.0;
-            let along: f64 = fine.displacement(&unit).iter().zip(&nodal).map(|(x, g)| (0..3).map(|d| x[d] * g[d]).sum::<f64>()).sum();
+            let along: f64 = fine
+                .displacement(&unit)
+                .iter()
+                .zip(&nodal)
+                .map(|(x, g)| (0..3).map(|d| x[d] * g[d]).sum::<f64>())
+                .sum();
             // Sums of some dozen terms.
             assert!((gradient[k] - along).abs() < 1e-12 * along.abs(), "{k}");
         }

@@ -37,7 +37,8 @@ impl ErrorEstimate {
     pub fn marked(&self, excess: f64) -> Vec<ElementId> {
         let wanted = (excess / (1.0 - LEFT)).clamp(MARKED[0], MARKED[1]);
         let mut by_size: Vec<usize> = (0..self.by_element.len()).collect();
-        by_size.sort_by(|&a, &b| self.by_element[b].abs().total_cmp(&self.by_element[a].abs()).then(a.cmp(&b)));
+        by_size
+            .sort_by(|&a, &b| self.by_element[b].abs().total_cmp(&self.by_element[a].abs()).then(a.cmp(&b)));
         let total: f64 = by_size.iter().map(|&e| self.by_element[e].abs()).sum();
         let mut sum = 0.0;
         let is_in_share = |e: &usize| {
