@@ -181,6 +181,8 @@ fn refinements_that_are_not_those_of_the_run_are_refused() {
         error.contains("refinements.json") && error.contains("an element that the mesh does not have"),
         "{error}"
     );
-    let error = damaged(&|kept| drop(kept.refinements[0].marked.pop()));
+    let error = damaged(&|kept| {
+        kept.refinements[0].marked.pop();
+    });
     assert!(error.contains("it makes another mesh than it says"), "{error}");
 }

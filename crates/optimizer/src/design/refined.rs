@@ -21,7 +21,7 @@ impl DesignSurface {
     #[must_use]
     pub fn refined(&self, triangles: &[[NodeId; 3]], coarse_nodes: usize, parents: &[[NodeId; 2]]) -> Self {
         let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
-        let mut fine = Self { points: self.points.clone(), ..Self::empty() };
+        let mut fine = Self { nodes: Vec::new(), directions: Vec::new(), rows: Vec::new(), ..self.clone() };
         for node in nodes {
             let (direction, row) = match node.index().checked_sub(coarse_nodes) {
                 None => self.at(node),
@@ -32,10 +32,6 @@ impl DesignSurface {
             fine.rows.push(row);
         }
         fine
-    }
-
-    fn empty() -> Self {
-        Self { nodes: Vec::new(), directions: Vec::new(), rows: Vec::new(), points: Vec::new() }
     }
 
     /// Direction and weights at one of its nodes.
