@@ -145,3 +145,45 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
     })?;
     Ok((curve, hash))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two sound lines, a comment and an empty line, then what is to be refused at line 5.
+    const HEAD: &str = "# H, B\n100, 0.5\n\n1000, 1.5\n";
+
+    #[test]
+    fn a_bad_line_of_a_file_is_refused_by_its_number() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let (table, path) = (folder.path().join("steel.csv"), folder.path().join("a.toml"));
+        let config = "[mesh]\ngenerator = \"block\"\n[analysis]\nfrequency = 0\n[materials.steel]\nbh_file = \"steel.csv\"\n\
+                      [regions.block]\nmaterial = \"steel\"\n[boundaries]\nflux_parallel = [\"x_min\"]\n";
+        std::fs::write(&path, config).expect("written");
+        let (config, source) = Config::from_file(&path, &[]).expect("a sound configuration");
+        let of_line_5 = [
+            ("2000", "1 columns, not 2"),
+            ("2000, 1.6, 3", "3 columns, not 2"),
+            ("2000; 1.6", "1 columns, not 2"),
+            ("2 kA/m, 1.6", "`2 kA/m` is no number"),
+            ("2000, -", "`-` is no number"),
+            ("nan, 1.6", "not finite"),
+            ("-2000, 1.6", "negative"),
+            ("1000, 1.6", "does not increase"),
+            ("900, 1.6", "does not increase"),
+            ("2000, 1.5", "does not increase"),
+            ("2000, 1.4", "does not increase"),
+            ("2e6, 1.6", "less than in vacuum"),
+            ("2000, 16", "beyond any material"),
+        ];
+        for (line, word) in of_line_5 {
+            std::fs::write(&table, format!("{HEAD}{line}\n100000, 2.2\n")).expect("written");
+            let message = Curves::read(&config, &source).expect_err("it is no law").to_string();
+            let is_at_its_line = message.contains("steel.csv`, line 5") && message.contains(word);
+            assert!(is_at_its_line, "{line}: {message}");
+        }
+        std::fs::write(&table, format!("{HEAD}100000, 2.2\n")).expect("written");
+        let curves = Curves::read(&config, &source).expect("a sound table");
+        assert_eq!(curves.into_files().len(), 1);
+    }
+}

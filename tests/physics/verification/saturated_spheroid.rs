@@ -108,21 +108,22 @@ fn errors(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution, exact: f64)
 /// Below the knee, beyond it, and deep in saturation [T].
 const APPLIED: [f64; 3] = [0.3, 0.6, 0.8];
 
-/// With the refinement of the mesh that each is solved on: first order takes smaller cells.
-const ALL: [((ElementFamily, Order), f64); 3] = [
-    ((ElementFamily::Edge, Order::Linear), 2.0),
-    ((ElementFamily::Edge, Order::Quadratic), 1.0),
-    ((ElementFamily::Nodal, Order::Quadratic), 1.0),
+/// Elements, the refinement of the mesh that they are solved on, and the applied fields: first order takes smaller cells, and one
+/// field tells what second order does.
+const ALL: [((ElementFamily, Order), f64, &[f64]); 3] = [
+    ((ElementFamily::Edge, Order::Linear), 2.0, &APPLIED),
+    ((ElementFamily::Edge, Order::Quadratic), 4.0 / 3.0, &[APPLIED[1]]),
+    ((ElementFamily::Nodal, Order::Quadratic), 4.0 / 3.0, &[APPLIED[1]]),
 ];
 
 #[test]
 fn the_inner_field_of_a_saturated_spheroid_solves_a_scalar_equation() {
     let curve = law();
-    for (elements, refinement) in ALL {
+    for (elements, refinement, fields) in ALL {
         let ball = sphere(&coarse(RADIUS, refinement)).expect("a sound sphere");
         for aspect in [1.0, 1.5] {
             let mesh = stretched(&ball, aspect);
-            for applied in APPLIED {
+            for &applied in fields {
                 let exact = Exact::new(&curve, aspect, applied).flux_density;
                 let model = model(&mesh, elements, &curve, applied);
                 let (solution, _) = model.solve(&mesh).expect("it converges");
@@ -143,9 +144,9 @@ fn the_inner_field_of_a_saturated_spheroid_solves_a_scalar_equation() {
 fn the_energy_of_a_saturated_sphere_changes_with_its_aspect_ratio_as_the_scalar_equation_says() {
     let curve = law();
     let exact_volume = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
-    for (elements, refinement) in ALL {
+    for (elements, refinement, fields) in ALL {
         let mesh = sphere(&coarse(RADIUS, refinement)).expect("a sound sphere");
-        for applied in APPLIED {
+        for &applied in fields {
             let exact = Exact::new(&curve, 1.0, applied);
             let by_aspect = exact_volume * curve.at(exact.flux_density).field_strength * exact.by_aspect;
             let model = model(&mesh, elements, &curve, applied);
