@@ -139,7 +139,7 @@ mod tests {
         let exact: Vec<c64> =
             (0..60).map(|i| c64::new((0.7 * f64::from(i)).sin(), 0.1 * f64::from(i))).collect();
         let right_side = operator(&exact);
-        for most in [400, 25] {
+        for most in [400, 8] {
             let apply = &mut |x: &[c64]| Ok(operator(x));
             let jacobi = &mut |r: &[c64]| -> Result<Vec<c64>, SolverError> {
                 Ok(r.iter().enumerate().map(|(i, r)| r / (3.0 + i as f64)).collect())
