@@ -16,6 +16,7 @@ pub mod shield;
 mod shield_checks;
 pub mod sizing;
 pub mod sphere;
+mod sphere_nodes;
 
 pub use block::{BlockParameters, block};
 pub use boxes::{AxisSize, BoxRegion, BoxesParameters, SurfacePatch, boxes};
