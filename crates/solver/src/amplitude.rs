@@ -24,8 +24,8 @@ use crate::linear::gmres::{self, Ended};
 use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton::{self, MOST_STEPS, NewtonObserver, NewtonProgress, REQUIRED, STAGNATION};
-use crate::nonlinear::Tangents;
 use crate::solution::FieldSolution;
+use crate::tangents::Tangents;
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;

@@ -15,11 +15,11 @@ use crate::error::SolverError;
 use crate::family::{self, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
-use crate::nonlinear::Tangents;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, ElementFamily, Order, Space};
 use crate::surface::SurfaceTerm;
+use crate::tangents::Tangents;
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
 

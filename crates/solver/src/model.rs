@@ -1,96 +1,36 @@
 //! The field problem on a topology: what does not change while the mesh moves.
 //!
-//! Lives here: the set-up and its checks, and what a model has at one frequency (weak form) and at all (spaces with
-//! their unknowns and patterns, sources, analysis of the linear solver). Does not live here: assembly (`discretisation`),
-//! element formulas ([`crate::element`]), the linear solver ([`crate::linear`]), what is done with a solution
-//! ([`crate::solution`], [`crate::functional`]).
+//! Lives here: what a model has at one frequency (weak form) and at all (spaces with their unknowns and patterns, sources,
+//! analysis of the linear solver). Does not live here: what it is made from ([`crate::setup`]), its solution (`solve`), assembly
+//! (`discretisation`), element formulas ([`crate::element`]), the linear solver ([`crate::linear`]), what is done with a
+//! solution ([`crate::solution`], [`crate::functional`]).
 
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
-use crate::amplitude;
 use crate::bh::BhCurve;
-use crate::boundary::{self, Boundary};
-use crate::circuit::{self, Border, Excitation, Winding, Windings};
-use crate::coil::{Coil, Condition, ConditionedSurface, continuity, planes};
+use crate::boundary;
+use crate::circuit::{self, Border, Windings};
+use crate::coil::{Coil, continuity};
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::linear::{
-    DistributedSettings, FieldKind, FieldSystem, LinearSolverCache, LinearSolverSettings, LocalSystem,
-    PreparedSystem, SystemAnalysis, SystemPattern,
+    FieldKind, FieldSystem, LinearSolverCache, LocalSystem, PreparedSystem, SystemAnalysis, SystemPattern,
 };
 use crate::load::Sources;
 use crate::material::Material;
-use crate::newton::{self, NewtonObserver};
-use crate::nonlinear::Tangents;
-use crate::open::{self, OpenRegion, Shell};
-use crate::solution::FieldSolution;
-use crate::space::{ElementFamily, Order, Space};
+use crate::open::{self, Shell};
+use crate::setup::{self, FieldModelSetup};
+use crate::space::Space;
 use crate::surface::{Conductor, SurfaceTerm};
+use crate::tangents::Tangents;
 use crate::unknowns::Unknowns;
 use crate::weak_form::WeakForm;
-
-/// Everything that defines a field problem beside the mesh.
-#[derive(Clone, Debug)]
-pub struct FieldModelSetup {
-    /// Frequency [Hz]; zero for magnetostatics.
-    pub frequency: f64,
-    /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
-    pub penalty: f64,
-    /// What is continuous between elements. Default edge.
-    pub family: ElementFamily,
-    /// Polynomial order of the potentials. Default linear.
-    pub order: Order,
-    /// Material of every region, by `RegionId`.
-    pub materials: Vec<Material>,
-    /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
-    pub remanence: Vec<Point>,
-    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Above 0 Hz it is that of the amplitude. The
-    /// permeability of the region's material is then that of the penalty of nodal elements.
-    pub bh: Vec<Option<Arc<BhCurve>>>,
-    /// Conductors replaced by their surfaces.
-    pub conductors: Vec<Conductor>,
-    /// Coils.
-    pub coils: Vec<Coil>,
-    /// Windings of the coils, by their place in `coils`; shorter where the rest has none.
-    pub windings: Vec<Option<Winding>>,
-    /// Conditions on named surfaces; outer faces without one are natural.
-    pub boundaries: Vec<(String, Boundary)>,
-    /// The region that stands for open space, if one does.
-    pub open: Option<OpenRegion>,
-    /// Linear solver.
-    pub linear_solver: LinearSolverSettings,
-    /// The ranks over which the problem is distributed, and how they solve; `None` for one process.
-    pub ownership: Option<(Ownership, DistributedSettings)>,
-}
-
-impl Default for FieldModelSetup {
-    /// A static problem without anything in it.
-    fn default() -> Self {
-        Self {
-            frequency: 0.0,
-            penalty: 1.0,
-            family: ElementFamily::default(),
-            order: Order::default(),
-            materials: Vec::new(),
-            remanence: Vec::new(),
-            bh: Vec::new(),
-            conductors: Vec::new(),
-            coils: Vec::new(),
-            windings: Vec::new(),
-            boundaries: Vec::new(),
-            open: None,
-            linear_solver: LinearSolverSettings::default(),
-            ownership: None,
-        }
-    }
-}
 
 /// A field problem, ready to be solved on any mesh with its topology.
 ///
@@ -161,7 +101,7 @@ impl FieldModel {
         let sources = Sources::new(mesh, &given, &magnetisation)?;
         let windings = Windings::new(mesh, &setup.coils, &setup.windings, (&fine.space, &fine.unknowns))?;
         let windings = Arc::new(windings);
-        check_sources(mesh, &setup)?;
+        setup::check_coils(mesh, &setup)?;
         let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
         let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
         continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
@@ -203,7 +143,7 @@ impl FieldModel {
 
     /// Checks a set-up; `ω` [rad/s] and the weak form.
     fn weak_form(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(f64, WeakForm), SolverError> {
-        check(mesh, setup)?;
+        setup::check(mesh, setup)?;
         boundary::check_applied(mesh, &setup.boundaries, &setup.conductors)?;
         let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
         let numbers = (angular_frequency, setup.penalty);
@@ -284,72 +224,6 @@ impl FieldModel {
         };
         let (windings, angular_frequency) = (self.windings(), self.angular_frequency);
         PreparedSystem::new(field, |solve| Border::new(windings, angular_frequency, solve))
-    }
-
-    /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
-    ///
-    /// # Errors
-    /// [`SolverError`] when the factorisation or the iteration fails.
-    pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-        if !self.is_linear() {
-            return self.solve_nonlinear(mesh, (&LinearSolverCache::default(), None), &mut |_| {});
-        }
-        let mut system = self.prepare(self.assembled(mesh))?;
-        let state = self.solve_prepared(&mut system, &self.load(mesh))?;
-        Ok((state, system))
-    }
-
-    /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
-    /// adjoint. Of `cache` only the method that worked last takes part; Newton's method begins with `start`, the unknowns of a
-    /// similar state, and where there is none with the field of the linear parts.
-    ///
-    /// # Errors
-    /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].
-    ///
-    /// # Panics
-    /// Where all is linear.
-    pub fn solve_nonlinear(
-        &self,
-        mesh: &Mesh,
-        (cache, start): (&LinearSolverCache, Option<&[c64]>),
-        observer: &mut NewtonObserver<'_>,
-    ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-        assert!(!self.is_linear(), "a model with B–H laws");
-        let solve = if self.angular_frequency > 0.0 { amplitude::solve } else { newton::solve };
-        match solve(self, mesh, (cache, start), observer) {
-            Err(SolverError::Newton { .. }) if start.is_some() => solve(self, mesh, (cache, None), observer),
-            solved => solved,
-        }
-    }
-
-    /// Solves the state problem with a prepared system and a load.
-    ///
-    /// # Errors
-    /// As [`PreparedSystem::solve`].
-    pub fn solve_prepared(
-        &self,
-        system: &mut PreparedSystem,
-        load: &[c64],
-    ) -> Result<FieldSolution, SolverError> {
-        let (values, report, currents) = system.solve_with(load, Excitation::Voltages)?;
-        Ok(FieldSolution::state(values, report).with_currents(currents))
-    }
-
-    /// Solves for 1 A in a winding by its place, which the state then holds as its response; again only where it does not yet.
-    ///
-    /// # Errors
-    /// As [`PreparedSystem::solve_field`].
-    pub fn respond(
-        &self,
-        system: &mut PreparedSystem,
-        winding: usize,
-        state: &mut FieldSolution,
-    ) -> Result<(), SolverError> {
-        if state.response(winding).is_none() {
-            let (values, report) = system.solve_field(self.windings().load(winding))?;
-            state.respond(winding, FieldSolution::adjoint(values, report));
-        }
-        Ok(())
     }
 
     /// What defines the problem.
@@ -484,99 +358,4 @@ impl FieldModel {
     pub(crate) fn sources(&self) -> &Sources {
         &self.shared.sources
     }
-}
-
-/// Refuses coils that meet the outside of the mesh where their source would be wrong.
-fn check_sources(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let mut surfaces = Vec::new();
-    for (name, boundary) in &setup.boundaries {
-        let condition = match boundary {
-            Boundary::FluxParallel => Condition::FluxParallel,
-            Boundary::FluxNormal => Condition::FluxNormal,
-            Boundary::UniformField(_) => Condition::Prescribed,
-        };
-        surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
-    }
-    planes::check(mesh, &setup.coils, &surfaces)
-}
-
-fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let refuse = |what: &str, value: f64, expected: &str| {
-        Err(SolverError::Parameter {
-            what: what.to_owned(),
-            value: value.to_string(),
-            expected: expected.to_owned(),
-        })
-    };
-    if !(setup.frequency >= 0.0 && setup.frequency.is_finite()) {
-        return refuse("frequency", setup.frequency, "a frequency in hertz, zero or more");
-    }
-    if !(setup.penalty > 0.0 && setup.penalty.is_finite()) {
-        return refuse("penalty", setup.penalty, "a positive factor; 1 is right for almost all cases");
-    }
-    let regions = mesh.topology().region_names().len();
-    if setup.materials.len() != regions || setup.remanence.len() > regions {
-        let count = setup.materials.len().max(setup.remanence.len()) as f64;
-        return refuse("number of materials", count, "one material a region, and at most one remanence");
-    }
-    for (material, region) in setup.materials.iter().zip(mesh.topology().region_names()) {
-        let Material { relative_permeability: mu, conductivity: sigma } = *material;
-        if !(mu > 0.0 && mu.is_finite()) {
-            return refuse(&format!("relative_permeability of `{region}`"), mu, "a positive number");
-        }
-        if !(sigma >= 0.0 && sigma.is_finite()) {
-            return refuse(&format!("conductivity of `{region}`"), sigma, "zero or more siemens per metre");
-        }
-    }
-    if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
-        return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
-    }
-    check_laws(setup)?;
-    for conductor in &setup.conductors {
-        if conductor.surface.is_empty() {
-            return Err(SolverError::EmptyRegion {
-                region: conductor.name.clone(),
-                expected: "the surface that replaces a conductor needs faces",
-            });
-        }
-    }
-    Ok(())
-}
-
-/// Refuses B–H laws where they have no meaning.
-fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let refuse = |what: &str, value: String, expected: &str| {
-        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
-    };
-    let has_law = |r: usize| setup.bh.get(r).is_some_and(Option::is_some);
-    if setup.bh.len() > setup.materials.len() {
-        return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");
-    }
-    if !setup.bh.iter().any(Option::is_some) {
-        return Ok(());
-    }
-    let is_driven = setup.windings.iter().flatten().any(|winding| winding.voltage.is_some());
-    if setup.frequency > 0.0 && is_driven {
-        return refuse(
-            "voltage",
-            "of a coil beside a B–H curve".to_owned(),
-            "a given current: above 0 Hz a circuit is solved with linear materials",
-        );
-    }
-    if setup.ownership.is_some() {
-        return refuse(
-            "ranks",
-            "several".to_owned(),
-            "one process: a B–H curve is solved by Newton's method in one",
-        );
-    }
-    if let Some(r) = (0..setup.remanence.len()).find(|&r| has_law(r) && setup.remanence[r] != [0.0; 3]) {
-        let remanence = format!("{:?}", setup.remanence[r]);
-        return refuse(
-            "remanence",
-            remanence,
-            "a material with a permeability: a magnet has a straight recoil line",
-        );
-    }
-    Ok(())
 }

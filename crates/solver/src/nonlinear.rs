@@ -18,30 +18,10 @@ use crate::element::tensor::MOST_POINTS;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+use crate::tangents::Tangents;
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
-
-/// `∂H/∂B − ν_r` [m/H] at the points of every element with a law.
-#[derive(Debug)]
-pub(crate) struct Tangents {
-    /// Ascending.
-    elements: Vec<ElementId>,
-    tensors: Vec<[Tangent; MOST_POINTS]>,
-}
-
-impl Tangents {
-    /// Those of some elements, ascending.
-    pub(crate) fn new(elements: Vec<ElementId>, tensors: Vec<[Tangent; MOST_POINTS]>) -> Self {
-        Self { elements, tensors }
-    }
-
-    /// Those of an element; `None` where its material is linear.
-    #[inline]
-    pub(crate) fn of(&self, e: ElementId) -> Option<&[Tangent; MOST_POINTS]> {
-        self.elements.binary_search(&e).ok().map(|position| &self.tensors[position])
-    }
-}
 
 /// What the laws add in one state.
 pub(crate) struct Added {
@@ -68,7 +48,7 @@ pub(crate) fn added(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> A
             }
         }
     }
-    Added { energy, residual, tangents: Tangents { elements: elements.to_vec(), tensors } }
+    Added { energy, residual, tangents: Tangents::new(elements.to_vec(), tensors) }
 }
 
 /// Energy with its derivatives, and tensors, of one element.

@@ -27,7 +27,7 @@ use crate::element::tabulated::Rule;
 use crate::element::tensor::{Tensor, TensorField};
 use crate::error::SolverError;
 use crate::material::Material;
-use crate::model::FieldModelSetup;
+use crate::setup::FieldModelSetup;
 
 /// A region of the mesh that stands for the space outside.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -124,7 +124,8 @@ mod tests {
     use crate::boundary::Boundary;
     use crate::linear::transfer::Transfer;
     use crate::material::Material;
-    use crate::model::{FieldModel, FieldModelSetup};
+    use crate::model::FieldModel;
+    use crate::setup::FieldModelSetup;
     use crate::space::{ElementFamily, Order};
     use crate::unknowns::Conductors;
 

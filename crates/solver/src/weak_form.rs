@@ -16,10 +16,10 @@ use crate::element::volume::Coefficients;
 use crate::error::SolverError;
 use crate::family::{Cell, Matrices};
 use crate::material::Material;
-use crate::nonlinear::Tangents;
 use crate::open::{OpenRegion, Shell, Stretch};
 use crate::space::{ElementFamily, Order};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
+use crate::tangents::Tangents;
 use crate::unknowns::Conductors;
 
 /// Coefficients of the weak form at one frequency.

@@ -1,0 +1,170 @@
+//! What a field problem is made from beside the mesh, and what is refused of it before anything is computed.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::parallel::Ownership;
+use fluxmorph_geometry::tet4::Point;
+
+use crate::bh::BhCurve;
+use crate::boundary::Boundary;
+use crate::circuit::Winding;
+use crate::coil::{Coil, Condition, ConditionedSurface, planes};
+use crate::error::SolverError;
+use crate::linear::{DistributedSettings, LinearSolverSettings};
+use crate::material::Material;
+use crate::open::OpenRegion;
+use crate::space::{ElementFamily, Order};
+use crate::surface::Conductor;
+
+/// Everything that defines a field problem beside the mesh.
+#[derive(Clone, Debug)]
+pub struct FieldModelSetup {
+    /// Frequency [Hz]; zero for magnetostatics.
+    pub frequency: f64,
+    /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
+    pub penalty: f64,
+    /// What is continuous between elements. Default edge.
+    pub family: ElementFamily,
+    /// Polynomial order of the potentials. Default linear.
+    pub order: Order,
+    /// Material of every region, by `RegionId`.
+    pub materials: Vec<Material>,
+    /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
+    pub remanence: Vec<Point>,
+    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Above 0 Hz it is that of the amplitude. The
+    /// permeability of the region's material is then that of the penalty of nodal elements.
+    pub bh: Vec<Option<Arc<BhCurve>>>,
+    /// Conductors replaced by their surfaces.
+    pub conductors: Vec<Conductor>,
+    /// Coils.
+    pub coils: Vec<Coil>,
+    /// Windings of the coils, by their place in `coils`; shorter where the rest has none.
+    pub windings: Vec<Option<Winding>>,
+    /// Conditions on named surfaces; outer faces without one are natural.
+    pub boundaries: Vec<(String, Boundary)>,
+    /// The region that stands for open space, if one does.
+    pub open: Option<OpenRegion>,
+    /// Linear solver.
+    pub linear_solver: LinearSolverSettings,
+    /// The ranks over which the problem is distributed, and how they solve; `None` for one process.
+    pub ownership: Option<(Ownership, DistributedSettings)>,
+}
+
+impl Default for FieldModelSetup {
+    /// A static problem without anything in it.
+    fn default() -> Self {
+        Self {
+            frequency: 0.0,
+            penalty: 1.0,
+            family: ElementFamily::default(),
+            order: Order::default(),
+            materials: Vec::new(),
+            remanence: Vec::new(),
+            bh: Vec::new(),
+            conductors: Vec::new(),
+            coils: Vec::new(),
+            windings: Vec::new(),
+            boundaries: Vec::new(),
+            open: None,
+            linear_solver: LinearSolverSettings::default(),
+            ownership: None,
+        }
+    }
+}
+
+/// Refuses coils that meet the outside of the mesh where their source would be wrong.
+pub(crate) fn check_coils(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let mut surfaces = Vec::new();
+    for (name, boundary) in &setup.boundaries {
+        let condition = match boundary {
+            Boundary::FluxParallel => Condition::FluxParallel,
+            Boundary::FluxNormal => Condition::FluxNormal,
+            Boundary::UniformField(_) => Condition::Prescribed,
+        };
+        surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
+    }
+    planes::check(mesh, &setup.coils, &surfaces)
+}
+
+/// Refuses numbers out of range.
+pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let refuse = |what: &str, value: f64, expected: &str| {
+        Err(SolverError::Parameter {
+            what: what.to_owned(),
+            value: value.to_string(),
+            expected: expected.to_owned(),
+        })
+    };
+    if !(setup.frequency >= 0.0 && setup.frequency.is_finite()) {
+        return refuse("frequency", setup.frequency, "a frequency in hertz, zero or more");
+    }
+    if !(setup.penalty > 0.0 && setup.penalty.is_finite()) {
+        return refuse("penalty", setup.penalty, "a positive factor; 1 is right for almost all cases");
+    }
+    let regions = mesh.topology().region_names().len();
+    if setup.materials.len() != regions || setup.remanence.len() > regions {
+        let count = setup.materials.len().max(setup.remanence.len()) as f64;
+        return refuse("number of materials", count, "one material a region, and at most one remanence");
+    }
+    for (material, region) in setup.materials.iter().zip(mesh.topology().region_names()) {
+        let Material { relative_permeability: mu, conductivity: sigma } = *material;
+        if !(mu > 0.0 && mu.is_finite()) {
+            return refuse(&format!("relative_permeability of `{region}`"), mu, "a positive number");
+        }
+        if !(sigma >= 0.0 && sigma.is_finite()) {
+            return refuse(&format!("conductivity of `{region}`"), sigma, "zero or more siemens per metre");
+        }
+    }
+    if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
+        return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
+    }
+    check_laws(setup)?;
+    for conductor in &setup.conductors {
+        if conductor.surface.is_empty() {
+            return Err(SolverError::EmptyRegion {
+                region: conductor.name.clone(),
+                expected: "the surface that replaces a conductor needs faces",
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses B–H laws where they have no meaning.
+fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let refuse = |what: &str, value: String, expected: &str| {
+        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
+    };
+    let has_law = |r: usize| setup.bh.get(r).is_some_and(Option::is_some);
+    if setup.bh.len() > setup.materials.len() {
+        return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");
+    }
+    if !setup.bh.iter().any(Option::is_some) {
+        return Ok(());
+    }
+    let is_driven = setup.windings.iter().flatten().any(|winding| winding.voltage.is_some());
+    if setup.frequency > 0.0 && is_driven {
+        return refuse(
+            "voltage",
+            "of a coil beside a B–H curve".to_owned(),
+            "a given current: above 0 Hz a circuit is solved with linear materials",
+        );
+    }
+    if setup.ownership.is_some() {
+        return refuse(
+            "ranks",
+            "several".to_owned(),
+            "one process: a B–H curve is solved by Newton's method in one",
+        );
+    }
+    if let Some(r) = (0..setup.remanence.len()).find(|&r| has_law(r) && setup.remanence[r] != [0.0; 3]) {
+        let remanence = format!("{:?}", setup.remanence[r]);
+        return refuse(
+            "remanence",
+            remanence,
+            "a material with a permeability: a magnet has a straight recoil line",
+        );
+    }
+    Ok(())
+}

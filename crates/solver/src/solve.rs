@@ -1,0 +1,80 @@
+//! The state of a field problem on a mesh: by one linear system, or with B–H laws by Newton's method.
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+
+use crate::amplitude;
+use crate::circuit::Excitation;
+use crate::error::SolverError;
+use crate::linear::{LinearSolverCache, PreparedSystem};
+use crate::model::FieldModel;
+use crate::newton::{self, NewtonObserver};
+use crate::solution::FieldSolution;
+
+impl FieldModel {
+    /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
+    ///
+    /// # Errors
+    /// [`SolverError`] when the factorisation or the iteration fails.
+    pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+        if !self.is_linear() {
+            return self.solve_nonlinear(mesh, (&LinearSolverCache::default(), None), &mut |_| {});
+        }
+        let mut system = self.prepare(self.assembled(mesh))?;
+        let state = self.solve_prepared(&mut system, &self.load(mesh))?;
+        Ok((state, system))
+    }
+
+    /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
+    /// adjoint. Of `cache` only the method that worked last takes part; Newton's method begins with `start`, the unknowns of a
+    /// similar state, and where there is none with the field of the linear parts.
+    ///
+    /// # Errors
+    /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].
+    ///
+    /// # Panics
+    /// Where all is linear.
+    pub fn solve_nonlinear(
+        &self,
+        mesh: &Mesh,
+        (cache, start): (&LinearSolverCache, Option<&[c64]>),
+        observer: &mut NewtonObserver<'_>,
+    ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+        assert!(!self.is_linear(), "a model with B–H laws");
+        let solve = if self.angular_frequency() > 0.0 { amplitude::solve } else { newton::solve };
+        match solve(self, mesh, (cache, start), observer) {
+            Err(SolverError::Newton { .. }) if start.is_some() => solve(self, mesh, (cache, None), observer),
+            solved => solved,
+        }
+    }
+
+    /// Solves the state problem with a prepared system and a load.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub fn solve_prepared(
+        &self,
+        system: &mut PreparedSystem,
+        load: &[c64],
+    ) -> Result<FieldSolution, SolverError> {
+        let (values, report, currents) = system.solve_with(load, Excitation::Voltages)?;
+        Ok(FieldSolution::state(values, report).with_currents(currents))
+    }
+
+    /// Solves for 1 A in a winding by its place, which the state then holds as its response; again only where it does not yet.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve_field`].
+    pub fn respond(
+        &self,
+        system: &mut PreparedSystem,
+        winding: usize,
+        state: &mut FieldSolution,
+    ) -> Result<(), SolverError> {
+        if state.response(winding).is_none() {
+            let (values, report) = system.solve_field(self.windings().load(winding))?;
+            state.respond(winding, FieldSolution::adjoint(values, report));
+        }
+        Ok(())
+    }
+}
