@@ -120,7 +120,7 @@ impl FieldModel {
             return Err(refuse(
                 "elements",
                 "nodal, beside a re-entrant edge of a wall that no flux passes",
-                "edge elements: nodal ones of second order are as far off there as those of first, and an estimate says too little",
+                "edge elements: the walls' term of nodal ones differs between the orders, and an estimate says too little",
             ));
         }
         if self.setup().ownership.is_some() {

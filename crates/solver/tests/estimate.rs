@@ -9,10 +9,8 @@ use fluxmorph_geometry::refine::{RefineLimits, uniform};
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
-use fluxmorph_solver::functional::{Observed, Weighting};
-use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
-    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
     SurfaceLaw,
 };
 
@@ -72,12 +70,6 @@ fn solved(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 
     functional.evaluate(&model, mesh, &state).expect("a number").value
 }
 
-fn observed(mesh: &Mesh) -> Functional {
-    let far = mesh.topology().region("far").expect("a region");
-    let observed = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
-    Functional::observation(mesh, far, observed).expect("a functional")
-}
-
 /// Effectivity between one half and two, and what elements add makes up the whole.
 fn assert_effective(what: &str, [value, estimated, sum]: [f64; 3], exact: f64) {
     let effectivity = estimated / (exact - value);
@@ -86,76 +78,19 @@ fn assert_effective(what: &str, [value, estimated, sum]: [f64; 3], exact: f64) {
     assert!((sum - estimated).abs() < 0.1 * estimated.abs(), "{what}: {sum:e} {estimated:e}");
 }
 
-/// Second order is as far off at that edge as first: the estimate would be a seventeenth of the error.
+/// The wall's term has another coefficient in second order: the estimate would be a seventeenth of the error.
 #[test]
 fn nodal_elements_at_a_singular_edge_have_no_estimate_and_say_so() {
     let (mesh, exposed) = square().without_region(RegionId(1)).expect("what is left");
     let conductor = Conductor { name: "block".to_owned(), surface: exposed, law: SurfaceLaw::Perfect };
-    let functional = observed(&mesh);
-    let b = 2500.0 * 0.163_333_333_333_333_33 * VACUUM_PERMEABILITY / 3.0;
-    let exact = b * b * 0.6 * 0.6 * 0.1;
-    for frequency in [0.0, 50.0] {
-        let of = |order| FieldModelSetup {
-            conductors: vec![conductor.clone()],
-            ..setup((ElementFamily::Nodal, order), frequency)
-        };
-        let [first, second] = [Order::Linear, Order::Quadratic].map(|o| solved(&mesh, &of(o), &functional));
-        println!("first order {first:.4e}, second {second:.4e}, exact {exact:.4e}");
-        assert!(
-            (second - first).abs() < 0.2 * (exact - first).abs(),
-            "an estimate would have been worth something"
-        );
-        let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
-        let error = model.enriched(&mesh, Effort::Any).expect_err("no estimate").to_string();
-        assert!(error.contains("re-entrant edge") && error.contains("edge elements"), "{error}");
-    }
-}
-
-/// Around the edge of a perfect conductor into the shadow behind it, whose field is known exactly: with `r^(2/3)` at the edge.
-#[test]
-fn the_error_of_edge_elements_at_a_singular_edge_is_estimated() {
-    let (mesh, exposed) = square().without_region(RegionId(1)).expect("what is left");
-    let conductor = Conductor { name: "block".to_owned(), surface: exposed, law: SurfaceLaw::Perfect };
-    let b = 2500.0 * 0.163_333_333_333_333_33 * VACUUM_PERMEABILITY / 3.0;
-    let exact = b * b * 0.6 * 0.6 * 0.1;
     for frequency in [0.0, 50.0] {
         let setup = FieldModelSetup {
             conductors: vec![conductor.clone()],
-            ..setup((ElementFamily::Edge, Order::Linear), frequency)
+            ..setup((ElementFamily::Nodal, Order::Linear), frequency)
         };
-        let found = estimate(&mesh, &setup, &observed(&mesh));
-        assert_effective(&format!("edge, perfect conductor, {frequency} Hz"), found, exact);
-    }
-}
-
-/// Iron that saturates: the error that is left is that of a nonlinear field.
-#[test]
-fn the_error_of_saturated_iron_is_estimated_for_both_families() {
-    let mesh = square();
-    let fine = uniform(&mesh, RefineLimits::default()).expect("eight for each");
-    let point = |i: i32| {
-        let h = 20.0 * (1.3_f64.powi(i) - 1.0);
-        [h, VACUUM_PERMEABILITY * h + 0.02 * (1.0 - (-h / 100.0).exp())]
-    };
-    let law = Arc::new(BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table"));
-    for family in [ElementFamily::Edge, ElementFamily::Nodal] {
-        for ampere_turns in [1e3, 2e4] {
-            let iron = Material { relative_permeability: 100.0, conductivity: 0.0 };
-            let of = |order| {
-                let mut setup = setup((family, order), 0.0);
-                setup.coils[0].ampere_turns = c64::from(ampere_turns);
-                let materials = vec![Material::AIR, iron, Material::AIR];
-                FieldModelSetup { materials, bh: vec![None, Some(law.clone())], ..setup }
-            };
-            let functional = observed(&mesh);
-            let found = estimate(&mesh, &of(Order::Linear), &functional);
-            let second = solved(&mesh, &of(Order::Quadratic), &functional);
-            let difference = second - found[0];
-            let reference = solved(fine.mesh(), &of(Order::Quadratic), &observed(fine.mesh()));
-            println!("second order {second:.4e}, estimated {:.4e}", found[0] + found[1]);
-            assert!((found[1] - difference).abs() < 0.05 * difference.abs(), "{} {difference}", found[1]);
-            assert_effective(&format!("{family:?}, {ampere_turns} A"), found, reference);
-        }
+        let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+        let error = model.enriched(&mesh, Effort::Any).expect_err("no estimate").to_string();
+        assert!(error.contains("re-entrant edge") && error.contains("edge elements"), "{error}");
     }
 }
 
