@@ -10,8 +10,7 @@ use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::{
-    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
-    SurfaceLaw,
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
 };
 
 /// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
