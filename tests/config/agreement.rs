@@ -67,7 +67,7 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
         ],
     ),
     ("directions", &["has no part across the axis", "leaves the symmetry plane"]),
-    ("an algorithm without constraints", &["cannot keep constraints"]),
+    ("an algorithm without constraints", &["cannot keep constraints", "has no bound on the terms"]),
     ("options of PETSc", &["`analysis.petsc.options`"]),
     ("what edge elements have not", &["for edge elements", "edge elements have"]),
 ];

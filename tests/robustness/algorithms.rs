@@ -63,6 +63,7 @@ fn record(number: usize, p: &[f64], constrained: bool) -> Record {
         design: p.to_vec(),
         gradient,
         constraints: if constrained { vec![constraint] } else { Vec::new() },
+        members: Vec::new(),
         reference: String::new(),
         methods: Vec::new(),
         worst_residual: 0.0,
@@ -87,6 +88,7 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
         lower: vec![-0.005; VARIABLES],
         upper: vec![0.02; VARIABLES],
         constraints: identity.constraints,
+        members: 0,
         ftol_rel: 0.0,
         xtol_rel: 0.0,
         first_step: 0.1,
@@ -123,7 +125,12 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
             }
         };
         count += 1;
-        Ok(Sample { value: record.row.objective, gradient: record.gradient, constraints: record.constraints })
+        Ok(Sample {
+            value: record.row.objective,
+            gradient: record.gradient,
+            constraints: record.constraints,
+            members: Vec::new(),
+        })
     });
     let bytes = disk.files(Path::new("/run")).remove(Path::new("journal.jsonl")).expect("a journal");
     (bytes, computed)

@@ -13,7 +13,8 @@ use fluxmorph_solver::functional::{self, AtTerminals, Inductive, Observed, Weigh
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use crate::config::{
-    self, BodyKind, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap, ValueBound,
+    self, BodyKind, Combination, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap,
+    ValueBound,
 };
 use crate::error::Error;
 
@@ -188,14 +189,25 @@ pub(super) fn objective(
     states: &[FieldModel],
 ) -> Result<Option<WeightedSum>, Error> {
     let Some(objective) = &config.objective else { return Ok(None) };
-    let terms = objective
-        .terms()
-        .iter()
-        .map(|written| {
-            Ok(Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? })
-        })
-        .collect::<Result<_, Error>>()?;
-    Ok(Some(WeightedSum { goal: objective.goal, terms }))
+    let mut terms = Vec::new();
+    for written in objective.terms() {
+        let own = Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? };
+        match objective.combine {
+            Combination::Sum => terms.push(own),
+            Combination::WorstCase => terms.extend(at_each_frequency(config, &own)),
+        }
+    }
+    Ok(Some(WeightedSum { goal: objective.goal, combination: objective.combine, terms }))
+}
+
+/// A term on each of its states alone.
+fn at_each_frequency(config: &Config, term: &Term) -> Vec<Term> {
+    let frequencies = config.analysis.frequencies();
+    let at = |&state: &usize| {
+        let label = Label { frequency: frequencies.get(state).copied(), ..term.label.clone() };
+        Term { states: vec![state], label, ..term.clone() }
+    };
+    term.states.iter().map(at).collect()
 }
 
 /// A functional on the states that it is taken at, with the weight one.

@@ -1,4 +1,4 @@
-//! What is optimised: a weighted sum of functionals over the states of a problem.
+//! What is optimised: a weighted sum of functionals over the states of a problem, or the worst of several.
 
 use fluxmorph_solver::Functional;
 
@@ -38,13 +38,35 @@ pub struct Label {
     pub frequency: Option<f64>,
 }
 
-/// `F = Σ_t w_t Σ_s F_t(state s)`.
+/// What the terms make together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Combination {
+    /// Their sum.
+    #[default]
+    Sum,
+    /// The worst of them: the largest where it is minimised, the least where it is maximised. It has kinks, so that a method sees
+    /// a bound on all of them instead, which it moves ([`crate::nlopt`]).
+    WorstCase,
+}
+
+/// `F = Σ_t w_t Σ_s F_t(state s)`, or the worst of the weighted terms.
 #[derive(Clone, Debug)]
 pub struct WeightedSum {
     /// Which way is better.
     pub goal: Goal,
+    /// Sum or worst case.
+    pub combination: Combination,
     /// The terms, at least one.
     pub terms: Vec<Term>,
+}
+
+impl WeightedSum {
+    /// The place of the worst of some weighted values; of equal ones the first. At least one.
+    pub fn worst(&self, values: &[f64]) -> usize {
+        let sign = self.goal.sign();
+        (1..values.len()).fold(0, |worst, k| if sign * values[k] > sign * values[worst] { k } else { worst })
+    }
 }
 
 impl Goal {

@@ -8,3 +8,4 @@ mod finite;
 mod first_steps;
 mod geometric;
 mod guards;
+mod worst_case;

@@ -69,7 +69,10 @@ table! {
 
 /// A current or a voltage, and windings for circuits.
 fn keys_of_the_drive(rules: Rules) -> Rules {
+    // A coil that is open must have terminals.
+    let open = json!({ "required": ["ampere_turns"], "properties": { "ampere_turns": { "const": 0 } } });
     let rules = rules.exactly_one(&["ampere_turns", "voltage"]);
+    let rules = rules.add(json!({ "if": open, "then": { "required": ["turns"] } }));
     let rules = rules.needs("voltage", &["turns"]).needs("resistance", &["turns"]);
     rules.needs("series_inductance", &["voltage"]).needs("series_capacitance", &["voltage"])
 }

@@ -15,7 +15,7 @@ use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
 use super::multipole::MultipoleSet;
-use super::objective::{Objective, Probe};
+use super::objective::{Combination, Objective, Probe};
 use super::open::Open;
 use super::optimizer::Optimizer;
 use super::output::Output;
@@ -125,6 +125,14 @@ impl Config {
         {
             let message = format!("`{}` cannot keep constraints", self.optimizer.algorithm.name());
             section.wrong("algorithm", message, "mma, ccsaq or slsqp, or no [[constraints]]");
+        }
+        if self.objective.as_ref().is_some_and(|objective| objective.combine == Combination::WorstCase)
+            && !self.optimizer.algorithm.takes_constraints()
+            && let Some(section) = root.inner("optimizer")
+        {
+            let message =
+                format!("`{}` has no bound on the terms of a worst case", self.optimizer.algorithm.name());
+            section.wrong("algorithm", message, "mma, ccsaq or slsqp, or objective.combine = \"sum\"");
         }
         let probes = self.probes.iter().map(|probe| &probe.name);
         root.named_twice("probes", probes, "probes", "a different name for each probe");

@@ -46,7 +46,7 @@ pub use morph::{
     Target, Tune, TunedParameter,
 };
 pub use multipole::{ExpansionShape, MultipoleSet};
-pub use objective::{Goal, Objective, Probe, Sum, Term};
+pub use objective::{Combination, Goal, Objective, Probe, Sum, Term};
 pub use open::Open;
 pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};
 pub use output::{FieldsKept, Output};

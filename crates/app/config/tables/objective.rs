@@ -25,8 +25,8 @@ const OF_A_TERM: [&str; 10] = [
 
 table! {
     /// What is made small or large; needed by `run` and `gradient`. Either one functional, with its keys in `[objective]`
-    /// itself, or a weighted sum of several, each in `[[objective.terms]]`: the objective is then Σ `weight` · value, and only
-    /// `goal` stays in `[objective]`.
+    /// itself, or several, each in `[[objective.terms]]`: the objective is then Σ `weight` · value, or the worst of them, and only
+    /// `goal` and `combine` stay in `[objective]`.
     ///
     /// The objective of the initial design must not be zero: a method sees the objective over its size there.
     ///
@@ -39,7 +39,10 @@ table! {
     pub struct Objective {
         /// Which way is better. Most objectives are errors, fields or losses.
         goal: Goal = WORD => Goal::Minimise;
-        /// What is summed.
+        /// What the terms make together. In a worst case a term without `frequency` is one at each frequency; with the algorithms `mma`,
+        /// `ccsaq` and `slsqp`.
+        combine: Combination = WORD => Combination::Sum;
+        /// What is combined.
         #[serde(flatten)]
         sum: Sum = KEYS;
     }
@@ -69,6 +72,16 @@ choice! {
         Minimise = "minimise",
         /// Larger.
         Maximise = "maximise",
+    }
+}
+
+choice! {
+    /// What several terms make together.
+    pub use fluxmorph_optimizer::objective as Combination {
+        /// Σ `weight` · value.
+        Sum = "sum",
+        /// The worst of `weight` · value: the largest where it is minimised, the least where it is maximised.
+        WorstCase = "worst_case",
     }
 }
 

@@ -47,6 +47,7 @@ pub(super) fn record(number: usize) -> Record {
         design: vec![x, -0.0, f64::MIN_POSITIVE],
         gradient: vec![1.0 / 3.0, x, -x],
         constraints: vec![(x, vec![0.1, 0.2, 0.3])],
+        members: vec![(-x, vec![0.4, 0.5, 0.6])],
         reference: "3".repeat(64),
         methods: vec![None, Some(Method::Direct), Some(Method::TwoLevel)],
         worst_residual: 1e-12,

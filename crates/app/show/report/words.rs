@@ -2,8 +2,8 @@
 
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
-    Algorithm, BodyKind, Compared, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal,
-    Limit, ObjectiveKind, ValueBound, Weighting,
+    Algorithm, BodyKind, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord,
+    Functional, Goal, Limit, ObjectiveKind, ValueBound, Weighting,
 };
 
 /// What is made small or large.
@@ -21,7 +21,14 @@ pub(super) fn objective(config: &Config) -> Option<String> {
             if term.weight == 1.0 { what } else { format!("{} times {what}", number(term.weight, 3)) }
         })
         .collect();
-    Some(format!("{goal} {}", terms.join(", plus ")))
+    Some(match (objective.combine, objective.goal) {
+        (Combination::Sum, _) => format!("{goal} {}", terms.join(", plus ")),
+        (Combination::WorstCase, goal_word) => {
+            let worst = if goal_word == Goal::Minimise { "largest" } else { "least" };
+            let where_from = if config.analysis.frequencies().len() > 1 { " and frequency" } else { "" };
+            format!("{goal} the {worst}, by term{where_from}, of {}", terms.join(", and "))
+        }
+    })
 }
 
 /// A functional of the field.

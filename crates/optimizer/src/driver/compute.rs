@@ -77,7 +77,7 @@ impl Run<'_> {
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
         // Before anything of it is kept.
-        sample.check(p.len(), self.constraint_count())?;
+        sample.check(p.len(), self.constraint_count(), self.member_count())?;
         let comparison = self.compare(objective, &sample);
         record.improved = comparison.is_improved();
         record.row.iteration = self.iterations_after(comparison);
@@ -163,6 +163,11 @@ impl Run<'_> {
             constraints: constraints
                 .map(|(bound, (value, gradient))| (bound.excess(*value), bound.gradient(gradient)))
                 .collect(),
+            members: record
+                .members
+                .iter()
+                .map(|(value, gradient)| (scale * value, gradient.iter().map(|d| scale * d).collect()))
+                .collect(),
         }
     }
 
@@ -217,6 +222,7 @@ impl Run<'_> {
             design: p.to_vec(),
             gradient,
             constraints: analysis.constraints.iter().map(constraint).collect(),
+            members: analysis.members.iter().map(constraint).collect(),
             reference: reference_hash(shape.motion().reference()),
             methods: self.cache.methods(),
             worst_residual: analysis.worst_residual,

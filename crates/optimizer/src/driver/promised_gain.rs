@@ -16,7 +16,11 @@ const SWEEPS: usize = 50;
 /// The gain between the bounds, relative to the value of the sample.
 pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
     let mut gradient = sample.gradient.clone();
-    remove_held(&mut gradient, &sample.constraints);
+    // The worst case may fall only as far as the other terms stay below it.
+    let difference = |of: &[f64]| of.iter().zip(&sample.gradient).map(|(own, worst)| own - worst).collect();
+    let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
+    let holding: Vec<(f64, Vec<f64>)> = sample.constraints.iter().cloned().chain(others).collect();
+    remove_held(&mut gradient, &holding);
     let gain = |k: usize| {
         let room = if gradient[k] > 0.0 { design[k] - lower[k] } else { upper[k] - design[k] };
         gradient[k].abs() * room.max(0.0)
@@ -49,7 +53,8 @@ mod tests {
     use super::*;
 
     fn sample(gradient: &[f64], constraints: &[(f64, Vec<f64>)]) -> Sample {
-        Sample { value: -0.5, gradient: gradient.to_vec(), constraints: constraints.to_vec() }
+        let (gradient, constraints) = (gradient.to_vec(), constraints.to_vec());
+        Sample { value: -0.5, gradient, constraints, members: Vec::new() }
     }
 
     #[test]
@@ -66,6 +71,12 @@ mod tests {
         assert!(gain(&sample(&[-0.1, -0.2], &[(-0.5, vec![1.0, 2.0])]), [0.0, 0.0]) > 0.5);
         // A constraint does not hold what leads away from it.
         assert!((gain(&sample(&[0.1, 0.2], &[(0.0, vec![1.0, 2.0])]), [0.0, 0.0]) - 0.6).abs() < 1e-15);
+        // Of two terms of a worst case whose gradients oppose each other, neither can fall.
+        let mut kink = sample(&[-0.3, 0.0], &[]);
+        kink.members = vec![(-0.5, vec![-0.3, 0.0]), (-0.5, vec![0.1, 0.0])];
+        assert!(gain(&kink, [0.0, 0.0]) < 1e-9);
+        kink.members[1].0 = -0.6;
+        assert!(gain(&kink, [0.0, 0.0]) > 0.5);
         // Two that hold it together.
         let two = [(0.0, vec![1.0, 0.0]), (0.0, vec![1.0, 1.0])];
         assert!(gain(&sample(&[-0.3, -0.2], &two), [0.0, 0.0]) < 1e-9);

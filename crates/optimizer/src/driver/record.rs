@@ -20,6 +20,9 @@ pub struct Record {
     pub gradient: Vec<f64>,
     /// What the constraints measure, in SI, with the derivatives by the variables.
     pub constraints: Vec<(f64, Vec<f64>)>,
+    /// Of a worst case: its terms with their weights, in SI, with the derivatives by the variables.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub members: Vec<(f64, Vec<f64>)>,
     /// [`reference_hash`] of the round's reference mesh.
     pub reference: String,
     /// The method of the linear solver that worked last, by state; `None` where it is the first one.

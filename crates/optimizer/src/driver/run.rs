@@ -11,7 +11,7 @@ use super::search::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
-use crate::objective::Goal;
+use crate::objective::{Combination, Goal};
 use crate::problem::{Analysis, Problem, RoundEvent, RoundStart, Shape, SolverCache, Timings};
 
 /// The state of one optimisation.
@@ -112,6 +112,12 @@ impl<'a> Run<'a> {
 
     pub(super) fn constraint_count(&self) -> usize {
         self.problem.constraints().len()
+    }
+
+    /// Terms of a worst case; none of a sum.
+    pub(super) fn member_count(&self) -> usize {
+        let worst = self.problem.objective().filter(|own| own.combination == Combination::WorstCase);
+        worst.map_or(0, |objective| objective.terms.len())
     }
 
     /// Constraints that the method sees: those of the problem, and the room of a mesh on rails.

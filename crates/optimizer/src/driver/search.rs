@@ -122,6 +122,7 @@ impl<'a> Search<'a> {
             lower,
             upper,
             constraints: run.method_constraint_count(),
+            members: run.member_count(),
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
             first_step: self.settings.first_step,

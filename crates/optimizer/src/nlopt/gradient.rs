@@ -4,7 +4,8 @@
 //! one after the other, in an order of its own: the first question evaluates the design, the others are answered from
 //! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
 //! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
-//! thrown away. A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
+//! thrown away. The worst of several terms is minimised as a bound `t` on all of them, a further variable that only NLopt knows:
+//! `t` is the objective, and `f_i − t ≤ 0` are constraints (epigraph form; Boyd and Vandenberghe, Convex Optimization, 4.1.3). A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
 //! NLopt's that is not finite, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
 //! caught here and resumed after NLopt has returned.
 
@@ -13,11 +14,12 @@ use std::cell::RefCell;
 use ::nlopt::{FailState, SuccessState, Target};
 
 use super::first_step::Start;
+use super::level::Level;
 use super::{PanicGuard, STOP_VALUE};
 use crate::error::Error;
 
 /// Span between the bounds that the variables are scaled to: the paper's plate (−5 … 20 mm) in millimetres.
-const SCALED_SPAN: f64 = 25.0;
+pub(super) const SCALED_SPAN: f64 = 25.0;
 
 /// Largest magnitude of a number that NLopt is shown: its methods square and multiply what is of order one at the start.
 const LARGEST: f64 = 1e100;
@@ -35,6 +37,8 @@ pub struct Sample {
     pub gradient: Vec<f64>,
     /// Values of the constraints, satisfied where ≤ 0 and of order one, with their gradients.
     pub constraints: Vec<(f64, Vec<f64>)>,
+    /// Of a worst case: the terms of which `value` is the largest, with their gradients.
+    pub members: Vec<(f64, Vec<f64>)>,
 }
 
 impl Sample {
@@ -42,8 +46,8 @@ impl Sample {
     ///
     /// # Errors
     /// [`Error::NotFinite`] names the first number that is none, or is beyond every range; [`Error::Optimisation`] where
-    /// there is not one derivative a variable, or another number of constraints.
-    pub fn check(&self, variables: usize, constraints: usize) -> Result<(), Error> {
+    /// there is not one derivative a variable, or another number of constraints or terms of a worst case.
+    pub fn check(&self, variables: usize, constraints: usize, members: usize) -> Result<(), Error> {
         let refuse = |what: String, value: f64| {
             let expected = "expected a finite number below 1e100 after division by the initial design's value; check weights, \
                             bounds of constraints and units";
@@ -65,10 +69,17 @@ impl Sample {
             return refuse("the relative objective".to_owned(), self.value);
         }
         derivatives("the relative objective", &self.gradient)?;
-        if self.constraints.len() != constraints {
+        if self.constraints.len() != constraints || self.members.len() != members {
             return Err(Error::Optimisation {
-                cause: "an evaluation gives another number of constraints than was announced to the method",
+                cause: "an evaluation gives another number of constraints or terms than was announced to the method",
             });
+        }
+        for (number, (value, gradient)) in self.members.iter().enumerate() {
+            let name = format!("term {number} of the relative objective");
+            derivatives(&name, gradient)?;
+            if !is_sound(*value) {
+                return refuse(name, *value);
+            }
         }
         for (number, (value, gradient)) in self.constraints.iter().enumerate() {
             let name = format!("constraint {number}, relative to its bound,");
@@ -92,6 +103,8 @@ pub struct Minimisation {
     pub upper: Vec<f64>,
     /// Inequality constraints; only where the method takes them.
     pub constraints: usize,
+    /// Terms of a worst case; 0 for an objective without kinks.
+    pub members: usize,
     /// Relative change of the objective below which the method stops; 0 is off.
     pub ftol_rel: f64,
     /// Relative change of the variables below which the method stops; 0 is off.
@@ -193,6 +206,7 @@ pub fn minimise<E: From<Error>>(
         settings,
         scaling: &scaling,
         factor: None,
+        level: None,
         start: (start, scaling.scale(start)),
         last: None,
         asked: 0,
@@ -205,27 +219,34 @@ pub fn minimise<E: From<Error>>(
     let constraints = |values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>, (): &mut ()| {
         bridge.borrow_mut().constraints(values, x, gradients);
     };
+    let [mut lower, mut upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
+    let mut x = scaling.scale(start);
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = x.clamp(lower[k], upper[k]);
+    }
+    if settings.members > 0
+        && let Some(level) = bridge.borrow_mut().begin_level(&x)
+    {
+        lower.push(level.lower());
+        upper.push(level.upper());
+        x.push(level.start());
+    }
     let mut library =
-        ::nlopt::Nlopt::new(settings.algorithm.library(), start.len(), &objective, Target::Minimize, ());
-    let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
+        ::nlopt::Nlopt::new(settings.algorithm.library(), x.len(), &objective, Target::Minimize, ());
     let mut accepted = library
         .set_lower_bounds(&lower)
         .and_then(|_| library.set_upper_bounds(&upper))
         .and_then(|_| library.set_stopval(STOP_VALUE))
         .and_then(|_| library.set_ftol_rel(settings.ftol_rel))
         .and_then(|_| library.set_xtol_rel(settings.xtol_rel));
-    if settings.constraints > 0 {
-        let tolerance = vec![CONSTRAINT_TOLERANCE; settings.constraints];
-        accepted = accepted.and_then(|_| {
-            library.add_inequality_mconstraint(settings.constraints, constraints, (), &tolerance)
-        });
+    let count = settings.constraints + settings.members;
+    if count > 0 {
+        let tolerance = vec![CONSTRAINT_TOLERANCE; count];
+        accepted =
+            accepted.and_then(|_| library.add_inequality_mconstraint(count, constraints, (), &tolerance));
     }
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
-    }
-    let mut x = scaling.scale(start);
-    for (k, x) in x.iter_mut().enumerate() {
-        *x = x.clamp(lower[k], upper[k]);
     }
     let ended = library.optimize(&mut x);
     drop(library);
@@ -312,6 +333,8 @@ struct Bridge<'a, F, E> {
     scaling: &'a Scaling,
     /// On the objective; known with the first answer.
     factor: Option<f64>,
+    /// The bound on the terms of a worst case.
+    level: Option<Level>,
     /// The start, in metres and as NLopt sees it.
     start: (&'a [f64], Vec<f64>),
     /// The design asked for last, as NLopt sees it, and its answer.
@@ -323,23 +346,51 @@ struct Bridge<'a, F, E> {
 }
 
 impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
+    /// Evaluates the start of a worst case, whose value its bound begins with; `None` once the closure has been interrupted.
+    fn begin_level(&mut self, x: &[f64]) -> Option<Level> {
+        let value = self.at(x)?.value;
+        self.level = Some(Level::around(value));
+        self.level
+    }
+
     /// The objective and its gradient at a design of NLopt's; below the stop value once the closure has been interrupted.
     fn objective(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> f64 {
-        let Self { scaling, settings, factor, .. } = *self;
-        let Some(sample) = self.at(x) else { return 2.0 * STOP_VALUE };
-        let factor = factor.unwrap_or_else(|| scaling.first_factor(settings, x, sample));
-        let value = factor * sample.value;
-        if let Some(gradient) = gradient {
-            scaling.fill(gradient, factor, &sample.gradient);
+        let (level, variables) = (self.level, self.start.0.len());
+        let Some(factor) = self.factor_at(&x[..variables]) else { return 2.0 * STOP_VALUE };
+        let scaling = self.scaling;
+        let Some(sample) = self.at(&x[..variables]) else { return 2.0 * STOP_VALUE };
+        match level {
+            None => {
+                if let Some(gradient) = gradient {
+                    scaling.fill(gradient, factor, &sample.gradient);
+                }
+                factor * sample.value
+            }
+            Some(level) => {
+                if let Some(gradient) = gradient {
+                    gradient.fill(0.0);
+                    gradient[variables] = factor * level.unit;
+                }
+                factor * level.unit * x[variables]
+            }
         }
-        self.factor = Some(factor);
-        value
+    }
+
+    /// The factor on the objective, which the first design fixes.
+    fn factor_at(&mut self, x: &[f64]) -> Option<f64> {
+        if self.factor.is_none() {
+            let Self { scaling, settings, .. } = *self;
+            let sample = self.at(x)?;
+            self.factor = Some(scaling.first_factor(settings, x, sample));
+        }
+        self.factor
     }
 
     /// The constraints and their gradients.
     fn constraints(&mut self, values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>) {
-        let scaling = self.scaling;
-        let Some(sample) = self.at(x) else {
+        let (scaling, level, variables) = (self.scaling, self.level, self.start.0.len());
+        let factor = self.factor_at(&x[..variables]).unwrap_or(1.0);
+        let Some(sample) = self.at(&x[..variables]) else {
             // Feasible: NLopt heeds its stop value at feasible designs alone.
             values.fill(-1.0);
             if let Some(gradients) = gradients {
@@ -350,9 +401,22 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
         for (value, (own, _)) in values.iter_mut().zip(&sample.constraints) {
             *value = *own;
         }
+        let bounded = &mut values[sample.constraints.len()..];
+        if let Some(level) = level {
+            for (value, (own, _)) in bounded.iter_mut().zip(&sample.members) {
+                *value = factor * (own - level.unit * x[variables]);
+            }
+        }
         if let Some(gradients) = gradients {
-            for (row, (_, own)) in gradients.chunks_exact_mut(x.len()).zip(&sample.constraints) {
-                scaling.fill(row, 1.0, own);
+            gradients.fill(0.0);
+            let constraints = sample.constraints.iter().map(|(_, own)| (1.0, own, 0.0));
+            let by_level = level.map_or(0.0, |level| -factor * level.unit);
+            let members = sample.members.iter().map(|(_, own)| (factor, own, by_level));
+            for (row, (factor, own, by_level)) in
+                gradients.chunks_exact_mut(x.len()).zip(constraints.chain(members))
+            {
+                scaling.fill(row, factor, own);
+                row[variables..].fill(by_level);
             }
         }
     }
@@ -395,7 +459,7 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
             (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
         let answer = self.guard.call(|| (self.evaluate)(&physical))?;
         Some(answer.and_then(|sample| {
-            sample.check(x.len(), self.settings.constraints)?;
+            sample.check(x.len(), self.settings.constraints, self.settings.members)?;
             Ok(sample)
         }))
     }

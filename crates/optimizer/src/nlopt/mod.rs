@@ -4,6 +4,7 @@
 mod derivative_free;
 mod first_step;
 mod gradient;
+mod level;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

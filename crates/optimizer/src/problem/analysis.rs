@@ -52,6 +52,8 @@ pub struct Analysis {
     pub objective: Option<f64>,
     /// The terms of the objective without their weights, each summed over its states.
     pub terms: Vec<f64>,
+    /// Of a worst case: its terms with their weights, of which the objective is one; otherwise empty.
+    pub members: Vec<Measured>,
     /// What the constraints measure, in their order.
     pub constraints: Vec<Measured>,
     /// Force and torque on every body, in the first state.
@@ -72,7 +74,7 @@ pub struct Analysis {
     pub timings: Timings,
 }
 
-/// The value of what a constraint measures.
+/// The value of what a constraint or a term measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// The value, in SI.

@@ -80,7 +80,7 @@ impl Problem {
                 analysis,
                 index,
             };
-            let terms: Vec<&Term> = self.terms().iter().collect();
+            let terms = self.terms_of_value(analysis);
             estimate.objective += state.error_of(&terms, Some(&mut estimate.by_element))?;
             for (error, (_, term)) in estimate.constraints.iter_mut().zip(self.field_constraints()) {
                 error.1 += state.error_of(&[term], None)?;

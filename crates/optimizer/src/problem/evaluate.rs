@@ -16,7 +16,7 @@ use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings, finite};
 use crate::body::Body;
 use crate::constraint::{Constraint, Quantity};
 use crate::error::Error;
-use crate::objective::Term;
+use crate::objective::{Combination, Term};
 
 /// Which derivatives an evaluation gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +29,8 @@ pub enum Derivatives {
 
 /// What the states of an evaluation add up to.
 struct Sums<'a> {
-    /// The terms of the objective.
-    objective: AdjointAccumulator,
+    /// The objective's terms in one sum, or each in its own where the worst counts.
+    objective: Vec<AdjointAccumulator>,
     /// Constraints on functionals of the field, with their numbers.
     fields: Vec<(usize, &'a Term)>,
     /// One sum for each of these.
@@ -96,14 +96,27 @@ impl Problem {
         }
         let mut clock = Stopwatch::start();
         let terms = self.terms();
-        let value = terms.iter().zip(&sums.objective.values).map(|(term, value)| term.weight * value).sum();
+        let values: Vec<f64> = sums.objective.iter().flat_map(|sum| sum.values.iter().copied()).collect();
+        let weighted: Vec<f64> = terms.iter().zip(&values).map(|(term, value)| term.weight * value).collect();
         let differentiated = shape.filter(|_| !terms.is_empty());
-        let gradient = differentiated
-            .map(|shape| shape.pull_back("the objective", &moved, &sums.objective.nodal))
-            .transpose()?;
+        let members = self.members(&moved, differentiated, &sums, &weighted)?;
+        // Which of the sums the objective is.
+        let active = match &self.objective {
+            Some(objective) if !members.is_empty() => objective.worst(&weighted),
+            _ => 0,
+        };
+        let (value, gradient) = match members.get(active) {
+            Some(member) => (member.value, member.gradient.clone()),
+            None => {
+                let pull_back =
+                    |shape: &Shape| shape.pull_back("the objective", &moved, &sums.objective[0].nodal);
+                (weighted.iter().sum(), differentiated.map(pull_back).transpose()?)
+            }
+        };
         let constraints = self.measure_constraints(&moved, shape, &sums)?;
         timings.remesh += clock.lap();
-        let Sums { objective, solutions, events, .. } = sums;
+        let Sums { mut objective, solutions, events, .. } = sums;
+        let nodal = std::mem::take(&mut objective[active].nodal);
         let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
         let of_body = |body: &Body| body.force(&self.states[0], &mesh, &solutions[0]);
@@ -113,10 +126,11 @@ impl Problem {
             inversion,
             solutions,
             objective: (!terms.is_empty()).then_some(value),
-            terms: objective.values,
+            terms: values,
+            members,
             constraints,
             gradient,
-            sensitivity: differentiated.map(|shape| moved_only(shape, objective.nodal)),
+            sensitivity: differentiated.map(|shape| moved_only(shape, nodal)),
             quality,
             linear_iterations: report.iterations,
             worst_residual: report.residual,
@@ -171,10 +185,13 @@ impl Problem {
         shape: Option<&Shape>,
     ) -> Result<Sums<'_>, Error> {
         let terms: Vec<(usize, &Term)> = self.terms().iter().enumerate().collect();
+        let alone: Vec<[(usize, &Term); 1]> = self.terms().iter().map(|term| [(0, term)]).collect();
+        let groups: Vec<&[(usize, &Term)]> =
+            if self.is_worst_case() { alone.iter().map(|own| &own[..]).collect() } else { vec![&terms] };
         let nodes = work.mesh.points().len();
         let fields: Vec<(usize, &Term)> = self.field_constraints().collect();
         let mut sums = Sums {
-            objective: AdjointAccumulator::new(terms.len(), nodes),
+            objective: groups.iter().map(|group| AdjointAccumulator::new(group.len(), nodes)).collect(),
             constrained: fields.iter().map(|_| AdjointAccumulator::new(1, nodes)).collect(),
             fields,
             solutions: Vec::with_capacity(self.states.len()),
@@ -182,7 +199,9 @@ impl Problem {
         };
         for (index, model) in self.states.iter().enumerate() {
             let mut solved = solve_state(index, model, work, cache)?;
-            sums.objective.add("the objective", work, &mut solved, &terms, shape)?;
+            for (sum, group) in sums.objective.iter_mut().zip(&groups) {
+                sum.add("the objective", work, &mut solved, group, shape)?;
+            }
             for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
                 let name = format!("the constraint `{}`", self.constraints[*k].name);
                 sum.add(&name, work, &mut solved, &[(0, *term)], shape)?;
@@ -193,6 +212,38 @@ impl Problem {
             sums.solutions.push(state);
         }
         Ok(sums)
+    }
+
+    /// Whether the objective is the worst of its terms.
+    fn is_worst_case(&self) -> bool {
+        self.objective.as_ref().is_some_and(|objective| objective.combination == Combination::WorstCase)
+    }
+
+    /// The terms of a worst case with their weights.
+    fn members(
+        &self,
+        moved: &Moved,
+        differentiated: Option<&Shape>,
+        sums: &Sums<'_>,
+        weighted: &[f64],
+    ) -> Result<Vec<Measured>, Error> {
+        if !self.is_worst_case() {
+            return Ok(Vec::new());
+        }
+        let of = |(&value, sum): (&f64, &AdjointAccumulator)| {
+            let pull_back = |shape: &Shape| shape.pull_back("the objective", moved, &sum.nodal);
+            Ok(Measured { value, gradient: differentiated.map(pull_back).transpose()? })
+        };
+        weighted.iter().zip(&sums.objective).map(of).collect()
+    }
+
+    /// The terms that the objective's value at an analysed design is made of: all, or the worst one.
+    pub(super) fn terms_of_value(&self, analysis: &Analysis) -> Vec<&Term> {
+        let Some(objective) = self.objective.as_ref().filter(|_| !analysis.members.is_empty()) else {
+            return self.terms().iter().collect();
+        };
+        let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
+        vec![&objective.terms[objective.worst(&values)]]
     }
 
     /// Constraints on functionals of the field, with their numbers.

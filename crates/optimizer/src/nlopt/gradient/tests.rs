@@ -23,6 +23,7 @@ fn settings(algorithm: Algorithm) -> Minimisation {
         lower: vec![-0.005; 8],
         upper: vec![0.020; 8],
         constraints: 0,
+        members: 0,
         ftol_rel: 1e-8,
         xtol_rel: 0.0,
         first_step: 0.1,
@@ -71,6 +72,39 @@ fn every_algorithm_finds_a_bounded_quadratic_minimum() {
         for (k, p) in best.1.iter().enumerate() {
             let exact = if k % 3 == 0 { 0.020 } else { 0.004 };
             assert!((p - exact).abs() < 1e-4, "{algorithm:?}: variable {k} is {p}");
+        }
+    }
+}
+
+/// The larger of two paraboloids around 4 and 12 mm is least half-way, where both are equal; the second reaches its minimum where
+/// the first is larger already, if its own is lower by more than their distance.
+#[test]
+fn the_worst_of_several_terms_is_least_where_they_meet() {
+    let paraboloid = |p: &[f64], centre: f64, least: f64| -> (f64, Vec<f64>) {
+        let slope = |p: &f64| 2.0 * (p - centre) / 0.025_f64.powi(2);
+        (least + p.iter().map(|p| ((p - centre) / 0.025).powi(2)).sum::<f64>(), p.iter().map(slope).collect())
+    };
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        // Least values of either, and where the larger one is least.
+        for (least, exact) in [([1.0, 1.0], 0.008), ([1.0, 0.1], 0.004)] {
+            let settings = Minimisation { members: 2, ftol_rel: 1e-9, ..settings(algorithm) };
+            let (mut best, mut calls) = ((f64::INFINITY, vec![]), 0);
+            let outcome = minimise::<Halt>(&settings, &[0.018; 8], |p| {
+                calls += 1;
+                let members = vec![paraboloid(p, 0.004, least[0]), paraboloid(p, 0.012, least[1])];
+                let (value, gradient) =
+                    if members[0].0 >= members[1].0 { members[0].clone() } else { members[1].clone() };
+                if value < best.0 {
+                    best = (value, p.to_vec());
+                }
+                Ok(Sample { value, gradient, members, ..Sample::default() })
+            });
+            println!("{algorithm:?} {least:?}: {calls} evaluations");
+            assert!(
+                matches!(outcome, Outcome::Ended(_)) && calls < 100,
+                "{algorithm:?}: {outcome:?}, {calls}"
+            );
+            assert!(best.1.iter().all(|p| (p - exact).abs() < 1e-4), "{algorithm:?}: {best:?}");
         }
     }
 }
@@ -330,6 +364,7 @@ fn a_design_of_the_method_that_is_no_number_is_never_evaluated() {
             settings: &settings,
             scaling: &scaling,
             factor: None,
+            level: None,
             start: (&[0.0; 8], vec![0.0; 8]),
             last: None,
             asked: 0,
