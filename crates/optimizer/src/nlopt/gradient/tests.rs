@@ -76,39 +76,6 @@ fn every_algorithm_finds_a_bounded_quadratic_minimum() {
     }
 }
 
-/// The larger of two paraboloids around 4 and 12 mm is least half-way, where both are equal; the second reaches its minimum where
-/// the first is larger already, if its own is lower by more than their distance.
-#[test]
-fn the_worst_of_several_terms_is_least_where_they_meet() {
-    let paraboloid = |p: &[f64], centre: f64, least: f64| -> (f64, Vec<f64>) {
-        let slope = |p: &f64| 2.0 * (p - centre) / 0.025_f64.powi(2);
-        (least + p.iter().map(|p| ((p - centre) / 0.025).powi(2)).sum::<f64>(), p.iter().map(slope).collect())
-    };
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        // Least values of either, and where the larger one is least.
-        for (least, exact) in [([1.0, 1.0], 0.008), ([1.0, 0.1], 0.004)] {
-            let settings = Minimisation { members: 2, ftol_rel: 1e-9, ..settings(algorithm) };
-            let (mut best, mut calls) = ((f64::INFINITY, vec![]), 0);
-            let outcome = minimise::<Halt>(&settings, &[0.018; 8], |p| {
-                calls += 1;
-                let members = vec![paraboloid(p, 0.004, least[0]), paraboloid(p, 0.012, least[1])];
-                let (value, gradient) =
-                    if members[0].0 >= members[1].0 { members[0].clone() } else { members[1].clone() };
-                if value < best.0 {
-                    best = (value, p.to_vec());
-                }
-                Ok(Sample { value, gradient, members, ..Sample::default() })
-            });
-            println!("{algorithm:?} {least:?}: {calls} evaluations");
-            assert!(
-                matches!(outcome, Outcome::Ended(_)) && calls < 100,
-                "{algorithm:?}: {outcome:?}, {calls}"
-            );
-            assert!(best.1.iter().all(|p| (p - exact).abs() < 1e-4), "{algorithm:?}: {best:?}");
-        }
-    }
-}
-
 /// The first two designs that a method asks for.
 fn first_two(settings: &Minimisation, start: &[f64], of: impl Fn(&[f64]) -> Sample) -> [Vec<f64>; 2] {
     let mut designs = Vec::new();
