@@ -16,7 +16,8 @@ use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
 use super::run::Run;
-use super::search::{LEAST_GAIN, Refusal, Stop};
+use super::search::LEAST_GAIN;
+use super::stop::{Refusal, Stop};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::between;

@@ -9,7 +9,7 @@ use fluxmorph_remesh::{Moved, RemeshError};
 use super::carry::Standing;
 use super::incumbent::{BestField, Comparison, Initial};
 use super::run::Run;
-use super::search::{Refusal, Stop};
+use super::stop::{Refusal, Stop};
 use super::{Evaluation, Record, StopReason, Watching, column, reference_hash};
 use crate::error::Error;
 use crate::geometric::WallThickness;

@@ -2,11 +2,12 @@
 
 use std::cmp::Ordering;
 
-use super::replay::ReplayState;
+use fluxmorph_remesh::Motion;
+
 use crate::constraint::Bound;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::Goal;
-use crate::problem::Analysis;
+use crate::problem::{Analysis, SolverCache};
 
 /// What the first evaluation fixes for the rest of the run.
 #[derive(Clone, Debug)]
@@ -30,6 +31,15 @@ impl Comparison {
     pub(super) fn is_improved(self) -> bool {
         self != Self::Worse
     }
+}
+
+/// In what an evaluation was computed: with both it comes out as it was.
+#[derive(Debug)]
+pub(super) struct ReplayState {
+    /// The mesh motion of its round.
+    pub(super) motion: Motion,
+    /// What the linear solvers kept before it.
+    pub(super) cache: SolverCache,
 }
 
 /// What is known of the field of the best design.

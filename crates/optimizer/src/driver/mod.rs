@@ -35,6 +35,7 @@ mod run;
 mod search;
 mod settings;
 mod start;
+mod stop;
 mod stop_reason;
 mod trust_region;
 

@@ -2,24 +2,13 @@
 
 use std::time::Instant;
 
-use fluxmorph_remesh::Motion;
-
-use super::incumbent::{BestField, Incumbent};
+use super::incumbent::{BestField, Incumbent, ReplayState};
 use super::run::Run;
-use super::search::Stop;
+use super::stop::Stop;
 use super::{Best, Record, reference_hash};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::{Derivatives, NoProgress, SolverCache};
-
-/// In what an evaluation was computed: with both it comes out as it was.
-#[derive(Debug)]
-pub(super) struct ReplayState {
-    /// The mesh motion of its round.
-    pub(super) motion: Motion,
-    /// What the linear solvers kept before it.
-    cache: SolverCache,
-}
 
 /// Largest difference of a design to that of its record, relative to the largest variable, where the work of either is or was
 /// shared out: sums over ranks have no fixed last bits, and every round's mesh is made of some. Well above what they leave,

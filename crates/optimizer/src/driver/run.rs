@@ -7,7 +7,7 @@ use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
 use super::promised_gain::promised_gain;
-use super::search::Stop;
+use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;

@@ -5,6 +5,7 @@
 use fluxmorph_remesh::FallbackLevel;
 
 use super::run::Run;
+use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
 use super::{Settings, StopReason};
 use crate::error::Error;
@@ -33,31 +34,6 @@ const STILL_PROMISED: f64 = 0.1;
 
 /// How often an end after the cautious first step is not believed.
 const MAX_TIGHTENINGS: usize = 3;
-
-/// What ends the method from inside an evaluation.
-#[derive(Debug)]
-pub(super) enum Stop {
-    Limit(StopReason),
-    /// The round's mesh cannot carry a design.
-    Mesh(Refusal),
-    /// The mesh carries a part of the step to a design, which is the best one now.
-    CutShort,
-    Error(Box<Error>),
-}
-
-impl From<Error> for Stop {
-    fn from(error: Error) -> Self {
-        Self::Error(Box::new(error))
-    }
-}
-
-/// A design that the round's mesh cannot carry.
-#[derive(Clone, Debug)]
-pub(super) struct Refusal {
-    pub(super) cause: String,
-    /// Its variables [m].
-    pub(super) wanted: Vec<f64>,
-}
 
 /// How one search of the method ended.
 pub(super) struct Ended {

@@ -1,7 +1,7 @@
 //! Where a search begins: at the initial design, or with the best one of a search on a coarser mesh.
 
 use super::run::Run;
-use super::search::{Refusal, Stop};
+use super::stop::{Refusal, Stop};
 use super::stop_reason::StopReason;
 use crate::error::Error;
 use crate::problem::RoundStart;
