@@ -67,13 +67,13 @@ fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
     let elements = elements(&page);
     stands_alone(&page, &elements);
     figures_are_described(&elements);
-    for id in SECTIONS.split(' ').chain(["shape-map", "field-cut", "quality-histogram", "surface"]) {
+    for id in SECTIONS.split(' ').chain(["shape-map", "field-cut", "error-map", "quality-histogram", "surface"]) {
         assert!(has_id(&elements, id), "{id}");
     }
     let charts: Vec<&str> = elements.iter().filter_map(|e| e.get("data-chart")).collect();
     assert_eq!(charts, ["objective", "gradient", "quality", "step"]);
-    // Two maps, two cuts, four charts, one histogram.
-    assert_eq!(elements.iter().filter(|e| e.name == "svg").count(), 9);
+    // Two maps, two cuts, where the error is made, four charts, one histogram.
+    assert_eq!(elements.iter().filter(|e| e.name == "svg").count(), 10);
     assert!(!page.contains("Not shown"));
     for link in ["fields.pvd", "optimum.msh", "optimum_plate_bottom.stl", "fields/eval_0000.vtu"] {
         assert!(elements.iter().any(|e| e.get("href") == Some(link)), "{link}");

@@ -10,7 +10,7 @@ use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::{
-    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
+    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
 };
 
 /// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
@@ -91,6 +91,29 @@ fn nodal_elements_at_a_singular_edge_have_no_estimate_and_say_so() {
         let error = model.enriched(&mesh, Effort::Any).expect_err("no estimate").to_string();
         assert!(error.contains("re-entrant edge") && error.contains("edge elements"), "{error}");
     }
+}
+
+/// Iron that saturates: the error that is left is that of a nonlinear field.
+#[test]
+fn the_error_of_saturated_iron_is_estimated() {
+    let mesh = square();
+    let point = |i: i32| {
+        let h = 20.0 * (1.3_f64.powi(i) - 1.0);
+        [h, 4e-7 * std::f64::consts::PI * h + 0.002 * (1.0 - (-h / 100.0).exp())]
+    };
+    let law = Arc::new(BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table"));
+    let iron = Material { relative_permeability: 10.0, conductivity: 0.0 };
+    let of = |order| FieldModelSetup {
+        materials: vec![Material::AIR, iron, Material::AIR],
+        bh: vec![None, Some(Arc::clone(&law))],
+        ..setup((ElementFamily::Edge, order), 0.0)
+    };
+    let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
+    let energy = Functional::energy(&model, None).expect("a functional");
+    let found = estimate(&mesh, &of(Order::Linear), &energy);
+    let difference = solved(&mesh, &of(Order::Quadratic), &energy) - found[0];
+    println!("F {:.5e}, estimated {:.5e}, second order has {difference:.5e} more", found[0], found[1]);
+    assert!((found[1] - difference).abs() < 0.1 * difference.abs(), "{} {difference}", found[1]);
 }
 
 /// A block of iron in the quarter: what is between first order and the truth, for both families, static and with eddy
