@@ -313,12 +313,12 @@ mod tests {
     use super::*;
     use crate::build::{Mode, set_up};
 
-    /// The coarse shield; without its control grid every node is a variable.
+    /// The coarse shield; without its control grid and a filter every node is a variable.
     fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
         let (mut config, source) = Config::from_file(&path, &[]).expect("a shipped configuration");
         if variables_on_nodes && let Some(design) = &mut config.design {
-            design.grid = None;
+            (design.grid, design.filter_radius) = (None, Some(0.0));
         }
         (config, source)
     }
