@@ -67,7 +67,9 @@ fn a_run_ends_with_a_page_that_is_the_same_when_made_again() {
     let elements = elements(&page);
     stands_alone(&page, &elements);
     figures_are_described(&elements);
-    for id in SECTIONS.split(' ').chain(["shape-map", "field-cut", "error-map", "quality-histogram", "surface"]) {
+    for id in
+        SECTIONS.split(' ').chain(["shape-map", "field-cut", "error-map", "quality-histogram", "surface"])
+    {
         assert!(has_id(&elements, id), "{id}");
     }
     let charts: Vec<&str> = elements.iter().filter_map(|e| e.get("data-chart")).collect();

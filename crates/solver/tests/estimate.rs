@@ -10,7 +10,8 @@ use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::{
-    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
+    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
+    SurfaceLaw,
 };
 
 /// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
@@ -116,18 +117,22 @@ fn the_error_of_saturated_iron_is_estimated() {
     assert!((found[1] - difference).abs() < 0.1 * difference.abs(), "{} {difference}", found[1]);
 }
 
-/// A block of iron in the quarter: what is between first order and the truth, for both families, static and with eddy
-/// currents in the block.
 #[test]
 fn the_error_around_iron_is_estimated_for_both_families() {
+    around_iron(0.0, 0.0);
+}
+
+#[test]
+#[ignore = "a minute: eddy currents of second order on halved edges"]
+fn so_is_that_around_iron_with_eddy_currents() {
+    around_iron(5.0, 1e4);
+}
+
+/// A block of iron in the quarter at a frequency [Hz] and of a conductivity [S/m]: what is between first order and the truth.
+fn around_iron(frequency: f64, conductivity: f64) {
     let mesh = square();
     let fine = uniform(&mesh, RefineLimits::default()).expect("eight for each");
-    for (family, frequency, conductivity) in [
-        (ElementFamily::Edge, 0.0, 0.0),
-        (ElementFamily::Nodal, 0.0, 0.0),
-        (ElementFamily::Edge, 5.0, 1e4),
-        (ElementFamily::Nodal, 5.0, 1e4),
-    ] {
+    for family in [ElementFamily::Edge, ElementFamily::Nodal] {
         let iron = Material { relative_permeability: 20.0, conductivity };
         let of = |order| FieldModelSetup {
             materials: vec![Material::AIR, iron, Material::AIR],
