@@ -45,7 +45,7 @@ pub(crate) fn solve(
         residual.iter_mut().zip(right_side).for_each(|(r, b)| *r = b - *r);
         ended.residual = norm(&residual) / scale;
         // Also where it is no number.
-        if !(ended.residual < 0.5 * before) {
+        if ended.residual.is_nan() || ended.residual >= 0.5 * before {
             break;
         }
     }
