@@ -25,7 +25,7 @@ use super::confirmation::ShapeMeshes;
 use super::finer::{Cut, FinerProblem};
 use super::summary;
 use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
-use crate::config::{Config, SourceMap};
+use crate::config::{Config, MotionLaw, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, OverwritePolicy, Verification};
 use crate::show::Observer;
@@ -219,18 +219,34 @@ impl MeshIndependence<'_> {
         values.map(|values| verification(parts, tets, values)).transpose()
     }
 
-    /// Both values on the fresh mesh; `None` where a signal came first.
+    /// Both values on the fresh mesh, moved there as the run's was, or else by the law that reaches farther, in rounds; `None` where
+    /// a signal came first.
     fn compute(
         &self,
         fresh: &FreshMesh,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
-        let config = fresh_configuration(self.config);
-        let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
+        let mut config = fresh_configuration(self.config);
+        match (self.compute_by(&config, fresh, interrupted), &mut config.remesh) {
+            (Err(Error::Optimizer(error)), Some(remesh)) if error.is_unreached() => {
+                remesh.law = Some(MotionLaw::Linear);
+                self.compute_by(&config, fresh, interrupted)
+            }
+            (computed, _) => computed,
+        }
+    }
+
+    fn compute_by(
+        &self,
+        config: &Config,
+        fresh: &FreshMesh,
+        interrupted: &dyn Fn() -> bool,
+    ) -> Result<Option<Verification>, Error> {
+        let setup = set_up_on(fresh.mesh.build(config, self.source)?, config, self.source)?;
         if interrupted() {
             return Ok(None);
         }
-        let displacements = self.shapes.displacements(&config, &setup)?;
+        let displacements = self.shapes.displacements(config, &setup)?;
         let mut problem = setup.problem;
         let tets = problem.original().topology().tets().len();
         let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());

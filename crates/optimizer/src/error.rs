@@ -109,6 +109,11 @@ impl Error {
         if interrupted() { Err(Self::Interrupted) } else { Ok(()) }
     }
 
+    /// Whether the mesh is what a design is out of reach of.
+    pub fn is_unreached(&self) -> bool {
+        matches!(self, Self::DesignUnreached { .. } | Self::Remesh(_))
+    }
+
     /// Whether a computation failed on sound input: a best design found before is still worth keeping.
     pub fn is_numerical(&self) -> bool {
         match self {

@@ -133,7 +133,9 @@ fn magnet(elements: &str, order: u8) -> String {
         direction = [0, 0, -1]
         lower = "-2 mm"
         upper = "2 mm"
+        filter_radius = 0
         [remesh]
+        law = "linear"
         region = ["magnet", "gap"]
         free = ["magnet|around", "gap|around"]
         slide = ["x_min", "y_min"]
