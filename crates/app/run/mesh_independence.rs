@@ -25,7 +25,7 @@ use super::confirmation::ShapeMeshes;
 use super::finer::{Cut, FinerProblem};
 use super::summary;
 use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
-use crate::config::{Config, MotionLaw, SourceMap};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, OverwritePolicy, Verification};
 use crate::show::Observer;
@@ -219,34 +219,33 @@ impl MeshIndependence<'_> {
         values.map(|values| verification(parts, tets, values)).transpose()
     }
 
-    /// Both values on the fresh mesh, moved there as the run's was, or else by the law that reaches farther, in rounds; `None` where
-    /// a signal came first.
+    /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape; `None` where a signal came
+    /// first.
     fn compute(
         &self,
         fresh: &FreshMesh,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
-        let mut config = fresh_configuration(self.config);
-        match (self.compute_by(&config, fresh, interrupted), &mut config.remesh) {
-            (Err(Error::Optimizer(error)), Some(remesh)) if error.is_unreached() => {
-                remesh.law = Some(MotionLaw::Linear);
-                self.compute_by(&config, fresh, interrupted)
+        match self.compute_on(fresh, interrupted) {
+            Err(Error::Optimizer(error)) if error.is_unreached() && self.meshes.is_some() => {
+                self.compute_on_finer_elements(interrupted)
             }
-            (computed, _) => computed,
+            computed => computed,
         }
     }
 
-    fn compute_by(
+    /// Both values on the fresh mesh.
+    fn compute_on(
         &self,
-        config: &Config,
         fresh: &FreshMesh,
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<Verification>, Error> {
-        let setup = set_up_on(fresh.mesh.build(config, self.source)?, config, self.source)?;
+        let config = fresh_configuration(self.config);
+        let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
         if interrupted() {
             return Ok(None);
         }
-        let displacements = self.shapes.displacements(config, &setup)?;
+        let displacements = self.shapes.displacements(&config, &setup)?;
         let mut problem = setup.problem;
         let tets = problem.original().topology().tets().len();
         let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());
