@@ -9,9 +9,9 @@ use fluxmorph_optimizer::design::{
     default_filter_radius,
 };
 
-use super::millimetres;
 use crate::config::{self, Boundaries, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
+use crate::place::millimetres;
 
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(

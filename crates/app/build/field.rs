@@ -16,6 +16,7 @@ use fluxmorph_solver::{
 };
 
 use super::curves::Curves;
+use super::entries::{material, phasor};
 use super::locate_error::DiagnosticSink;
 use super::open;
 use crate::config::{
@@ -32,7 +33,7 @@ pub(super) fn without_replaced_regions(
     let mut mesh = full.clone();
     let law = |(name, region): (&'_ String, &config::Region)| match region.model {
         RegionModel::Volume => None,
-        RegionModel::Impedance => Some((name.clone(), SurfaceLaw::Impedance(super::material(config, name)))),
+        RegionModel::Impedance => Some((name.clone(), SurfaceLaw::Impedance(material(config, name)))),
         RegionModel::Perfect => Some((name.clone(), SurfaceLaw::Perfect)),
     };
     let replaced: Vec<(String, SurfaceLaw)> = config.regions.iter().filter_map(law).collect();
@@ -113,7 +114,7 @@ pub(super) fn contact_faults(
     }
     let topology = mesh.topology();
     let conducts: Vec<bool> =
-        topology.region_names().iter().map(|name| super::material(config, name).conductivity > 0.0).collect();
+        topology.region_names().iter().map(|name| material(config, name).conductivity > 0.0).collect();
     let touched = |conductor: &Conductor| -> Option<usize> {
         let around = conductor.surface.iter().flatten().flat_map(|&node| topology.elements_around(node));
         let mut regions = around.map(|e| topology.region_of()[e.index()].index());
@@ -164,10 +165,10 @@ fn field_model(
     let names = mesh.topology().region_names();
     let bh: Vec<Option<Arc<BhCurve>>> = names.iter().map(|name| curves.of(config, name)).collect();
     let material = |(name, curve): (&String, &Option<Arc<BhCurve>>)| match curve {
-        None => super::material(config, name),
+        None => material(config, name),
         // What is left of a linear material is the penalty of nodal elements.
         Some(curve) => {
-            Material { relative_permeability: curve.largest_permeability(), ..super::material(config, name) }
+            Material { relative_permeability: curve.largest_permeability(), ..material(config, name) }
         }
     };
     let materials = names.iter().zip(&bh).map(material).collect();
@@ -294,7 +295,7 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
             RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
         }
     };
-    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: super::phasor(coil), shape })
+    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: phasor(coil), shape })
 }
 
 /// The winding of a coil that has turns.
@@ -369,7 +370,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
             let fault = source.diagnostic(&path, format!("`{name}` is replaced by its surface"));
             faults.push(fault.expected("a region that is meshed"));
         } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
-            && super::material(config, name).conductivity > 0.0
+            && material(config, name).conductivity > 0.0
         {
             let message = format!(
                 "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"

@@ -12,41 +12,13 @@ use fluxmorph_optimizer::{Error as OptimizerError, geometric};
 use fluxmorph_solver::functional::{self, AtTerminals, Inductive, Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
+use super::entries::material;
+use super::references::{functionals, regions};
 use crate::config::{
     self, BodyKind, Combination, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap,
     ValueBound,
 };
 use crate::error::Error;
-
-/// Every functional of the configuration with its key path: terms of the objective, then constraints.
-pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {
-    let terms = config.objective.iter().flat_map(|objective| {
-        let terms = objective.terms().iter().enumerate();
-        terms.map(|(k, term)| (objective.path(k), &term.functional))
-    });
-    let constraints = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
-        let Written::Field { functional, .. } = &constraint.limit else { return None };
-        Some((format!("constraints[{k}]"), functional))
-    });
-    terms.chain(constraints).collect()
-}
-
-/// Key path and name of every region that objective and constraints name.
-pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
-    let fields = functionals(config)
-        .into_iter()
-        .filter(|(_, f)| f.kind.is_of_a_region())
-        .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
-    let forces = config.forces.iter().enumerate().flat_map(|(k, force)| {
-        let path = move |(i, name): (usize, &'a String)| (format!("forces[{k}].regions[{i}]"), name.as_str());
-        force.regions.iter().enumerate().map(path)
-    });
-    let bodies = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
-        let Written::Body { region, .. } = &constraint.limit else { return None };
-        Some((format!("constraints[{k}].region"), region.as_str()))
-    });
-    fields.chain(forces).chain(bodies).collect()
-}
 
 /// The mesh with the cells of every region that is measured written down: a finer mesh has the same ones then, and a sum
 /// over cells the same terms.
@@ -82,7 +54,7 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
                         .diagnostic(&format!("{path}.region"), message)
                         .expected("a region whose material conducts, with another model"),
                 );
-            } else if super::material(config, region).conductivity == 0.0 {
+            } else if material(config, region).conductivity == 0.0 {
                 let message = format!("`{region}` does not conduct, so it has no eddy-current loss");
                 faults.push(
                     source

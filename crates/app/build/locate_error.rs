@@ -10,8 +10,7 @@ use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::coil::{PlaneFault, RegionFault};
 use fluxmorph_solver::{NonConvergence, SolverError};
 
-use super::functional;
-use super::mesh::surface_names;
+use super::references::{regions, surface_names};
 use crate::config::{CoilShape, Config, ConfigError, Diagnostic, RemeshExtent, SourceMap};
 use crate::error::Error;
 
@@ -26,7 +25,7 @@ pub(crate) fn attribute_error(error: Error, config: &Config, source: &SourceMap)
         OptimizerError::Mesh(error) => blame.mesh(error),
         OptimizerError::Constraint { name, .. } => blame.constraint(name, cause),
         OptimizerError::FirstDesign { .. } | OptimizerError::DesignUnreached { .. } => {
-            Some(with_advice(source.diagnostic("design.initial", error.to_string())))
+            Some(source.diagnostic("design.initial", error.to_string()).with_advice_apart())
         }
         _ => None,
     };
@@ -110,15 +109,6 @@ impl<'a> DiagnosticSink<'a> {
     }
 }
 
-/// The same fault with what its message says to do, after the last semicolon, as its help.
-pub(super) fn with_advice(mut fault: Diagnostic) -> Diagnostic {
-    if let Some((message, advice)) = fault.message.rsplit_once("; ") {
-        fault.help = Some(advice.to_owned());
-        fault.message = message.to_owned();
-    }
-    fault
-}
-
 struct Blame<'a> {
     config: &'a Config,
     source: &'a SourceMap,
@@ -126,7 +116,7 @@ struct Blame<'a> {
 
 impl Blame<'_> {
     fn at(&self, path: &str, error: &dyn std::fmt::Display) -> Option<Diagnostic> {
-        Some(with_advice(self.source.diagnostic(path, error.to_string())))
+        Some(self.source.diagnostic(path, error.to_string()).with_advice_apart())
     }
 
     /// The key path of a surface in a list of the configuration whose path starts like that.
@@ -247,7 +237,7 @@ impl Blame<'_> {
 
     /// A fault of a region where objective, constraints or `[regions]` name it.
     fn region(&self, name: &str, error: &dyn std::fmt::Display) -> Option<Diagnostic> {
-        let named = functional::regions(self.config).into_iter().find(|(_, own)| *own == name);
+        let named = regions(self.config).into_iter().find(|(_, own)| *own == name);
         let path = match named {
             Some((path, _)) => path,
             None => self.config.regions.contains_key(name).then(|| format!("regions.{name}"))?,

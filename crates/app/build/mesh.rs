@@ -14,12 +14,9 @@ use fluxmorph_geometry::topology::{OUTSIDE, face_key};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
 use fluxmorph_optimizer::design::DesignSurface;
 
-use super::locate_error::with_advice;
 use super::open;
-use crate::config::{
-    CoilPath, CoilShape, Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span,
-    Target,
-};
+use super::references::surface_names;
+use crate::config::{Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span};
 use crate::error::Error;
 use crate::files::OutputError;
 
@@ -107,7 +104,8 @@ fn file_fault(error: MeshError, source: &SourceMap) -> Error {
 /// A fault of a mesh file is shown in the file where that is text, and at the key that names it.
 fn msh_fault(path: &Path, error: &MshError, source: &SourceMap) -> ConfigError {
     let file = path.display().to_string();
-    let mut fault = with_advice(source.diagnostic("mesh.file", format!("mesh file `{file}`, {error}")));
+    let mut fault =
+        source.diagnostic("mesh.file", format!("mesh file `{file}`, {error}")).with_advice_apart();
     if path.extension().is_some_and(|extension| extension == "geo") {
         fault.help = Some("this is the geometry: `gmsh -3 -format msh41` makes the mesh of it".to_owned());
     }
@@ -119,50 +117,6 @@ fn msh_fault(path: &Path, error: &MshError, source: &SourceMap) -> ConfigError {
     let span = Span { document: number, range: excerpt.span.clone() };
     let named = fault.span.clone();
     source.error(vec![Diagnostic { span, ..fault }.secondary(named, "the file is named here")])
-}
-
-/// Every surface that the configuration names, with the path of its key.
-pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
-    let mut names = Vec::new();
-    let mut add = |path: &str, surfaces: &'a [String]| {
-        names.extend(surfaces.iter().enumerate().map(|(i, name)| (format!("{path}[{i}]"), name.as_str())));
-    };
-    add("boundaries.flux_parallel", &config.boundaries.flux_parallel);
-    add("boundaries.flux_normal", &config.boundaries.flux_normal);
-    if let Some(field) = &config.boundaries.uniform_field {
-        add("boundaries.uniform_field.surfaces", &field.surfaces);
-    }
-    if let Some(open) = &config.open {
-        add("open.surfaces", open.surfaces());
-    }
-    for (i, coil) in config.coils.iter().enumerate() {
-        if let CoilShape::Region(region) = &coil.shape
-            && let CoilPath::Terminals { terminals } = &region.path
-        {
-            add(&format!("coils[{i}].terminals"), terminals.as_slice());
-        }
-    }
-    if let Some(remesh) = &config.remesh {
-        add("remesh.slide", &remesh.slide);
-        add("remesh.fixed", &remesh.fixed);
-        add("remesh.free", &remesh.free);
-    }
-    for (i, motion) in config.morph.iter().flat_map(|morph| &morph.motion).enumerate() {
-        if let Target::Surface(surfaces) = &motion.target {
-            add(&format!("morph.motion[{i}].surface"), surfaces);
-        }
-    }
-    let design = config.design.as_ref().map(|design| design.surface.as_slice()).unwrap_or_default();
-    // By default it is the design surface, whose own key is the better place for a fault.
-    if config.output.stl != design {
-        add("output.stl", &config.output.stl);
-    }
-    if let [one] = design {
-        names.push(("design.surface".to_owned(), one.as_str()));
-    } else {
-        add("design.surface", design);
-    }
-    names
 }
 
 /// The mesh with a surface for every name of an interface; names that stand for none are left to [`surface_faults`].

@@ -2,12 +2,13 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `plausible` what cannot be meant, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod curves;
 mod design;
 mod divided_mesh;
 mod elastic_body;
+mod entries;
 mod field;
 mod functional;
 pub(crate) mod locate_error;
@@ -15,9 +16,11 @@ pub(crate) mod memory_limit;
 pub(crate) mod mesh;
 mod motion;
 pub(crate) mod multipole;
+mod names;
 mod open;
 mod outline;
 mod plausible;
+mod references;
 mod refined;
 mod shape;
 mod share;
@@ -28,9 +31,11 @@ pub(crate) mod steels;
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::motion_in_words;
+pub(crate) use entries::material;
 pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
+pub use names::with_names;
 pub use outline::{Outline, OutlinedDesign, outline};
 pub(crate) use refined::RefinedMesh;
 pub use skin::Audited;
@@ -39,20 +44,21 @@ pub(crate) use skin::result_warnings;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::{Mesh, RegionId, Topology};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
-use fluxmorph_solver::{FieldModel, Material};
+use fluxmorph_solver::FieldModel;
 
 use self::curves::Curves;
 use self::locate_error::DiagnosticSink;
+use self::names::{check_names, name_faults};
 use self::skin::audits;
-use crate::config::{self, Boundaries, Config, ConfigError, Diagnostic, DiagnosticReport, SourceMap};
+use crate::config::{Boundaries, Config, Diagnostic, SourceMap};
 use crate::error::Error;
+use crate::place::millimetres;
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]
@@ -260,22 +266,6 @@ fn problem_on(
     Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body, tables })
 }
 
-/// Refuses names that the mesh does not have; what was left out of a mesh file is often why.
-fn check_names(
-    config: &Config,
-    source: &SourceMap,
-    mesh: &Mesh,
-    notices: &[String],
-) -> Result<(), ConfigError> {
-    let mut faults = name_faults(config, source, mesh.topology());
-    if let Some(first) = faults.first_mut() {
-        let notices = notices.iter().map(|notice| format!("of the mesh: {notice}"));
-        let help: Vec<String> = first.help.take().into_iter().chain(notices).collect();
-        first.help = Some(help.join("\n")).filter(|help| !help.is_empty());
-    }
-    source.check(faults)
-}
-
 /// Refuses a field problem whose potential no surface fixes.
 fn check_conditions(config: &Config, source: &SourceMap) -> Result<(), Error> {
     let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
@@ -305,124 +295,6 @@ pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Erro
     let mesh = build_mesh(config, source)?;
     source.check(name_faults(config, source, mesh.topology()))?;
     Ok(design::surface(config, source, design, &mesh)?.variable_count())
-}
-
-/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron.
-const OF_A_CURVE: f64 = 1000.0;
-
-/// The material of a region; air where the configuration says nothing.
-pub(crate) fn material(config: &Config, region: &str) -> Material {
-    let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
-    entry.map_or(Material::AIR, |m| Material {
-        relative_permeability: if m.saturates() { OF_A_CURVE } else { m.relative_permeability },
-        conductivity: m.conductivity,
-    })
-}
-
-/// The peak phasor of a coil [A].
-fn phasor(coil: &config::Coil) -> c64 {
-    c64::from_polar(coil.ampere_turns.unwrap_or_default(), coil.phase)
-}
-
-/// With more faults in the text of a configuration its names are not checked against the mesh as well.
-const MOST_TEXT_FAULTS: usize = 100;
-
-/// A report of what is wrong with the text of a configuration, with what is wrong with its names in the mesh as well.
-///
-/// That is looked at where the tables of the mesh are sound. What could be read stands in for the rest: a name that is
-/// missing or faulty is empty, and left out.
-pub fn with_names(error: ConfigError) -> ConfigError {
-    match error {
-        ConfigError::Invalid(report) => ConfigError::Invalid(Box::new(report_with_names(*report))),
-        other => other,
-    }
-}
-
-fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
-    let DiagnosticReport { source, diagnostics: mut faults, of, unfinished } = report;
-    let of_mesh = |fault: &Diagnostic| {
-        let path = fault.path.as_str();
-        path.is_empty() || path == "mesh" || path.starts_with("mesh.") || path.starts_with("morph.case")
-    };
-    let is_short = faults.len() <= MOST_TEXT_FAULTS;
-    let Some(config) = unfinished.filter(|_| is_short && !faults.iter().any(of_mesh)) else {
-        return DiagnosticReport { source, diagnostics: faults, of, unfinished: None };
-    };
-    let stays_in_folder = source.confined(config::OutputNamedBy::User).is_ok();
-    if stays_in_folder && crate::build::memory_limit::check_mesh(&config, &source).is_ok() {
-        match mesh::build(&config, &source) {
-            Ok(built) => {
-                let found = names(&config, &source, built.mesh.topology());
-                // A place that has a fault already says enough.
-                let new = |fault: &Diagnostic| faults.iter().all(|known| known.span != fault.span);
-                let found: Vec<Diagnostic> = found.into_iter().filter(new).collect();
-                faults.extend(found);
-                faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
-            }
-            // Places of the mesh file belong to the texts of its own report, behind those of the configuration.
-            Err(Error::Config(ConfigError::Invalid(mut of_mesh))) => {
-                of_mesh.diagnostics.splice(0..0, faults);
-                return *of_mesh;
-            }
-            Err(_) => {}
-        }
-    }
-    DiagnosticReport { source, diagnostics: faults, of, unfinished: None }
-}
-
-/// Every name of the configuration that the mesh does not have, every region named that is empty, and every one that cannot
-/// be used as it is.
-fn name_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
-    let mut faults = names(config, source, topology);
-    faults.extend(field::coil_faults(config, source));
-    let open = open::faults(config, source);
-    let inner = mesh::inner_faults(config, source, topology).into_iter();
-    faults.extend(inner.filter(|fault| open.iter().all(|known| known.span != fault.span)));
-    faults.extend(open);
-    faults.extend(functional::faults(config, source, topology));
-    faults.sort_by_key(|fault| (fault.span.document, fault.span.range.start));
-    faults
-}
-
-/// Every name of the configuration that the mesh does not have, and every region named that is empty; empty names are left
-/// out.
-fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
-    let mut faults = Vec::new();
-    let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
-    let mut region = |path: String, name: &str| match topology.region(name) {
-        _ if name.is_empty() => {}
-        Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
-        Ok(id) if is_empty(topology, id) => {
-            faults.push(source.diagnostic(&path, format!("the region `{name}` has no elements")));
-        }
-        Ok(_) => {}
-    };
-    for name in config.regions.keys() {
-        region(format!("regions.{name}"), name);
-    }
-    for (i, coil) in config.coils.iter().enumerate() {
-        if let config::CoilShape::Region(own) = &coil.shape {
-            region(format!("coils[{i}].region"), &own.region);
-        }
-    }
-    for (path, name) in functional::regions(config) {
-        region(path, name);
-    }
-    if let Some(name) = config.open.as_ref().and_then(|open| open.region.as_deref()) {
-        region("open.region".to_owned(), name);
-    }
-    if let Some(remesh) = &config.remesh {
-        if let config::RemeshExtent::Regions(names) = &remesh.extent {
-            for (i, name) in names.iter().enumerate() {
-                region(format!("remesh.region[{i}]"), name);
-            }
-        }
-        for (i, subregion) in remesh.subregions.iter().enumerate() {
-            region(format!("remesh.subregions[{i}].name"), &subregion.name);
-        }
-    }
-    faults.extend(mesh::surface_faults(config, source, topology));
-    faults
 }
 
 /// Every probe point that no element holds, before a run is spent on it.
@@ -463,14 +335,4 @@ fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Me
         faults.push(source.diagnostic(&format!("probes[{i}].points[{j}]"), message).expected(expected));
     }
     faults
-}
-
-/// A point for messages, to a micrometre.
-pub(crate) fn millimetres([x, y, z]: [f64; 3]) -> String {
-    let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
-    format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
-}
-
-fn is_empty(topology: &Topology, region: RegionId) -> bool {
-    !topology.region_of().contains(&region)
 }

@@ -10,11 +10,13 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
 use super::elastic_body::{common_axis, guidance, motion_law, remesh_setup};
-use super::{field, mesh, millimetres, name_faults, soundness};
+use super::names::name_faults;
+use super::{field, mesh, soundness};
 use crate::config::{
     Config, DesignMotion, DesignWord, Diagnostic, Morphing, MotionLaw, PrescribedMotion, SourceMap, Target,
 };
 use crate::error::Error;
+use crate::place::millimetres;
 use crate::run::morph::path::{NodeMotion, Path, Transform};
 
 /// How far from a line, box or point of the configuration a node may lie, as a share of the mesh's diagonal:

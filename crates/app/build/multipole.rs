@@ -6,7 +6,7 @@ use fluxmorph_solver::functional::{MirrorPlane, Multipoles, OfTerms};
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{FieldModel, Functional};
 
-use super::functional::functionals;
+use super::references::functionals;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
 use crate::error::Error;
 

@@ -6,9 +6,10 @@ use fluxmorph_geometry::topology::Topology;
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_solver::{Boundary, OpenRegion};
 
-use super::functional;
+use super::references::{functionals, surface_names};
 use crate::config::{Config, Diagnostic, ObjectiveKind, Open, SourceMap};
 use crate::error::Error;
+use crate::place::millimetres;
 
 /// The region of a shell that is put around a mesh.
 const REGION: &str = "open";
@@ -75,8 +76,8 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
                 .expected("a region inside; of the shell, only the energy means something")
         })
     };
-    let named = super::mesh::surface_names(config).into_iter().filter_map(twice);
-    named.chain(functional::functionals(config).into_iter().filter_map(observed)).collect()
+    let named = surface_names(config).into_iter().filter_map(twice);
+    named.chain(functionals(config).into_iter().filter_map(observed)).collect()
 }
 
 /// Probe points in the shell.
@@ -89,7 +90,7 @@ pub(super) fn probe_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> 
     for (i, probe) in config.probes.iter().enumerate() {
         for (j, found) in locate(mesh, &probe.points).into_iter().enumerate() {
             if found.is_some_and(|(e, _)| mesh.topology().region_of()[e.index()] == shell) {
-                let at = super::millimetres(probe.points[j]);
+                let at = millimetres(probe.points[j]);
                 let message =
                     format!("the point {at} of the probe `{}` lies in the shell of open space", probe.name);
                 let fault = source.diagnostic(&format!("probes[{i}].points[{j}]"), message);

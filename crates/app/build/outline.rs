@@ -11,9 +11,10 @@ use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 
 use super::RefinedMesh;
 use super::elastic_body::{regions_at, remesh_setup};
+use super::names::name_faults;
 use super::shape::thickened_region;
 use super::skin::{Audited, audits};
-use super::{design, field, mesh, name_faults};
+use super::{design, field, mesh};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 

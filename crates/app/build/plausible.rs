@@ -7,11 +7,13 @@ use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{self, Racetrack};
 
-use super::{Audited, material, millimetres};
+use super::entries::material;
+use super::skin::Audited;
 use crate::config::{
     Boundaries, Coil, CoilShape, Config, Diagnostic, ElementOrder, Elements, MeshConfig, RegionModel,
     SourceMap,
 };
+use crate::place::millimetres;
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.

@@ -13,9 +13,10 @@ use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{common_axis, guidance, motion_law, regions_at, remesh_setup};
 use super::outline::same_nodes;
-use super::{millimetres, plausible};
+use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
 use crate::error::Error;
+use crate::place::millimetres;
 
 /// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
 const LEAST_QUALITY_SHARE: f64 = 0.05;

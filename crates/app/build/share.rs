@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::parallel::{Ownership, RankGroup};
 use fluxmorph_geometry::{ElementId, Mesh, Partition};
 
-use super::material;
+use super::entries::material;
 use crate::config::{Config, resolved_toml};
 use crate::error::Error;
 

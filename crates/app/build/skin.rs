@@ -5,7 +5,8 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_optimizer::problem::{Problem, Shape};
 use fluxmorph_solver::audit::{SkinAudit, skin_audit};
 
-use super::{field, material};
+use super::entries::material;
+use super::field;
 use crate::config::{self, Config, Limit, RegionModel};
 
 /// The audit of one conductor and how it is modelled.

@@ -10,8 +10,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::json_place;
-use crate::build::millimetres;
 use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
+use crate::place::millimetres;
 
 /// Largest design file that is read [bytes]: a million variables with their points.
 const LARGEST: u64 = 256 * 1024 * 1024;

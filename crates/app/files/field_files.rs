@@ -8,9 +8,9 @@ use std::io;
 use std::path::PathBuf;
 
 use super::OutputError;
+use super::names::FIELDS;
 use super::run_directory::RunDirectory;
 
-const FIELDS: &str = "fields";
 const WHOLE: &str = ".vtu";
 const HEADER: &str = ".pvtu";
 
@@ -189,11 +189,6 @@ impl RunDirectory {
     pub(super) fn has_no_fields(&self) -> Result<bool, OutputError> {
         Ok(self.entries(&self.fields())?.is_empty())
     }
-}
-
-/// Whether a name in the run directory is that of the folder of the fields.
-pub(super) fn is_fields(name: &str) -> bool {
-    name == FIELDS
 }
 
 fn stem(evaluation: usize) -> String {

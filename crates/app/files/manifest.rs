@@ -7,6 +7,7 @@ use fluxmorph_optimizer::driver::StopReason;
 use serde::{Deserialize, Serialize};
 
 use super::host::{hostname, utc_timestamp};
+use super::json::to_json;
 use super::{OutputError, RunDirectory};
 use crate::config::{Optimizer, SourceMap};
 
@@ -260,7 +261,7 @@ impl Manifest {
     /// # Errors
     /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
-        directory.write(&directory.manifest(), &super::result::to_json(self))
+        directory.write(&directory.manifest(), &to_json(self))
     }
 
     /// Read the manifest of a run directory.

@@ -10,6 +10,7 @@ pub mod fields;
 mod finite;
 mod history;
 mod host;
+mod json;
 mod json_place;
 mod manifest;
 mod names;
@@ -30,11 +31,11 @@ pub(crate) use finite::check_finite;
 pub use fluxmorph_optimizer::driver::StopReason;
 pub use history::History;
 pub use host::{hostname, peak_memory_bytes, utc_timestamp};
+pub(crate) use json::to_json;
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
 pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
 pub use refinements::{RefinementStep, Refinements};
-pub(crate) use result::to_json;
 pub use result::{
     Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,
     LinearSolverResult, MeshResult, MultipoleResult, ObjectiveResult, OpenResult, ProbeResult, RunResult,

@@ -23,6 +23,9 @@ pub fn surface_files(surfaces: &[String]) -> Vec<String> {
     surfaces.iter().map(&mut file).collect()
 }
 
+/// The folder of the fields in a run directory.
+pub(super) const FIELDS: &str = "fields";
+
 /// Whether a name is one of [`surface_files`].
 pub(super) fn is_surface(name: &str) -> bool {
     name.strip_prefix("optimum_")

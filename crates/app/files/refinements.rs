@@ -5,7 +5,7 @@ use std::io;
 use fluxmorph_geometry::ElementId;
 use serde::{Deserialize, Serialize};
 
-use super::result::to_json;
+use super::json::to_json;
 use super::{OutputError, RunDirectory};
 
 /// Largest file that is read [bytes]: ten times a hundred million numbers.

@@ -8,6 +8,7 @@ use fluxmorph_optimizer::problem::{RoundEvent, RoundStart};
 use serde::{Deserialize, Serialize};
 
 use super::accuracy::Accuracy;
+use super::json::to_json;
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory};
 
@@ -337,13 +338,6 @@ impl RunResult {
     pub fn to_json(&self) -> Vec<u8> {
         to_json(self)
     }
-}
-
-/// Indented JSON with a line break at the end.
-pub(crate) fn to_json(value: &impl Serialize) -> Vec<u8> {
-    let mut bytes = serde_json::to_vec_pretty(value).expect("structs of numbers and text have a JSON form");
-    bytes.push(b'\n');
-    bytes
 }
 
 #[cfg(test)]

@@ -8,9 +8,8 @@ use std::time::{Duration, Instant};
 
 use super::OutputError;
 use super::disk::{Disk, DiskLock, Sharing};
-use super::field_files::is_fields;
 use super::manifest::Manifest;
-use super::names::{is_case, is_surface};
+use super::names::{FIELDS, is_case, is_surface};
 use super::run_files::{FILES, OLDER_JOURNAL};
 use super::synced::{SyncedLog, UNFINISHED, folder_of, write_whole};
 
@@ -263,7 +262,7 @@ impl RunDirectory {
 
     fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
         for name in self.entries(&self.path)? {
-            let leftover = name.starts_with(UNFINISHED) || (is_fields(&name) && self.has_no_fields()?);
+            let leftover = name.starts_with(UNFINISHED) || (&name == FIELDS && self.has_no_fields()?);
             if !leftover {
                 return Ok(false);
             }

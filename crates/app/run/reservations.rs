@@ -10,8 +10,9 @@ use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
-use crate::build::{Setup, material, millimetres, result_warnings};
+use crate::build::{Setup, material, result_warnings};
 use crate::config::Config;
+use crate::place::millimetres;
 
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
 /// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.

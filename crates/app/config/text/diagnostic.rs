@@ -68,6 +68,15 @@ impl Diagnostic {
         self.help = Some(help.into());
         self
     }
+
+    /// The same with what its message says behind the last `; `, the advice of an error, as its help.
+    pub(crate) fn with_advice_apart(mut self) -> Self {
+        if let Some((message, advice)) = self.message.rsplit_once("; ") {
+            self.help = Some(advice.to_owned());
+            self.message = message.to_owned();
+        }
+        self
+    }
 }
 
 /// The fault with the nearest known name as help and all known names as the expectation.
