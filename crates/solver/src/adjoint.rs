@@ -47,7 +47,9 @@ pub fn node_gradient(
     moving: &[ElementId],
 ) -> Result<Vec<Point>, SolverError> {
     match model.distributed() {
-        Some(distributed) => distributed.node_gradient(state, adjoint, moving),
+        Some(distributed) => {
+            distributed.node_gradient(state.is_state(), [state.values(), adjoint.values()], moving)
+        }
         None => Ok(gradient_of(model, mesh, state, adjoint, &Extent { moving, triangles: None })),
     }
 }

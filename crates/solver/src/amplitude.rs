@@ -21,7 +21,7 @@ use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
 use crate::linear::gmres::{self, Ended};
-use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem};
+use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
 use crate::newton::{self, MOST_STEPS, NewtonObserver, NewtonProgress, REQUIRED, STAGNATION};
 use crate::solution::FieldSolution;
@@ -131,11 +131,15 @@ impl AmplitudeTangent {
         Ok((x, LinearSolverReport { iterations: inner, residual }))
     }
 
-    /// Solves the adjoint problem.
-    ///
-    /// # Errors
-    /// [`SolverError::NotConverged`], and those of the preconditioner.
-    pub(crate) fn solve_adjoint(
+    /// The tensors of the complex symmetric matrix that is nearest.
+    fn tensors(&self) -> Tangents {
+        let of = |points: &[PointLaw; MOST_POINTS]| points.map(|point| point.tensor());
+        Tangents::new(self.model.elements_with_a_law().to_vec(), self.points.iter().map(of).collect())
+    }
+}
+
+impl RealLinear for AmplitudeTangent {
+    fn solve_adjoint(
         &self,
         right_side: &[c64],
         nearest: &mut FieldSystem,
@@ -148,12 +152,6 @@ impl AmplitudeTangent {
         }
         let (required, cause) = (settings.required, NonConvergence::IllConditioned);
         Err(SolverError::NotConverged { residual, required, iterations, cause })
-    }
-
-    /// The tensors of the complex symmetric matrix that is nearest.
-    fn tensors(&self) -> Tangents {
-        let of = |points: &[PointLaw; MOST_POINTS]| points.map(|point| point.tensor());
-        Tangents::new(self.model.elements_with_a_law().to_vec(), self.points.iter().map(of).collect())
     }
 }
 

@@ -7,7 +7,6 @@ use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
-use crate::surface::{Conductor, SurfaceLaw};
 
 /// Share of an applied field's largest circulation along an edge that may be left where another condition says
 /// otherwise: rounding.
@@ -68,15 +67,15 @@ pub(crate) fn centre(
     Ok(centre)
 }
 
-/// Refuses applied fields that contradict each other where their surfaces meet, or a perfect conductor that touches one: along
-/// an edge `A` has one circulation, and on a perfect conductor none.
+/// Refuses applied fields that contradict each other where their surfaces meet, or a perfect conductor, by name and surface, that
+/// touches one: along an edge `A` has one circulation, and on a perfect conductor none.
 ///
 /// # Errors
 /// [`SolverError::TwoFields`], [`SolverError::FieldOnConductor`].
-pub(crate) fn check_applied(
+pub(crate) fn check_applied<'a>(
     mesh: &Mesh,
     boundaries: &[(String, Boundary)],
-    conductors: &[Conductor],
+    perfect: impl Iterator<Item = (&'a str, &'a [[NodeId; 3]])>,
 ) -> Result<(), SolverError> {
     let mut applied: HashMap<[NodeId; 2], (f64, &str)> = HashMap::new();
     let (mut largest, mut apart) = (0.0_f64, Vec::new());
@@ -98,13 +97,13 @@ pub(crate) fn check_applied(
         let surfaces = surfaces.map(str::to_owned);
         return Err(SolverError::TwoFields { surfaces, place: middle(mesh, edge) });
     }
-    for conductor in conductors.iter().filter(|conductor| conductor.law == SurfaceLaw::Perfect) {
-        for edge in conductor.surface.iter().flat_map(edges) {
+    for (name, triangles) in perfect {
+        for edge in triangles.iter().flat_map(edges) {
             if let Some((_, surface)) =
                 applied.get(&edge).filter(|(circulation, _)| circulation.abs() > least)
             {
                 return Err(SolverError::FieldOnConductor {
-                    conductor: conductor.name.clone(),
+                    conductor: name.to_owned(),
                     surface: (*surface).to_owned(),
                     place: middle(mesh, edge),
                 });

@@ -11,13 +11,14 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::family::{self, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::rotated::RotatedMatrix;
-use crate::space::{Carriers, ElementFamily, Order, Space};
+use crate::space::{Carriers, Space};
 use crate::surface::SurfaceTerm;
 use crate::tangents::Tangents;
 use crate::unknowns::{PSI, Unknowns};

@@ -23,6 +23,7 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 
 use crate::circuit::Excitation;
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::linear::{LinearSolver, LinearSolverSettings, Method, PreparedSystem, Reuse};
 use crate::model::FieldModel;
@@ -30,7 +31,6 @@ use crate::nonlinear;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::setup::FieldModelSetup;
 use crate::solution::FieldSolution;
-use crate::space::{ElementFamily, Order};
 use crate::unknowns::Unknowns;
 
 /// Relative residual of the corrections. The error of a field may be a hundred times its residual; at a thousandth the product

@@ -198,8 +198,9 @@ fn signed(coefficient: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elements::{ElementFamily, Order};
     use crate::gauge;
-    use crate::space::{ElementFamily, Order, Space};
+    use crate::space::Space;
     use fluxmorph_geometry::generate::Grid;
     use fluxmorph_geometry::topology::face_key;
     use fluxmorph_geometry::{Mesh, RegionId};

@@ -21,13 +21,10 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
-use crate::boundary::Boundary;
 use crate::element::Complex3;
 use crate::element::tabulated::Rule;
 use crate::element::tensor::{Tensor, TensorField};
 use crate::error::SolverError;
-use crate::material::Material;
-use crate::setup::FieldModelSetup;
 
 /// A region of the mesh that stands for the space outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,32 +140,6 @@ impl Shell {
     pub(crate) fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.elements.keys().copied()
     }
-}
-
-/// Refuses what open space cannot hold: matter, sources, and a field that does not vanish at infinity.
-///
-/// # Errors
-/// [`SolverError::OpenContents`].
-pub(crate) fn check_contents(
-    shell: &Shell,
-    mesh: &Mesh,
-    setup: &FieldModelSetup,
-    mut sources: impl Iterator<Item = ElementId>,
-) -> Result<(), SolverError> {
-    let Some(region) = setup.open.map(|open| open.region.index()) else { return Ok(()) };
-    let is_matter = setup.materials[region] != Material::AIR
-        || setup.remanence.get(region).is_some_and(|remanence| *remanence != [0.0; 3]);
-    let applied = |(_, boundary): &(String, Boundary)| matches!(boundary, Boundary::UniformField(_));
-    let what = if is_matter {
-        "a material other than air"
-    } else if setup.boundaries.iter().any(applied) {
-        "a uniform field applied outside"
-    } else if sources.any(|e| shell.of(e).is_some()) {
-        "a coil or its window"
-    } else {
-        return Ok(());
-    };
-    Err(SolverError::OpenContents { region: mesh.topology().region_names()[region].clone(), what })
 }
 
 /// The two sides of a shell as seen from the centre.

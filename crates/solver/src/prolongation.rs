@@ -122,11 +122,11 @@ mod tests {
 
     use super::*;
     use crate::boundary::Boundary;
+    use crate::elements::{ElementFamily, Order};
     use crate::linear::transfer::Transfer;
     use crate::material::Material;
     use crate::model::FieldModel;
     use crate::setup::FieldModelSetup;
-    use crate::space::{ElementFamily, Order};
     use crate::unknowns::Conductors;
 
     fn unknowns(

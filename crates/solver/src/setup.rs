@@ -2,20 +2,20 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::bh::BhCurve;
-use crate::boundary::Boundary;
+use crate::boundary::{self, Boundary};
 use crate::circuit::Winding;
 use crate::coil::{Coil, Condition, ConditionedSurface, planes};
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::linear::{DistributedSettings, LinearSolverSettings};
 use crate::material::Material;
-use crate::open::OpenRegion;
-use crate::space::{ElementFamily, Order};
-use crate::surface::Conductor;
+use crate::open::{OpenRegion, Shell};
+use crate::surface::{Conductor, SurfaceLaw};
 
 /// Everything that defines a field problem beside the mesh.
 #[derive(Clone, Debug)]
@@ -87,7 +87,7 @@ pub(crate) fn check_coils(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), So
     planes::check(mesh, &setup.coils, &surfaces)
 }
 
-/// Refuses numbers out of range.
+/// Refuses numbers out of range, and applied fields that cannot be.
 pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     let refuse = |what: &str, value: f64, expected: &str| {
         Err(SolverError::Parameter {
@@ -128,7 +128,9 @@ pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverEr
             });
         }
     }
-    Ok(())
+    let perfect = setup.conductors.iter().filter(|conductor| conductor.law == SurfaceLaw::Perfect);
+    let perfect = perfect.map(|conductor| (conductor.name.as_str(), conductor.surface.as_slice()));
+    boundary::check_applied(mesh, &setup.boundaries, perfect)
 }
 
 /// Refuses B–H laws where they have no meaning.
@@ -167,4 +169,30 @@ fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
         );
     }
     Ok(())
+}
+
+/// Refuses what open space cannot hold: matter, sources, and a field that does not vanish at infinity.
+///
+/// # Errors
+/// [`SolverError::OpenContents`].
+pub(crate) fn check_open(
+    shell: &Shell,
+    mesh: &Mesh,
+    setup: &FieldModelSetup,
+    mut sources: impl Iterator<Item = ElementId>,
+) -> Result<(), SolverError> {
+    let Some(region) = setup.open.map(|open| open.region.index()) else { return Ok(()) };
+    let is_matter = setup.materials[region] != Material::AIR
+        || setup.remanence.get(region).is_some_and(|remanence| *remanence != [0.0; 3]);
+    let applied = |(_, boundary): &(String, Boundary)| matches!(boundary, Boundary::UniformField(_));
+    let what = if is_matter {
+        "a material other than air"
+    } else if setup.boundaries.iter().any(applied) {
+        "a uniform field applied outside"
+    } else if sources.any(|e| shell.of(e).is_some()) {
+        "a coil or its window"
+    } else {
+        return Ok(());
+    };
+    Err(SolverError::OpenContents { region: mesh.topology().region_names()[region].clone(), what })
 }

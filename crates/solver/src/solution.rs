@@ -10,10 +10,10 @@ use rayon::prelude::*;
 
 use crate::element::Complex3;
 use crate::element::edge::FieldPoint;
+use crate::elements::ElementFamily;
 use crate::family::Local;
 use crate::linear::LinearSolverReport;
 use crate::model::FieldModel;
-use crate::space::ElementFamily;
 use crate::surface::SurfaceTerm;
 
 /// Whose potentials a solution holds.

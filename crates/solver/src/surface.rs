@@ -12,11 +12,11 @@ use crate::element::impedance::{self, ImpedanceTriangle};
 use crate::element::interface::InterfaceTriangle;
 use crate::element::lagrange::Lagrange;
 use crate::element::volume::Coefficients;
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
 use crate::material::{Material, VACUUM_PERMEABILITY};
 use crate::reentrant::beside_reentrant_edges;
-use crate::space::{ElementFamily, Order};
 
 /// A conductor that is not meshed but replaced by its surface.
 #[derive(Clone, Debug, PartialEq)]

@@ -29,11 +29,12 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::{self, Boundary, CONFLICT};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
+use crate::elements::ElementFamily;
 use crate::error::SolverError;
 use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
 use crate::gauge;
 use crate::harmonic::{self, HarmonicField};
-use crate::space::{ElementFamily, Space};
+use crate::space::Space;
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;

@@ -10,7 +10,7 @@ use fluxmorph_geometry::depth::depths;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
-use crate::space::Order;
+use crate::elements::Order;
 
 /// Skin depths down to which elements are looked at.
 const DEEPEST: f64 = 3.0;

@@ -12,8 +12,8 @@ pub use layers::CoarseLayers;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
+use crate::elements::Order;
 use crate::material::Material;
-use crate::space::Order;
 
 /// Share of the surface on which the first layer may be thicker than a skin depth before the audit warns: edges and
 /// corners of graded meshes.

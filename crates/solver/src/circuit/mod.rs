@@ -21,8 +21,6 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use crate::coil::Coil;
 use crate::error::SolverError;
 use crate::load::Sources;
-use crate::model::FieldModel;
-use crate::solution::FieldSolution;
 use crate::space::Space;
 use crate::unknowns::Unknowns;
 pub(crate) use border::{Border, Excitation};
@@ -104,11 +102,6 @@ impl Windings {
         self.with_source().next().is_some()
     }
 
-    /// The place among these of the coil with a name.
-    pub(crate) fn position(&self, model: &FieldModel, name: &str) -> Option<usize> {
-        self.coils.iter().position(|driven| model.coils()[driven.coil].name == name)
-    }
-
     /// The winding at a place.
     pub(crate) fn winding(&self, k: usize) -> &Winding {
         &self.coils[k].winding
@@ -135,23 +128,6 @@ impl Windings {
         for ((driven, _), current) in self.with_source().zip(currents) {
             load.iter_mut().zip(&driven.load).for_each(|(sum, own)| *sum += current * own);
         }
-    }
-
-    /// Current [A] of a winding in a state.
-    pub(crate) fn current(&self, k: usize, model: &FieldModel, state: &FieldSolution) -> c64 {
-        let Driven { coil, winding, .. } = &self.coils[k];
-        match (winding.voltage, model.angular_frequency() == 0.0) {
-            (None, _) => model.coils()[*coil].ampere_turns / winding.turns,
-            (Some(voltage), true) => voltage / winding.resistance,
-            (Some(_), false) => {
-                self.source_position(k).and_then(|d| state.currents().get(d)).copied().unwrap_or_default()
-            }
-        }
-    }
-
-    /// Flux linkage [Wb] of a winding in a state.
-    pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
-        self.coils[k].sources.linkage(model.space(), mesh, |e| state.element(model, e))
     }
 
     /// The voltage-driven ones.

@@ -3,7 +3,7 @@
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
-use super::{Driven, product};
+use super::{Driven, Windings, product};
 use crate::error::SolverError;
 use crate::linear::PreparedSystem;
 use crate::model::FieldModel;
@@ -32,6 +32,30 @@ pub struct Terminals {
     pub coils: Vec<CoilTerminals>,
     /// `L_jk`, by rows.
     pub inductance: Vec<Vec<f64>>,
+}
+
+impl Windings {
+    /// The place among these of the coil with a name.
+    pub(crate) fn position(&self, model: &FieldModel, name: &str) -> Option<usize> {
+        self.coils.iter().position(|driven| model.coils()[driven.coil].name == name)
+    }
+
+    /// Current [A] of a winding in a state.
+    pub(crate) fn current(&self, k: usize, model: &FieldModel, state: &FieldSolution) -> c64 {
+        let Driven { coil, winding, .. } = &self.coils[k];
+        match (winding.voltage, model.angular_frequency() == 0.0) {
+            (None, _) => model.coils()[*coil].ampere_turns / winding.turns,
+            (Some(voltage), true) => voltage / winding.resistance,
+            (Some(_), false) => {
+                self.source_position(k).and_then(|d| state.currents().get(d)).copied().unwrap_or_default()
+            }
+        }
+    }
+
+    /// Flux linkage [Wb] of a winding in a state.
+    pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
+        self.coils[k].sources.linkage(model.space(), mesh, |e| state.element(model, e))
+    }
 }
 
 /// `F_jᵀ K⁻¹ F_k` [H], by rows; the responses are those of the state, or solved for.

@@ -22,7 +22,7 @@ use crate::element::tabulated::Rule;
 use crate::element::tensor::{Curls, CurlsOfRule};
 use crate::element::virtual_work::VirtualWork;
 use crate::element::volume::Coefficients;
-use crate::space::{ElementFamily, Order};
+use crate::elements::{ElementFamily, Order};
 use crate::surface::SurfaceTerm;
 
 /// Most carriers of an element.

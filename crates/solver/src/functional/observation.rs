@@ -11,10 +11,10 @@ use super::FunctionalValue;
 use super::homogeneity::{Compared, FieldQuality, Spread};
 use crate::element::Complex3;
 use crate::element::quadrature::{self, Node};
+use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::space::Order;
 
 /// How observation cells are weighted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

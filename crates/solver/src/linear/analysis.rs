@@ -12,8 +12,8 @@ use fluxmorph_geometry::fem::{
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
 use super::two_level::{self, TwoLevelAnalysis};
+use crate::elements::Order;
 use crate::error::SolverError;
-use crate::space::Order;
 
 /// What a system is analysed by.
 pub(crate) struct SystemPattern<'a> {

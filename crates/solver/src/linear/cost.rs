@@ -4,7 +4,7 @@
 //! matter, and these move little from machine to machine; a clock would make the bits of a run depend on the load.
 
 use super::method::{FieldKind, Method, Reuse};
-use crate::space::Order;
+use crate::elements::Order;
 
 /// Nanoseconds a byte that is streamed from memory in a product.
 const BYTE: f64 = 0.15;

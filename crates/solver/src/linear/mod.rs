@@ -30,7 +30,7 @@ pub use cache::LinearSolverCache;
 pub use distributed::{DistributedMethod, DistributedSettings, DistributedSystem};
 pub(crate) use method::FieldKind;
 pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};
-pub(crate) use prepared::FieldSystem;
 pub use prepared::PreparedSystem;
+pub(crate) use prepared::{FieldSystem, RealLinear};
 pub use report::LinearSolverReport;
 pub use system::{LocalSystem, SolverEvent};

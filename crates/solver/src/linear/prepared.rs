@@ -7,7 +7,6 @@ use super::distributed::DistributedSystem;
 use super::method::Method;
 use super::report::LinearSolverReport;
 use super::system::{LocalSystem, SolverEvent};
-use crate::amplitude::AmplitudeTangent;
 use crate::circuit::{Border, Excitation};
 use crate::error::SolverError;
 
@@ -20,13 +19,26 @@ pub(crate) enum FieldSystem {
     Distributed(DistributedSystem),
 }
 
+/// A derivative of the field's equations that is linear over the real numbers alone.
+pub(crate) trait RealLinear: std::fmt::Debug + Send + Sync {
+    /// Solves the adjoint problem, preconditioned by the matrix that is nearest to the derivative.
+    ///
+    /// # Errors
+    /// [`SolverError::NotConverged`], and those of the preconditioner.
+    fn solve_adjoint(
+        &self,
+        right_side: &[c64],
+        nearest: &mut FieldSystem,
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError>;
+}
+
 /// A matrix ready to be solved with, for any number of right sides, with the circuits that border it.
 #[derive(Debug)]
 pub struct PreparedSystem {
     field: FieldSystem,
     border: Option<Border>,
     /// Where the derivative of the equations is linear over the real numbers alone: then the matrix is its preconditioner.
-    tangent: Option<Box<AmplitudeTangent>>,
+    tangent: Option<Box<dyn RealLinear>>,
 }
 
 impl PreparedSystem {
@@ -45,7 +57,7 @@ impl PreparedSystem {
     }
 
     /// The same with a derivative that the matrix is nearest to.
-    pub(crate) fn with_tangent(self, tangent: AmplitudeTangent) -> Self {
+    pub(crate) fn with_tangent(self, tangent: impl RealLinear + 'static) -> Self {
         Self { tangent: Some(Box::new(tangent)), ..self }
     }
 

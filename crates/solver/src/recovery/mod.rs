@@ -25,10 +25,10 @@ use rayon::prelude::*;
 use crate::element::Complex3;
 use crate::element::quadrature::Node;
 use crate::element::tabulated::Rule;
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::space::{ElementFamily, Order};
 use fit::Fit;
 
 /// Layers of elements around the probed one after which no fit is tried.

@@ -20,7 +20,7 @@
 use fluxmorph_geometry::tet4::EDGES;
 
 use super::polynomial::Polynomial;
-use crate::space::Order;
+use crate::elements::Order;
 
 /// Component of the Whitney function of an edge.
 pub(crate) const WHITNEY: usize = 0;

@@ -22,7 +22,7 @@ use fluxmorph_geometry::tet4::{EDGES, Point, Tet4, cross};
 
 use super::Complex3;
 use super::tabulated::Rule;
-use crate::space::Order;
+use crate::elements::Order;
 use functions::ASCENDING_FACES;
 
 /// A tetrahedron as its edge functions see it: the vertices in ascending order of their numbers.

@@ -13,7 +13,7 @@ use super::super::Complex3;
 use super::super::density::ElementIntegral;
 use super::super::triangle::{Triangle, quadratic_form};
 use super::functions::{self, ASCENDING_TRIANGLE_EDGES};
-use crate::space::Order;
+use crate::elements::Order;
 
 /// Edge functions on a triangle: `N` edges and faces with unknowns, `M` functions.
 #[derive(Debug)]

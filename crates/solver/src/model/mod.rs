@@ -1,9 +1,11 @@
 //! The field problem on a topology: what does not change while the mesh moves.
 //!
 //! Lives here: what a model has at one frequency (weak form) and at all (spaces with their unknowns and patterns, sources,
-//! analysis of the linear solver). Does not live here: what it is made from ([`crate::setup`]), its solution (`solve`), assembly
+//! analysis of the linear solver). Does not live here: what it is made from ([`crate::setup`]) and how (`construction`), its solution (`solve`), assembly
 //! (`discretisation`), element formulas ([`crate::element`]), the linear solver ([`crate::linear`]), what is done with a
 //! solution ([`crate::solution`], [`crate::functional`]).
+
+mod construction;
 
 use std::sync::Arc;
 
@@ -12,20 +14,17 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
-use crate::boundary;
-use crate::circuit::{self, Border, Windings};
-use crate::coil::{Coil, continuity};
+use crate::circuit::{Border, Windings};
+use crate::coil::Coil;
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
 use crate::error::SolverError;
-use crate::linear::{
-    FieldKind, FieldSystem, LinearSolverCache, LocalSystem, PreparedSystem, SystemAnalysis, SystemPattern,
-};
+use crate::linear::{FieldSystem, LinearSolverCache, LocalSystem, PreparedSystem, SystemAnalysis};
 use crate::load::Sources;
 use crate::material::Material;
-use crate::open::{self, Shell};
-use crate::setup::{self, FieldModelSetup};
+use crate::open::Shell;
+use crate::setup::FieldModelSetup;
 use crate::space::Space;
 use crate::surface::{Conductor, SurfaceTerm};
 use crate::tangents::Tangents;
@@ -71,94 +70,6 @@ impl From<CsrMatrix<c64>> for AssembledMatrix {
 }
 
 impl FieldModel {
-    /// Sets up the problem on a reference mesh: equation numbers, pattern, symbolic factor, coil integrals.
-    ///
-    /// # Errors
-    /// [`SolverError`] names what is missing or out of range.
-    pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
-        let (angular_frequency, weak_form) = Self::weak_form(mesh, &setup)?;
-        let ownership = setup.ownership.as_ref().map(|(ownership, _)| ownership);
-        let fine =
-            Discretisation::new(mesh, (setup.family, setup.order), &weak_form, &setup.boundaries, ownership)?;
-        let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
-        let pattern = SystemPattern {
-            structure: fine.pattern.structure(),
-            hosts: fine.hosts(),
-            reference: &|| fine.assemble(&weak_form, None, mesh),
-            prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
-        };
-        let analysis = match ownership {
-            None => Some(SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?),
-            Some(_) => None,
-        };
-        let magnetisation: Vec<Point> = setup
-            .remanence
-            .iter()
-            .zip(&setup.materials)
-            .map(|(b, m)| b.map(|b| m.reluctivity() * b))
-            .collect();
-        let given = circuit::given_currents(&setup.coils, &setup.windings, angular_frequency);
-        let sources = Sources::new(mesh, &given, &magnetisation)?;
-        let windings = Windings::new(mesh, &setup.coils, &setup.windings, (&fine.space, &fine.unknowns))?;
-        let windings = Arc::new(windings);
-        setup::check_coils(mesh, &setup)?;
-        let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
-        let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
-        continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
-        if let Some(shell) = weak_form.shell() {
-            open::check_contents(shell, mesh, &setup, sources.fixed_elements())?;
-        }
-        let shared = Arc::new(SharedParts { fine, sources, windings, analysis: analysis.map(Arc::new) });
-        Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
-    }
-
-    /// The model, distributed where it has ranks.
-    fn whole(
-        setup: FieldModelSetup,
-        (angular_frequency, weak_form): (f64, WeakForm),
-        shared: Arc<SharedParts>,
-    ) -> Self {
-        let setup = Arc::new(setup);
-        let weak_form = Arc::new(weak_form);
-        let mut model = Self { setup, angular_frequency, weak_form, shared, distributed: None };
-        if let Some((ownership, settings)) = &model.setup.ownership {
-            model.distributed = Some(Arc::new(Distributed::new(&model, ownership, settings)));
-        }
-        model
-    }
-
-    /// The same problem at another frequency [Hz]; between frequencies above zero, equation numbers, pattern, symbolic
-    /// factor and coil integrals are shared.
-    ///
-    /// # Errors
-    /// As [`FieldModel::new`].
-    pub fn at_frequency(&self, mesh: &Mesh, frequency: f64) -> Result<Self, SolverError> {
-        let setup = FieldModelSetup { frequency, ..(*self.setup).clone() };
-        if frequency == 0.0 || self.angular_frequency == 0.0 {
-            return Self::new(mesh, setup);
-        }
-        let weak_form = Self::weak_form(mesh, &setup)?;
-        Ok(Self::whole(setup, weak_form, Arc::clone(&self.shared)))
-    }
-
-    /// Checks a set-up; `ω` [rad/s] and the weak form.
-    fn weak_form(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(f64, WeakForm), SolverError> {
-        setup::check(mesh, setup)?;
-        boundary::check_applied(mesh, &setup.boundaries, &setup.conductors)?;
-        let angular_frequency = 2.0 * std::f64::consts::PI * setup.frequency;
-        let numbers = (angular_frequency, setup.penalty);
-        let form = WeakForm::new(
-            mesh,
-            (setup.family, setup.order),
-            numbers,
-            &setup.materials,
-            &setup.boundaries,
-            &setup.conductors,
-            setup.open.as_ref(),
-        )?;
-        Ok((angular_frequency, form.with_curves(&setup.bh)))
-    }
-
     pub(crate) fn has_reentrant_walls(&self) -> bool {
         self.weak_form.has_reentrant_walls()
     }
