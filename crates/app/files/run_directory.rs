@@ -262,7 +262,7 @@ impl RunDirectory {
 
     fn holds_only_leftovers(&self) -> Result<bool, OutputError> {
         for name in self.entries(&self.path)? {
-            let leftover = name.starts_with(UNFINISHED) || (&name == FIELDS && self.has_no_fields()?);
+            let leftover = name.starts_with(UNFINISHED) || (name == FIELDS && self.has_no_fields()?);
             if !leftover {
                 return Ok(false);
             }
