@@ -312,7 +312,8 @@ fn winding(coil: &config::Coil) -> Option<Winding> {
 /// Notices about the current of each coil region.
 pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     let notice = |coil: &coil::Coil| match &coil.shape {
-        CoilShape::Racetrack(_) => None,
+        // The current of a solid conductor is part of the solution.
+        CoilShape::Racetrack(_) | CoilShape::Solid(_) => None,
         CoilShape::Region(current) => Some(format!("coil `{}`: {}", coil.name, current.report())),
     };
     model.coils().iter().filter_map(notice).collect()

@@ -11,9 +11,10 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
+use crate::circuit::{SolidRows, Solids};
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
-use crate::family::{self, Matrices};
+use crate::family::{self, Local, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
@@ -44,6 +45,9 @@ trait Bound: std::fmt::Debug + Send + Sync {
     fn add(&self, of: &Discretisation, form: (&WeakForm, Option<&Tangents>), mesh: &Mesh, values: &mut [c64]);
     /// `f −= K A_prescribed` of the elements and triangles that prescribed values touch.
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]);
+    /// The matrix of an element times some coefficients.
+    fn times(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, e: ElementId, x: &Local)
+    -> Local;
 }
 
 /// Groups of elements with `N` and triangles with `F` carriers.
@@ -88,6 +92,25 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
             let matrix = weak_form.triangle(self.matrices, mesh, t);
             of.subtract_lift(&of.space.triangle(weak_form.triangles()[t]), &matrix, load);
         }
+    }
+
+    fn times(
+        &self,
+        of: &Discretisation,
+        weak_form: &WeakForm,
+        mesh: &Mesh,
+        e: ElementId,
+        x: &Local,
+    ) -> Local {
+        let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, None));
+        Local::new(N, |a| {
+            let mut row = [c64::default(); 4];
+            for (b, x) in x.values().iter().enumerate().take(N) {
+                let block = matrix.block(a, b);
+                (0..4).for_each(|i| row[i] += (0..4).map(|j| block[i][j] * x[j]).sum::<c64>());
+            }
+            row
+        })
     }
 }
 
@@ -219,6 +242,17 @@ impl Discretisation {
     /// `f −= K A_prescribed`: what the prescribed part of `A` does to the load.
     pub(crate) fn lift(&self, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
         self.groups.subtract_lift(self, weak_form, mesh, load);
+    }
+
+    /// What solid conductors add to the matrix on a mesh.
+    pub(crate) fn solid_rows(&self, solids: &Solids, weak_form: &WeakForm, mesh: &Mesh) -> SolidRows {
+        let times = |e: ElementId, x: &Local| self.groups.times(self, weak_form, mesh, e, x);
+        let scatter = |e: ElementId, local: &Local, load: &mut [c64]| {
+            for (&carrier, values) in self.space.carriers_of(e).iter().zip(local.values()) {
+                self.unknowns.scatter_add(load, carrier, *values);
+            }
+        };
+        solids.rows(self.unknowns.dofs.count(), times, scatter)
     }
 
     /// `f −= K A_prescribed` for one element.

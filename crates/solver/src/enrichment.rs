@@ -164,15 +164,18 @@ impl Enrichment {
             ElementFamily::Edge => injection(coarse.unknowns(), fine),
         };
         let mut field = vec![c64::default(); fine.dofs.count()];
-        prolongation.mul(state.values(), &mut field);
-        let linear = model.assemble(mesh);
+        prolongation.mul(&state.values()[..coarse.unknown_count()], &mut field);
+        field.extend(state.solid_unknowns(coarse));
         let mut residual = model.load(mesh);
         let currents = state.currents().to_vec();
         model.windings().add_driven_load(&currents, &mut residual);
-        subtract_product(&linear, &field, &mut residual);
         let (mut system, linear) = if model.is_linear() {
-            (model.prepare(linear)?, None)
+            let system = model.prepare(model.assembled(mesh))?;
+            system.subtract_product(&field, &mut residual);
+            (system, None)
         } else {
+            let linear = model.assemble(mesh);
+            subtract_product(&linear, &field, &mut residual);
             let added = nonlinear::added(&model, mesh, &FieldSolution::of_state(field.clone()));
             axpy(c64::from(-1.0), &added.residual, &mut residual);
             (model.prepare(model.assemble_tangent(mesh, &added.tangents))?, Some((linear, added.residual)))
@@ -182,10 +185,7 @@ impl Enrichment {
         let mut rest = residual.clone();
         model.windings().add_driven_load(&driven, &mut rest);
         match linear {
-            None => {
-                let matrix = system.matrix().expect("an estimate is made in one process");
-                subtract_product(matrix, &correction, &mut rest);
-            }
+            None => system.subtract_product(&correction, &mut rest),
             Some((linear, before)) => {
                 subtract_product(&linear, &correction, &mut rest);
                 let corrected = field.iter().zip(&correction).map(|(u, e)| u + e).collect();
@@ -212,18 +212,17 @@ impl Enrichment {
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
-    ///
-    /// # Panics
-    /// If several ranks solve.
     pub fn respond(&mut self, winding: usize, coarse: &FieldSolution) -> Result<(), SolverError> {
         if self.responses.contains_key(&winding) {
             return Ok(());
         }
-        let mut field = vec![c64::default(); self.field.len()];
-        self.prolongation.mul(coarse.values(), &mut field);
+        let (of_first, of_solids) = coarse.values().split_at(self.prolongation.structure.column_count);
+        let mut field = vec![c64::default(); self.model.unknown_count()];
+        self.prolongation.mul(of_first, &mut field);
+        field.extend(of_solids);
         let mut residual = self.model.windings().load(winding).to_vec();
-        let matrix = self.system.matrix().expect("an estimate is made in one process");
-        subtract_product(matrix, &field, &mut residual);
+        residual.resize(field.len(), c64::default());
+        self.system.subtract_product(&field, &mut residual);
         let (correction, report) = self.system.solve_field(&residual)?;
         self.iterations += report.iterations;
         self.responses.insert(winding, Response { field, residual, correction });
@@ -300,7 +299,7 @@ impl Enrichment {
                 }
             }
         }
-        let mut first = vec![c64::default(); values.len()];
+        let mut first = vec![c64::default(); fine.count()];
         self.prolongation.mul(&at_carriers, &mut first);
         values.iter_mut().zip(first).for_each(|(value, first)| *value -= first);
         values

@@ -8,7 +8,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::bh::BhCurve;
 use crate::boundary::{self, Boundary};
-use crate::circuit::Winding;
+use crate::circuit::{Winding, solids};
 use crate::coil::{Coil, Condition, ConditionedSurface, planes};
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
@@ -120,6 +120,7 @@ pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverEr
         return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
     }
     check_laws(setup)?;
+    check_solids(setup)?;
     for conductor in &setup.conductors {
         if conductor.surface.is_empty() {
             return Err(SolverError::EmptyRegion {
@@ -131,6 +132,25 @@ pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverEr
     let perfect = setup.conductors.iter().filter(|conductor| conductor.law == SurfaceLaw::Perfect);
     let perfect = perfect.map(|conductor| (conductor.name.as_str(), conductor.surface.as_slice()));
     boundary::check_applied(mesh, &setup.boundaries, perfect)
+}
+
+/// Refuses solid conductors where they cannot be solved with.
+fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let Some((coil, _)) = solids::conductors(&setup.coils).next().filter(|_| setup.frequency > 0.0) else {
+        return Ok(());
+    };
+    let refuse = |what: &str, value: String, expected: &str| {
+        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
+    };
+    let coil = format!("the solid conductor `{}`", setup.coils[coil].name);
+    if setup.bh.iter().any(Option::is_some) {
+        let expected = "materials with a permeability: above 0 Hz a circuit is solved with linear materials";
+        return refuse("bh", format!("a curve beside {coil}"), expected);
+    }
+    if setup.ownership.is_some() {
+        return refuse("ranks", "several".to_owned(), "one process for a solid conductor above 0 Hz");
+    }
+    Ok(())
 }
 
 /// Refuses B–H laws where they have no meaning.

@@ -54,7 +54,7 @@ impl FieldSolution {
         &self.currents
     }
 
-    /// The solution of a state of which nothing but its unknowns is known, one per equation.
+    /// The solution of a state of which nothing but its unknowns is known, as [`FieldSolution::values`] has them.
     pub fn of_state(values: Vec<c64>) -> Self {
         Self::state(values, LinearSolverReport { iterations: 0, residual: 0.0 })
     }
@@ -92,7 +92,7 @@ impl FieldSolution {
         self.newton_steps
     }
 
-    /// The unknowns, one per equation.
+    /// The unknowns, one per equation, then one per solid conductor.
     pub fn values(&self) -> &[c64] {
         &self.values
     }
@@ -124,10 +124,18 @@ impl FieldSolution {
         Local::new(carriers.len(), |a| self.potentials(model, carriers[a]))
     }
 
-    /// Coefficients of an element.
+    /// Coefficients of an element, with what the voltage of a solid conductor adds to them.
     #[inline]
     pub(crate) fn element(&self, model: &FieldModel, e: ElementId) -> Local {
-        self.local(model, model.space().carriers_of(e))
+        let mut local = self.local(model, model.space().carriers_of(e));
+        model.solids().add_to(e, self.solid_unknowns(model), &mut local);
+        local
+    }
+
+    /// `V/(jω)` [Wb] of solid conductors.
+    #[inline]
+    pub(crate) fn solid_unknowns(&self, model: &FieldModel) -> &[c64] {
+        self.values.get(model.unknown_count()..).unwrap_or_default()
     }
 
     /// The field at barycentric coordinates in an element.

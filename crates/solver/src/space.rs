@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::element::edge::functions::{ASCENDING_FACES, ASCENDING_TRIANGLE_EDGES};
 use crate::element::lagrange::TRIANGLE_EDGES;
 use crate::elements::{ElementFamily, Order};
-use crate::family::{self, Cell, EachFunction, Family};
+use crate::family::{self, Cell, EachFunction, Family, MOST};
 
 /// Carriers of unknowns, and those of each element.
 #[derive(Clone, Debug)]
@@ -221,6 +221,27 @@ impl Space {
     pub fn cell(&self, mesh: &Mesh, e: ElementId) -> Cell {
         let order = self.ascending.get(e.index()).copied().unwrap_or([0, 1, 2, 3]);
         Cell { tet: Tet4::new(mesh.vertices(e)), order }
+    }
+
+    /// The coefficients of the gradient of a linear function by its values at the vertices of an element, one a carrier: of edges
+    /// those of the Whitney functions, of nodes those of `ψ`.
+    pub(crate) fn gradient_coefficients(&self, e: ElementId, values: &[f64; 4]) -> [f64; MOST] {
+        let mut coefficients = [0.0; MOST];
+        match self.family {
+            ElementFamily::Nodal => {
+                coefficients[..4].copy_from_slice(values);
+                for (k, [i, j]) in EDGES.into_iter().enumerate().filter(|_| self.order == Order::Quadratic) {
+                    coefficients[4 + k] = 0.5 * (values[i] + values[j]);
+                }
+            }
+            ElementFamily::Edge => {
+                let values = self.ascending[e.index()].map(|place| values[usize::from(place)]);
+                for (k, [i, j]) in EDGES.into_iter().enumerate() {
+                    coefficients[k] = values[j] - values[i];
+                }
+            }
+        }
+        coefficients
     }
 
     /// Calls back with every function of an element at barycentric coordinates: local carrier, component, value of what it

@@ -70,6 +70,12 @@ pub struct Conductors {
 }
 
 impl Conductors {
+    /// The same without some elements, ascending.
+    pub(crate) fn without(mut self, elements: &[ElementId]) -> Self {
+        self.elements.retain(|e| elements.binary_search(e).is_err());
+        self
+    }
+
     /// The vertices between which current may pass: on surfaces with a fixed tangential `A`, and in and on conductors.
     pub(crate) fn joined(
         &self,

@@ -11,6 +11,7 @@ mod open;
 mod prisms;
 mod saturation;
 mod sheet;
+mod solid;
 mod sources;
 mod two_level;
 

@@ -1,9 +1,13 @@
-//! The elimination of the field for the currents that voltages drive.
+//! The elimination of the field for the voltages of solid conductors and the currents that voltages drive.
+//!
+//! With `F = −c` of a solid conductor and `y` for `U` and `I` the system is `K u − F y = f`, `Fᵀu + D y = r`: see the modules
+//! above for its entries. `W = K⁻¹F`, and `(FᵀW + D) y = r − FᵀK⁻¹f`.
 
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 
+use super::solids::SolidRows;
 use super::{Windings, product};
 use crate::error::SolverError;
 use crate::linear::LinearSolverReport;
@@ -11,67 +15,112 @@ use crate::linear::LinearSolverReport;
 /// Solves the field's system for a right side.
 type Solve<'a> = dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> + 'a;
 
-/// The elimination of the field for the currents of voltage-driven coils, on one mesh.
+/// The elimination of the field on one mesh: solid conductors first, then voltage-driven coils.
 #[derive(Debug)]
 pub(crate) struct Border {
     windings: Arc<Windings>,
-    /// `W = K⁻¹ F`.
+    solids: SolidRows,
+    /// `W`; empty where `F` is zero, of a solid conductor's current.
     responses: Vec<Vec<c64>>,
-    /// `FᵀW + Z/(jω)` [H], by rows.
+    /// `FᵀW + D` [H], by rows.
     schur: Vec<Vec<c64>>,
     angular_frequency: f64,
 }
 
 impl Border {
-    /// Solves for 1 A in each; `None` where no voltage drives a current.
+    /// Solves for 1 Wb and 1 A in each; `None` where there is neither solid conductor nor driven current.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
     pub(crate) fn new(
         windings: &Arc<Windings>,
+        solids: SolidRows,
         angular_frequency: f64,
         solve: &mut Solve<'_>,
     ) -> Result<Option<Self>, SolverError> {
-        if angular_frequency == 0.0 || windings.with_source().next().is_none() {
+        let is_driven = windings.with_source().next().is_some();
+        if angular_frequency == 0.0 || solids.count() == 0 && !is_driven {
             return Ok(None);
         }
-        let responses: Vec<Vec<c64>> = windings
-            .with_source()
-            .map(|(driven, _)| Ok(solve(&driven.load)?.0))
-            .collect::<Result<_, SolverError>>()?;
-        let mut schur: Vec<Vec<c64>> = windings
-            .with_source()
-            .map(|(driven, _)| responses.iter().map(|w| product(&driven.load, w)).collect())
-            .collect();
-        for (k, (driven, _)) in windings.with_source().enumerate() {
-            schur[k][k] += driven.winding.impedance(angular_frequency) / c64::new(0.0, angular_frequency);
+        let mut respond = |load: &[c64]| Ok(solve(load)?.0);
+        let mut responses: Vec<Vec<c64>> =
+            solids.loads.iter().map(|load| respond(load)).collect::<Result<_, SolverError>>()?;
+        for (driven, _) in windings.with_source() {
+            responses.push(match driven.solid {
+                Some(_) => Vec::new(),
+                None => respond(&driven.load)?,
+            });
         }
-        Ok(Some(Self { windings: Arc::clone(windings), responses, schur, angular_frequency }))
+        let border =
+            Self { windings: Arc::clone(windings), solids, responses, schur: Vec::new(), angular_frequency };
+        let schur = border.eliminated();
+        Ok(Some(Self { schur, ..border }))
     }
 
-    /// Number of the field's unknowns.
-    pub(crate) fn field_unknowns(&self) -> usize {
-        self.responses.first().map_or(0, Vec::len)
-    }
-
-    /// Completes `u_0 = K⁻¹ f` to the solution of the whole system; the currents [A].
-    pub(crate) fn complete(&self, values: &mut [c64], right_side: Excitation<'_>) -> Vec<c64> {
-        let source = |d: usize, voltage: c64| match right_side {
-            Excitation::Voltages => voltage / c64::new(0.0, self.angular_frequency),
-            Excitation::Given(entries) => entries.get(d).map_or(c64::default(), |entry| -entry),
-        };
-        let right: Vec<c64> = self
-            .windings
-            .with_source()
-            .enumerate()
-            .map(|(d, (driven, voltage))| source(d, voltage) - product(&driven.load, values))
-            .collect();
-        let currents = solve_dense(self.schur.clone(), right);
-        for (current, response) in currents.iter().zip(&self.responses) {
-            for (value, w) in values.iter_mut().zip(response) {
-                *value += current * w;
+    /// `FᵀW + D`.
+    fn eliminated(&self) -> Vec<Vec<c64>> {
+        let row = |load: &[c64]| self.responses.iter().map(|w| product(load, w)).collect();
+        let mut schur: Vec<Vec<c64>> = self.loads().map(row).collect();
+        let solids = self.solids.count();
+        for (k, diagonal) in self.solids.diagonal.iter().enumerate() {
+            schur[k][k] -= diagonal;
+        }
+        for (k, (driven, _)) in self.windings.with_source().enumerate() {
+            let own = solids + k;
+            schur[own][own] +=
+                driven.winding.impedance(self.angular_frequency) / c64::new(0.0, self.angular_frequency);
+            if let Some(conductor) = driven.solid {
+                schur[own][conductor] += 1.0;
+                schur[conductor][own] += 1.0;
             }
         }
+        schur
+    }
+
+    /// `F` of every unknown, as far as it is in the field's equations.
+    fn loads(&self) -> impl Iterator<Item = &[c64]> {
+        let of_coils = self.windings.with_source().map(|(driven, _)| driven.field_load());
+        self.solids.loads.iter().map(Vec::as_slice).chain(of_coils)
+    }
+
+    /// What solid conductors add to the field's matrix.
+    pub(crate) fn solids(&self) -> &SolidRows {
+        &self.solids
+    }
+
+    /// Number of the field's unknowns, without and with those of solid conductors.
+    pub(crate) fn field_unknowns(&self) -> [usize; 2] {
+        let count = self.responses.first().map_or(0, Vec::len);
+        [count, count + self.solids.count()]
+    }
+
+    /// Completes `K⁻¹f` to the solution of the whole system, with the `U` of solid conductors behind it; the currents [A].
+    /// `of_solids` are the right sides of their rows, zero where they end.
+    pub(crate) fn complete(
+        &self,
+        values: &mut Vec<c64>,
+        of_solids: &[c64],
+        right_side: Excitation<'_>,
+    ) -> Vec<c64> {
+        let solids = self.solids.count();
+        let entry = |entries: &[c64], k: usize| entries.get(k).map_or(c64::default(), |entry| -entry);
+        let sources = self.windings.with_source().enumerate().map(|(d, (_, voltage))| match right_side {
+            Excitation::Voltages => voltage / c64::new(0.0, self.angular_frequency),
+            Excitation::Given(entries) => entry(entries, d),
+            Excitation::Open => c64::default(),
+        });
+        let size = if right_side == Excitation::Open { solids } else { self.schur.len() };
+        let right = (0..solids).map(|k| entry(of_solids, k)).chain(sources).zip(self.loads());
+        let right: Vec<c64> = right.map(|(r, load)| r - product(load, values)).take(size).collect();
+        let matrix = self.schur.iter().take(size).map(|row| row[..size].to_vec()).collect();
+        let mut unknowns = solve_dense(matrix, right);
+        for (unknown, response) in unknowns.iter().zip(&self.responses) {
+            for (value, w) in values.iter_mut().zip(response) {
+                *value += unknown * w;
+            }
+        }
+        let currents = unknowns.split_off(solids);
+        values.extend(unknowns);
         currents
     }
 }
@@ -83,6 +132,8 @@ pub(crate) enum Excitation<'a> {
     Voltages,
     /// These entries, as of an adjoint, zero where they end.
     Given(&'a [c64]),
+    /// No current flows in them, as of the response to 1 A.
+    Open,
 }
 
 /// Gaussian elimination with row pivoting, for the few equations of circuits.

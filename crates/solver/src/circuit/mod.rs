@@ -8,22 +8,26 @@
 //!
 //! complex symmetric as `K` is, so that the adjoint has the same matrix, and as `F` does not move with the design, the
 //! derivative of `K` remains all there is. It is solved by eliminating `u`: one further solution a coil. All values are those
-//! of the meshed part. At 0 Hz a voltage drives `V/R`.
-//! Lives here: windings (`mod`), the elimination (`border`), what the terminals see (`terminals`). Does not live here: the loads
+//! of the meshed part. At 0 Hz a voltage drives `V/R`. A solid conductor is a coil of one turn, whose `λ = V/(jω)` is itself an
+//! unknown of the field (`solids`).
+//! Lives here: windings (`mod`), the elimination (`border`), solid conductors (`solids`), what the terminals see (`terminals`). Does not live here: the loads
 //! (`crate::load`), functionals of terminals and inductances (`crate::functional`).
 
 mod border;
+pub(crate) mod solids;
 mod terminals;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh};
 
-use crate::coil::Coil;
+use crate::coil::{Coil, CoilShape};
 use crate::error::SolverError;
 use crate::load::Sources;
+use crate::material::Material;
 use crate::space::Space;
 use crate::unknowns::Unknowns;
 pub(crate) use border::{Border, Excitation};
+pub(crate) use solids::{SolidRows, Solids};
 pub use terminals::{CoilTerminals, Terminals, terminals};
 
 /// A coil's winding, and the circuit that it is in.
@@ -42,6 +46,10 @@ pub struct Winding {
 }
 
 impl Winding {
+    /// Of a solid conductor with nothing in series, whose current is given.
+    const SOLID: Self =
+        Self { turns: 1.0, resistance: 0.0, series_inductance: 0.0, series_capacitance: None, voltage: None };
+
     /// `R + jωL_s + 1/(jωC)` [Ω].
     pub fn impedance(&self, angular_frequency: f64) -> c64 {
         let capacitive = self.series_capacitance.map_or(0.0, |c| -1.0 / (angular_frequency * c));
@@ -61,9 +69,18 @@ struct Driven {
     /// Place of its coil in the model.
     coil: usize,
     winding: Winding,
+    /// Of a solid conductor above 0 Hz, by its number: it is in the field, and no source.
+    solid: Option<usize>,
     sources: Sources,
-    /// `F` [m per unit of a test function].
+    /// `F` [m per unit of a test function]; of a solid conductor 1 in its own row behind those of the field.
     load: Vec<c64>,
+}
+
+impl Driven {
+    /// `F` as far as it is in the field's equations: nothing of a solid conductor.
+    fn field_load(&self) -> &[c64] {
+        if self.solid.is_some() { &[] } else { &self.load }
+    }
 }
 
 impl Windings {
@@ -75,17 +92,21 @@ impl Windings {
         mesh: &Mesh,
         coils: &[Coil],
         windings: &[Option<Winding>],
-        (space, unknowns): (&Space, &Unknowns),
+        (space, unknowns, solids): (&Space, &Unknowns, &Solids),
     ) -> Result<Self, SolverError> {
         let of = |(coil, winding): (usize, &Option<Winding>)| -> Option<Result<Driven, SolverError>> {
-            let (winding, unit) = (
-                (*winding)?,
-                Coil { ampere_turns: c64::from(winding.as_ref()?.turns), ..coils.get(coil)?.clone() },
-            );
-            Some(Sources::new(mesh, &[unit], &[]).map(|sources| {
+            let winding = (*winding)?;
+            let solid = solids.of_coil(coil);
+            let unit = Coil { ampere_turns: c64::from(winding.turns), ..coils.get(coil)?.clone() };
+            let unit = if solid.is_some() { Vec::new() } else { vec![unit] };
+            Some(Sources::new(mesh, &unit, &[]).map(|sources| {
                 let mut load = vec![c64::default(); unknowns.dofs.count()];
                 sources.add_load(space, unknowns, mesh, &mut load);
-                Driven { coil, winding, sources, load }
+                if let Some(conductor) = solid {
+                    load.resize(load.len() + conductor + 1, c64::default());
+                    load[unknowns.dofs.count() + conductor] = c64::from(1.0);
+                }
+                Driven { coil, winding, solid, sources, load }
             }))
         };
         let coils = windings.iter().enumerate().filter_map(of).collect::<Result<_, _>>()?;
@@ -97,9 +118,9 @@ impl Windings {
         self.coils.iter().flat_map(|driven| driven.sources.fixed_elements())
     }
 
-    /// Whether a voltage excites a field.
-    pub(crate) fn is_driven(&self) -> bool {
-        self.with_source().next().is_some()
+    /// Whether a voltage or the current of a solid conductor excites a field.
+    pub(crate) fn is_driven(&self, coils: &[Coil]) -> bool {
+        self.with_source().next().is_some() || self.solid_currents(coils).any(|i| i != c64::default())
     }
 
     /// The winding at a place.
@@ -130,14 +151,55 @@ impl Windings {
         }
     }
 
+    /// Net currents [A] of the solid conductors whose current is given, zero of the others: behind the load of the field.
+    pub(crate) fn solid_currents<'a>(&'a self, coils: &'a [Coil]) -> impl Iterator<Item = c64> + 'a {
+        let solids = self.coils.iter().filter(|driven| driven.solid.is_some());
+        solids.map(|driven| match driven.winding.voltage {
+            None => coils[driven.coil].ampere_turns,
+            Some(_) => c64::default(),
+        })
+    }
+
     /// The voltage-driven ones.
     fn with_source(&self) -> impl Iterator<Item = (&Driven, c64)> {
         self.coils.iter().filter_map(|driven| Some((driven, driven.winding.voltage?)))
     }
 }
 
+/// The windings of all coils: that of a solid conductor has one turn, and at 0 Hz the resistance of its conduction.
+///
+/// # Errors
+/// [`SolverError::EmptyRegion`] for a solid conductor of a material that does not conduct, or of several.
+pub(crate) fn windings(
+    mesh: &Mesh,
+    coils: &[Coil],
+    windings: &[Option<Winding>],
+    materials: &[Material],
+    angular_frequency: f64,
+) -> Result<Vec<Option<Winding>>, SolverError> {
+    let mut windings = windings.to_vec();
+    for (coil, conductor) in solids::conductors(coils) {
+        let regions = conductor.potential().iter().map(|(e, _)| mesh.topology().region_of()[e.index()]);
+        let mut conductivities = regions.map(|region| materials[region.index()].conductivity);
+        let conductivity = conductivities.next().unwrap_or(0.0);
+        if conductivity == 0.0 || conductivities.any(|other| other != conductivity) {
+            let expected = "a solid conductor is of one material that conducts";
+            return Err(SolverError::EmptyRegion { region: coils[coil].name.clone(), expected });
+        }
+        if windings.len() <= coil {
+            windings.resize(coil + 1, None);
+        }
+        let winding = windings[coil].get_or_insert(Winding::SOLID);
+        winding.turns = 1.0;
+        if angular_frequency == 0.0 {
+            winding.resistance += conductor.direct_resistance(conductivity);
+        }
+    }
+    Ok(windings)
+}
+
 /// The coils with the currents that are known before the field is: those that a voltage drives carry none in harmonics, and `V/R`
-/// in statics.
+/// in statics; those of solid conductors are no sources in harmonics.
 pub(crate) fn given_currents(
     coils: &[Coil],
     windings: &[Option<Winding>],
@@ -151,7 +213,8 @@ pub(crate) fn given_currents(
         let current = if angular_frequency == 0.0 { voltage / winding.resistance } else { c64::default() };
         coil.ampere_turns = winding.turns * current;
     }
-    coils.retain(|coil| coil.ampere_turns != c64::default());
+    let is_source = |coil: &Coil| angular_frequency == 0.0 || !matches!(coil.shape, CoilShape::Solid(_));
+    coils.retain(|coil| coil.ampere_turns != c64::default() && is_source(coil));
     coils
 }
 

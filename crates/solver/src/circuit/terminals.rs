@@ -54,6 +54,9 @@ impl Windings {
 
     /// Flux linkage [Wb] of a winding in a state.
     pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
+        if let Some(conductor) = self.coils[k].solid {
+            return state.solid_unknowns(model)[conductor];
+        }
         self.coils[k].sources.linkage(model.space(), mesh, |e| state.element(model, e))
     }
 }

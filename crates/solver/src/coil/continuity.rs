@@ -10,9 +10,9 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Tet4, dot};
 use fluxmorph_geometry::{Mesh, NodeId};
 
+use super::Coil;
 use super::fault::RegionFault;
 use super::region::RegionCurrent;
-use super::{Coil, CoilShape};
 use crate::error::SolverError;
 use crate::harmonic::HarmonicField;
 use crate::space::Space;
@@ -34,7 +34,7 @@ pub(crate) fn check(
     (space, harmonic): (&Space, &[HarmonicField]),
 ) -> Result<(), SolverError> {
     for coil in coils {
-        let CoilShape::Region(current) = &coil.shape else { continue };
+        let Some(current) = coil.shape.region_current() else { continue };
         let fault = gathered(mesh, current, joined).or_else(|| encircled(mesh, current, space, harmonic));
         if let Some(fault) = fault {
             return Err(SolverError::CoilRegion { coil: coil.name.clone(), fault });

@@ -88,6 +88,16 @@ pub enum RegionFault {
         /// A node of one of the walls [m].
         place: Point,
     },
+    /// A terminal of a solid conductor that another conductor touches.
+    #[error(
+        "another conductor touches its terminal at ({:.3}, {:.3}, {:.3}) mm, and current would pass between them there; leave a \
+         gap, or make both one region",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    TerminalShared {
+        /// A node of both [m].
+        place: Point,
+    },
     /// A ring round a tunnel of the mesh.
     #[error(
         "its current flows round a tunnel of the mesh whose walls have no condition, and H would have to turn round it \

@@ -3,10 +3,10 @@
 //! Writing `J = curl T` and `T` on the right makes the discrete current exactly free of divergence, whether or not the
 //! mesh follows the coil. Lives here: the coil's place ([`frame`]), its shape and `T` ([`racetrack`]), the integral of
 //! `T` over a tetrahedron that the coil's edges cut ([`moment`], [`cut`]), the current of a coil that is a region of the
-//! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), all of it summed over coils
+//! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), what drives a solid conductor ([`solid`]), all of it summed over coils
 //! ([`terms`]), where a coil may meet the outside of the mesh ([`planes`]), and whether the current of a region goes on there
 //! (`continuity`). `T` and `J` are fixed in space: elements
-//! that meet them must not move.
+//! that meet them must not move; a solid conductor may, above 0 Hz.
 
 pub(crate) mod continuity;
 pub mod cut;
@@ -19,6 +19,7 @@ pub mod planes;
 mod potential;
 pub mod racetrack;
 pub mod region;
+pub mod solid;
 pub mod terms;
 
 pub use divergence::CurrentReport;
@@ -27,6 +28,7 @@ pub use frame::Frame;
 pub use planes::{Condition, ConditionedSurface};
 pub use racetrack::{Corner, Racetrack};
 pub use region::{Path, RegionCurrent, Terminal};
+pub use solid::SolidConductor;
 pub use terms::SourceTerms;
 
 use fluxmorph_geometry::fem::c64;
@@ -50,8 +52,21 @@ pub struct Coil {
 pub enum CoilShape {
     /// An analytic coil; the mesh need not follow it.
     Racetrack(Racetrack),
-    /// A region of the mesh.
+    /// A stranded winding that is a region of the mesh.
     Region(RegionCurrent),
+    /// A solid conductor that is a region of the mesh.
+    Solid(SolidConductor),
+}
+
+impl CoilShape {
+    /// The current of a coil that is a region of the mesh; of a solid conductor that at 0 Hz.
+    pub fn region_current(&self) -> Option<&RegionCurrent> {
+        match self {
+            Self::Racetrack(_) => None,
+            Self::Region(current) => Some(current),
+            Self::Solid(conductor) => Some(conductor.direct_current()),
+        }
+    }
 }
 
 impl From<Racetrack> for CoilShape {
@@ -63,6 +78,12 @@ impl From<Racetrack> for CoilShape {
 impl From<RegionCurrent> for CoilShape {
     fn from(current: RegionCurrent) -> Self {
         Self::Region(current)
+    }
+}
+
+impl From<SolidConductor> for CoilShape {
+    fn from(conductor: SolidConductor) -> Self {
+        Self::Solid(conductor)
     }
 }
 

@@ -84,7 +84,8 @@ pub fn check(mesh: &Mesh, coils: &[Coil], surfaces: &[ConditionedSurface<'_>]) -
                 let (place, reason) = racetrack_fault(racetrack, surface.condition, faces)?;
                 Some((describe(surface), place, reason))
             }),
-            CoilShape::Region(current) => {
+            shape => {
+                let Some(current) = shape.region_current() else { continue };
                 let surface_at = |key: &[NodeId; 3]| surface_of.get(key).map_or(&rest, |&i| &surfaces[i]);
                 terminal_fault(mesh, current, surface_at)
                     .or_else(|| wall_fault(mesh, current, surfaces, &rest, &surface_of))

@@ -15,7 +15,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::tet4::{Point, Tet4, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
@@ -80,7 +80,7 @@ pub struct RegionCurrent {
 const DEAD: f64 = 1e-9;
 
 /// `‖h‖/‖∇θ‖` below which nothing goes round the line: rounding of the solve, far below any ring's.
-const NO_RING: f64 = 1e-6;
+pub(super) const NO_RING: f64 = 1e-6;
 
 impl RegionCurrent {
     /// The current in the elements of a region; `coil` names it in messages.
@@ -109,6 +109,18 @@ impl RegionCurrent {
                 ring_current(&patch, frame, &turning)?.ok_or_else(|| refuse(RegionFault::NoRing))
             }
         }
+    }
+
+    /// A current that is given in the elements of a patch [A/m²], for one ampere.
+    pub(super) fn of_conduction(
+        (patch, problem): (&Patch, &Potential<'_>),
+        current: Vec<Point>,
+        (terminals, names): (Vec<TerminalFace>, Option<[String; 2]>),
+        sections: Section<'_>,
+    ) -> Self {
+        let report = report(patch, problem, [&current, &current], &terminals, sections);
+        let current_density = patch.elements.iter().copied().zip(current).collect();
+        Self { current_density, terminals, terminal_names: names, report }
     }
 
     /// `J` of every element of the region for one ampere-turn [A/m²], ascending by element.
@@ -198,7 +210,11 @@ fn stranded_current(
 }
 
 /// The triangles of the terminals that are faces of the region.
-fn terminal_faces(patch: &Patch, from: &Terminal, to: &Terminal) -> Result<Vec<TerminalFace>, RegionFault> {
+pub(super) fn terminal_faces(
+    patch: &Patch,
+    from: &Terminal,
+    to: &Terminal,
+) -> Result<Vec<TerminalFace>, RegionFault> {
     let mut faces = Vec::new();
     for (terminal, end) in [(from, End::From), (to, End::To)] {
         let mut nodes: Vec<[NodeId; 3]> = terminal
@@ -222,7 +238,7 @@ fn terminal_faces(patch: &Patch, from: &Terminal, to: &Terminal) -> Result<Vec<T
 }
 
 /// φ on the terminals' nodes: 1 where current comes in, 0 where it goes out.
-fn terminal_values(
+pub(super) fn terminal_values(
     patch: &Patch,
     faces: &[TerminalFace],
     [from, to]: [&Terminal; 2],
@@ -262,6 +278,14 @@ fn terminal_values(
 
 /// `∇θ` of the nodal angles about the frame's axis, on every element [1/m].
 fn angle_gradient(patch: &Patch, frame: &Frame) -> Result<Vec<Point>, RegionFault> {
+    let gradient = |(angles, tet): ([f64; 4], &Tet4)| {
+        std::array::from_fn(|d| (0..4).map(|a| angles[a] * tet.gradients[a][d]).sum())
+    };
+    Ok(angles(patch, frame)?.into_iter().zip(&patch.tets).map(gradient).collect())
+}
+
+/// The angles [rad] about the frame's axis of every element's vertices, from that of its first one.
+pub(super) fn angles(patch: &Patch, frame: &Frame) -> Result<Vec<[f64; 4]>, RegionFault> {
     let extent = patch.points.iter().map(|x| norm(sub(*x, frame.centre()))).fold(0.0, f64::max);
     let local: Vec<Point> = patch.points.iter().map(|x| frame.local(*x)).collect();
     // A node on the axis has no angle.
@@ -283,8 +307,7 @@ fn angle_gradient(patch: &Patch, frame: &Frame) -> Result<Vec<Point>, RegionFaul
     patch
         .connectivity
         .iter()
-        .zip(&patch.tets)
-        .map(|(nodes, tet)| {
+        .map(|nodes| {
             let theta = nodes.map(|n| angles[n.index()]);
             let from_first = theta.map(|t| turn(theta[0], t));
             // Round a face that the axis pierces the differences add up to a whole turn.
@@ -294,7 +317,7 @@ fn angle_gradient(patch: &Patch, frame: &Frame) -> Result<Vec<Point>, RegionFaul
             if !consistent {
                 return Err(RegionFault::AxisInside { place: patch.points[nodes[0].index()] });
             }
-            Ok(std::array::from_fn(|d| (0..4).map(|a| from_first[a] * tet.gradients[a][d]).sum()))
+            Ok(from_first)
         })
         .collect()
 }

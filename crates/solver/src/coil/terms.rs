@@ -42,7 +42,8 @@ impl SourceTerms {
                     }
                     all.extend(moments.iter().map(|(e, m)| (*e, m.each_ref().map(times))));
                 }
-                CoilShape::Region(current) => {
+                shape => {
+                    let Some(current) = shape.region_current() else { continue };
                     currents.extend(current.current_density().iter().map(|(e, j)| (*e, [times(j)])));
                 }
             }

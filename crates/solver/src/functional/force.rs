@@ -193,6 +193,10 @@ fn carries_current(model: &FieldModel, mesh: &Mesh, e: ElementId) -> bool {
             .map(|x| std::array::from_fn(|d| 0.999 * x[d] + 0.001 * centre[d]))
             .chain([centre])
             .any(|x| racetrack.current_density(x) != [0.0; 3]),
-        CoilShape::Region(current) => current.current_density().binary_search_by_key(&e, |(e, _)| *e).is_ok(),
+        // What flows in a solid conductor above 0 Hz moves with it, as eddy currents do.
+        CoilShape::Solid(_) if model.angular_frequency() > 0.0 => false,
+        shape => shape
+            .region_current()
+            .is_some_and(|current| current.current_density().binary_search_by_key(&e, |(e, _)| *e).is_ok()),
     })
 }

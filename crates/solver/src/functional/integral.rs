@@ -169,7 +169,7 @@ impl<'a> Sum<'a> {
         Self {
             model,
             value: 0.0,
-            derivative: vec![c64::default(); model.unknown_count()],
+            derivative: vec![c64::default(); model.unknown_count() + model.solids().count()],
             explicit: vec![[0.0; 3]; model.topology().node_count()],
         }
     }
@@ -182,6 +182,8 @@ impl<'a> Sum<'a> {
         for chunk in elements.chunks(CHUNK) {
             let integrals: Vec<_> = chunk.par_iter().map(|&e| integral(e)).collect();
             for (&e, integral) in chunk.iter().zip(&integrals) {
+                let (_, of_solids) = self.derivative.split_at_mut(self.model.unknown_count());
+                self.model.solids().scatter(e, integral.potentials.values(), of_solids);
                 self.add(self.model.space().carriers_of(e), &self.model.topology().tet(e), integral);
             }
         }

@@ -64,8 +64,9 @@ impl TerminalFunctional {
         let mut derivative: Vec<c64> =
             windings.load(self.winding).iter().map(|load| by_linkage * load).collect();
         if let Some(source) = windings.source_position(self.winding).filter(|_| omega > 0.0) {
-            derivative.resize(derivative.len() + windings.source_count(), c64::default());
-            derivative[model.unknown_count() + source] = by_current;
+            let of_field = model.unknown_count() + model.solids().count();
+            derivative.resize(of_field + windings.source_count(), c64::default());
+            derivative[of_field + source] = by_current;
         }
         FunctionalValue { value, derivative, ..Default::default() }
     }

@@ -103,14 +103,16 @@ impl PreparedSystem {
         self.field.into_cache()
     }
 
-    /// Solves `K x = b` of the field alone.
+    /// Solves `K x = b` of the field alone, with solid conductors in it: their unknowns are behind the others, and their currents
+    /// behind the load, zero where they are left out.
     ///
     /// # Errors
     /// [`SolverError::NotConverged`] when the true residual stays above the required one, [`SolverError::Mesh`] and
     /// [`SolverError::Rank`] when no method has a factor, [`SolverError::NotFinite`] and [`SolverError::OutOfRange`] for a
     /// right side that cannot be solved for.
     pub fn solve_field(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        self.field.solve(right_side)
+        let (values, report, _) = self.solve_with(right_side, Excitation::Open)?;
+        Ok((values, report))
     }
 
     /// Solves with the circuits' sources shorted, as adjoint problems are. Behind the entries of the field's unknowns there may
@@ -119,7 +121,7 @@ impl PreparedSystem {
     /// # Errors
     /// As [`PreparedSystem::solve_field`].
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        let unknowns = self.border.as_ref().map_or(right_side.len(), Border::field_unknowns);
+        let unknowns = self.border.as_ref().map_or(right_side.len(), |border| border.field_unknowns()[1]);
         let (field, circuits) = right_side.split_at(unknowns.min(right_side.len()));
         let (values, report, _) = self.solve_with(field, Excitation::Given(circuits))?;
         Ok((values, report))
@@ -134,13 +136,27 @@ impl PreparedSystem {
         right_side: &[c64],
         excitation: Excitation<'_>,
     ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
+        let unknowns = self.border.as_ref().map_or(right_side.len(), |border| border.field_unknowns()[0]);
+        let (right_side, of_solids) = right_side.split_at(unknowns.min(right_side.len()));
         let (mut values, report) = match &self.tangent {
             Some(tangent) => tangent.solve_adjoint(right_side, &mut self.field)?,
             None => self.field.solve(right_side)?,
         };
         let border = self.border.as_ref();
-        let currents = border.map(|border| border.complete(&mut values, excitation)).unwrap_or_default();
-        Ok((values, report, currents))
+        let currents = border.map(|border| border.complete(&mut values, of_solids, excitation));
+        Ok((values, report, currents.unwrap_or_default()))
+    }
+
+    /// `r −= K x` of the field with solid conductors; nothing where the matrix is on several ranks.
+    pub(crate) fn subtract_product(&self, x: &[c64], r: &mut [c64]) {
+        let Some(matrix) = self.matrix() else { return };
+        let count = matrix.structure.row_count();
+        let mut product = vec![c64::default(); count];
+        matrix.mul(&x[..count], &mut product);
+        r.iter_mut().zip(product).for_each(|(r, p)| *r -= p);
+        if let Some(border) = &self.border {
+            border.solids().subtract_product(x, r);
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::Point;
 
 use super::{FieldModel, SharedParts};
-use crate::circuit::{self, Windings};
+use crate::circuit::{self, Solids, Windings, solids};
 use crate::coil::continuity;
 use crate::discretisation::Discretisation;
 use crate::distributed::{Distributed, Follower};
@@ -43,18 +43,26 @@ impl FieldModel {
             .zip(&setup.materials)
             .map(|(b, m)| b.map(|b| m.reluctivity() * b))
             .collect();
-        let given = circuit::given_currents(&setup.coils, &setup.windings, angular_frequency);
+        let of_coils =
+            circuit::windings(mesh, &setup.coils, &setup.windings, &setup.materials, angular_frequency)?;
+        let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
         let sources = Sources::new(mesh, &given, &magnetisation)?;
-        let windings = Windings::new(mesh, &setup.coils, &setup.windings, (&fine.space, &fine.unknowns))?;
+        let solids = Solids::new(&setup.coils, &fine.space, angular_frequency);
+        let windings = Windings::new(mesh, &setup.coils, &of_coils, (&fine.space, &fine.unknowns, &solids))?;
         let windings = Arc::new(windings);
         setup::check_coils(mesh, &setup)?;
-        let mut joined = weak_form.conductors().joined(mesh, &setup.boundaries)?;
+        let conductors = weak_form.conductors();
+        solids::check(mesh, &setup.coils, &conductors, &setup.boundaries)?;
+        // The net current of a solid conductor is given: no other returns through it.
+        let conductors = conductors.without(&solids::elements(&setup.coils));
+        let mut joined = conductors.joined(mesh, &setup.boundaries)?;
         let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
         continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
         if let Some(shell) = weak_form.shell() {
             setup::check_open(shell, mesh, &setup, sources.fixed_elements())?;
         }
-        let shared = Arc::new(SharedParts { fine, sources, windings, analysis: analysis.map(Arc::new) });
+        let shared =
+            Arc::new(SharedParts { fine, sources, solids, windings, analysis: analysis.map(Arc::new) });
         Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
     }
 

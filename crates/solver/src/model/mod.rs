@@ -14,7 +14,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
-use crate::circuit::{Border, Windings};
+use crate::circuit::{Border, SolidRows, Solids, Windings};
 use crate::coil::Coil;
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
@@ -49,23 +49,31 @@ pub struct FieldModel {
 struct SharedParts {
     fine: Discretisation,
     sources: Sources,
+    solids: Solids,
     windings: Arc<Windings>,
     /// Of one process.
     analysis: Option<Arc<SystemAnalysis>>,
 }
 
-/// A matrix as assembled, wherever it is.
+/// A matrix as assembled, wherever it is, with what solid conductors add to it.
 #[derive(Debug)]
-pub enum AssembledMatrix {
+pub struct AssembledMatrix {
+    field: FieldMatrix,
+    solids: SolidRows,
+}
+
+#[derive(Debug)]
+enum FieldMatrix {
     /// In this process.
     Local(CsrMatrix<c64>),
     /// To be assembled by the ranks, with nodes at these places [m].
     OnRanks(Vec<Point>),
 }
 
+/// That of a model without solid conductors.
 impl From<CsrMatrix<c64>> for AssembledMatrix {
     fn from(matrix: CsrMatrix<c64>) -> Self {
-        Self::Local(matrix)
+        Self { field: FieldMatrix::Local(matrix), solids: SolidRows::default() }
     }
 }
 
@@ -87,18 +95,22 @@ impl FieldModel {
 
     /// The matrix on a mesh with this model's topology, wherever it is to be.
     pub fn assembled(&self, mesh: &Mesh) -> AssembledMatrix {
-        match &self.distributed {
-            None => AssembledMatrix::Local(self.assemble(mesh)),
-            Some(_) => AssembledMatrix::OnRanks(mesh.points().to_vec()),
-        }
+        let field = match &self.distributed {
+            None => FieldMatrix::Local(self.assemble(mesh)),
+            Some(_) => FieldMatrix::OnRanks(mesh.points().to_vec()),
+        };
+        let solids = self.shared.fine.solid_rows(self.solids(), &self.weak_form, mesh);
+        AssembledMatrix { field, solids }
     }
 
-    /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown.
+    /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown, then the net current [A] of each
+    /// solid conductor, zero where a voltage drives it.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
-        let SharedParts { fine, sources, .. } = &*self.shared;
+        let SharedParts { fine, sources, windings, .. } = &*self.shared;
         let mut load = vec![c64::default(); fine.unknowns.dofs.count()];
         sources.add_load(&fine.space, &fine.unknowns, mesh, &mut load);
         fine.lift(&self.weak_form, mesh, &mut load);
+        load.extend(windings.solid_currents(self.coils()));
         load
     }
 
@@ -116,25 +128,27 @@ impl FieldModel {
     /// [`SolverError::Mesh`] when the factorisation fails: the system is singular; [`SolverError::Rank`] where a rank does.
     ///
     /// # Panics
-    /// For a matrix that is not where the model is.
+    /// For a matrix that is not where the model is, or without the rows of its solid conductors.
     pub fn prepare_with(
         &self,
         matrix: impl Into<AssembledMatrix>,
         cache: &mut LinearSolverCache,
     ) -> Result<PreparedSystem, SolverError> {
-        let field = match (matrix.into(), &self.distributed, &self.shared.analysis) {
-            (AssembledMatrix::Local(matrix), _, Some(analysis)) => {
+        let AssembledMatrix { field, solids } = matrix.into();
+        assert_eq!(solids.count(), self.solids().count(), "the rows of all solid conductors");
+        let field = match (field, &self.distributed, &self.shared.analysis) {
+            (FieldMatrix::Local(matrix), _, Some(analysis)) => {
                 let system = LocalSystem::new(analysis, matrix, cache)?;
                 FieldSystem::Local(Box::new(system))
             }
-            (AssembledMatrix::OnRanks(points), Some(distributed), _) => {
+            (FieldMatrix::OnRanks(points), Some(distributed), _) => {
                 let system = distributed.prepare(&points, &self.setup.linear_solver)?;
                 FieldSystem::Distributed(system)
             }
             _ => panic!("a matrix belongs where its model is"),
         };
         let (windings, angular_frequency) = (self.windings(), self.angular_frequency);
-        PreparedSystem::new(field, |solve| Border::new(windings, angular_frequency, solve))
+        PreparedSystem::new(field, |solve| Border::new(windings, solids, angular_frequency, solve))
     }
 
     /// What defines the problem.
@@ -142,7 +156,7 @@ impl FieldModel {
         &self.setup
     }
 
-    /// Number of unknowns.
+    /// Number of unknowns of the field, without the voltages of solid conductors.
     pub fn unknown_count(&self) -> usize {
         self.unknowns().dofs.count()
     }
@@ -217,12 +231,16 @@ impl FieldModel {
     /// Whether nothing excites a field: no coil, magnet or applied field.
     pub fn is_unexcited(&self) -> bool {
         self.shared.sources.is_empty()
-            && !self.windings().is_driven()
+            && !self.windings().is_driven(self.coils())
             && self.unknowns().prescribed_carriers().next().is_none()
     }
 
     pub(crate) fn windings(&self) -> &Arc<Windings> {
         &self.shared.windings
+    }
+
+    pub(crate) fn solids(&self) -> &Solids {
+        &self.shared.solids
     }
 
     /// How the linear systems of one process are solved, and what that takes; `None` where they are on several ranks.

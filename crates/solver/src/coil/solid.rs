@@ -1,0 +1,116 @@
+//! A solid conductor of the mesh that is driven by its terminals: a busbar, or a turn of an inductor or of an induction coil.
+//!
+//! Its field is `E = −jω(A + ∇ψ) − V∇χ` with the voltage `V` and any fixed `χ` that is 1 on the terminal where current comes in
+//! and 0 on the other; round a ring `χ` falls by 1 a turn. Here it is that of conduction at 0 Hz on the reference mesh,
+//! `∫∇χ·∇q = 0`, so that what `ψ` is left with is small. On the mesh that moves it keeps its values at the nodes. Current at
+//! 0 Hz: `J = −∇χ/g` for 1 A, with the resistance `1/(σg)`, `g = ∫|∇χ|²` [m].
+//!
+//! Separate parts between the same terminals are in parallel. What the circuit makes of `V` is in [`crate::circuit`].
+
+use std::f64::consts::TAU;
+
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{ElementId, Mesh};
+
+use super::divergence::Section;
+use super::fault::RegionFault;
+use super::patch::Patch;
+use super::potential::Potential;
+use super::region::{self, NO_RING, Path, RegionCurrent};
+use crate::error::SolverError;
+
+/// The way of the current through a conductor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolidConductor {
+    potential: Vec<(ElementId, [f64; 4])>,
+    direct: RegionCurrent,
+    conductance: f64,
+}
+
+impl SolidConductor {
+    /// The elements of a region as a conductor; `coil` names it in messages.
+    ///
+    /// # Errors
+    /// As [`RegionCurrent::new`].
+    pub fn new(mesh: &Mesh, coil: &str, elements: &[ElementId], path: &Path) -> Result<Self, SolverError> {
+        let refuse = |fault| SolverError::CoilRegion { coil: coil.to_owned(), fault };
+        if elements.is_empty() {
+            return Err(refuse(RegionFault::NoElements));
+        }
+        let patch = Patch::new(mesh, elements);
+        match path {
+            Path::Terminals { from, to } => {
+                let terminals = region::terminal_faces(&patch, from, to).map_err(refuse)?;
+                let values = region::terminal_values(&patch, &terminals, [from, to]).map_err(refuse)?;
+                let given: Vec<bool> = values.iter().map(Option::is_some).collect();
+                let lift: Vec<f64> = values.iter().map(|v| v.unwrap_or(0.0)).collect();
+                let problem = Potential::new(&patch, &given)?;
+                let chi = problem.solve(&vec![[0.0; 3]; patch.elements.len()], &lift);
+                let vertices = patch.connectivity.iter().map(|nodes| nodes.map(|n| chi[n.index()]));
+                let names = Some([from.name.clone(), to.name.clone()]);
+                let sections = Section::LevelsOf(&chi);
+                Ok(Self::of((&patch, &problem), vertices.collect(), (terminals, names), sections))
+            }
+            Path::Closed(frame) => {
+                if patch.parts != 1 {
+                    return Err(refuse(RegionFault::SeveralRings { parts: patch.parts }));
+                }
+                let turns: Vec<[f64; 4]> = region::angles(&patch, frame)
+                    .map_err(refuse)?
+                    .iter()
+                    .map(|a| a.map(|t| t / TAU))
+                    .collect();
+                let turning = gradients(&patch, &turns);
+                let mut given = vec![false; patch.points.len()];
+                given[0] = true;
+                let problem = Potential::new(&patch, &given)?;
+                let rest = problem.solve(&turning, &vec![0.0; given.len()]);
+                let of = |(nodes, turns): (&[fluxmorph_geometry::NodeId; 4], &[f64; 4])| {
+                    std::array::from_fn(|a| rest[nodes[a].index()] - turns[a])
+                };
+                let chi: Vec<[f64; 4]> = patch.connectivity.iter().zip(&turns).map(of).collect();
+                if patch.norm(&gradients(&patch, &chi)) < NO_RING * patch.norm(&turning) {
+                    return Err(refuse(RegionFault::NoRing));
+                }
+                Ok(Self::of((&patch, &problem), chi, (Vec::new(), None), Section::HalfPlanesOf(frame)))
+            }
+        }
+    }
+
+    fn of(
+        (patch, problem): (&Patch, &Potential<'_>),
+        chi: Vec<[f64; 4]>,
+        terminals: (Vec<region::TerminalFace>, Option<[String; 2]>),
+        sections: Section<'_>,
+    ) -> Self {
+        let gradient = gradients(patch, &chi);
+        let conductance = patch.inner(&gradient, &gradient);
+        let current = gradient.into_iter().map(|g| g.map(|c| -c / conductance)).collect();
+        let direct = RegionCurrent::of_conduction((patch, problem), current, terminals, sections);
+        Self { potential: patch.elements.iter().copied().zip(chi).collect(), direct, conductance }
+    }
+
+    /// `χ` [1] at the vertices of every element, in the mesh's order, ascending by element; round a ring up to a constant of each
+    /// element's own.
+    pub fn potential(&self) -> &[(ElementId, [f64; 4])] {
+        &self.potential
+    }
+
+    /// The current at 0 Hz, for 1 A.
+    pub fn direct_current(&self) -> &RegionCurrent {
+        &self.direct
+    }
+
+    /// Resistance at 0 Hz [Ω] on the reference mesh, for a conductivity [S/m].
+    pub fn direct_resistance(&self, conductivity: f64) -> f64 {
+        1.0 / (conductivity * self.conductance)
+    }
+}
+
+/// The gradients of linear functions by their values at the vertices of every element.
+fn gradients(patch: &Patch, values: &[[f64; 4]]) -> Vec<Point> {
+    let of = |(tet, values): (&fluxmorph_geometry::tet4::Tet4, &[f64; 4])| {
+        std::array::from_fn(|d| (0..4).map(|a| values[a] * tet.gradients[a][d]).sum())
+    };
+    patch.tets.iter().zip(values).map(of).collect()
+}
