@@ -53,7 +53,7 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
                 format!(
                     "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz, at {}, and {:.1} % of it \
                      are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
-                     that of a material that does not exist. At 0 Hz give the material its curve (bh); else lower the ampere-turns, or \
+                     that of a material that does not exist. Give the material its curve (bh), lower the ampere-turns, or \
                      give the iron more section",
                     millimetres(place),
                     100.0 * found.beyond / found.whole

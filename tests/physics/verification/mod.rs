@@ -6,6 +6,7 @@
 
 mod case;
 mod coil_forces;
+mod families;
 mod forces;
 mod page;
 mod plate;

@@ -39,6 +39,7 @@ fn joined(parts: &[Vec<f64>]) -> Vec<f64> {
 /// How fine a mesh is, and on what elements.
 #[derive(Clone, Copy)]
 struct Resolution {
+    family: ElementFamily,
     order: Order,
     /// Cell size over that of the mesh described above.
     size: f64,
@@ -68,7 +69,7 @@ fn space(
     loop_: Racetrack,
     resolution: Resolution,
 ) -> Space {
-    let Resolution { order, size, layers, outer } = resolution;
+    let Resolution { family, order, size, layers, outer } = resolution;
     let across = joined(&[
         uniform("coil", [0.0, 0.14], 0.0117 * size).expect("lines"),
         outwards(0.14, outer, 0.015 * size, 1.5, Fine::Start),
@@ -84,15 +85,21 @@ fn space(
     let (_, mesh) = boxed([across.clone(), across, along], &["air", "plate"], |[_, _, z]| {
         u32::from(z > PLATE && z < top)
     });
-    let model = model(&mesh, frequency, order, material, loop_);
+    let model = model(&mesh, frequency, (family, order), material, loop_);
     Space { mesh, model }
 }
 
 /// The field model of one ampere-turn in a coil.
-fn model(mesh: &Mesh, frequency: f64, order: Order, plate: Material, coil: Racetrack) -> FieldModel {
+fn model(
+    mesh: &Mesh,
+    frequency: f64,
+    (family, order): (ElementFamily, Order),
+    plate: Material,
+    coil: Racetrack,
+) -> FieldModel {
     let coil = Coil { name: "loop".to_owned(), ampere_turns: c64::from(1.0), shape: coil.into() };
     let setup = FieldModelSetup {
-        family: ElementFamily::Nodal,
+        family,
         frequency,
         order,
         materials: vec![Material::AIR, plate],
@@ -138,7 +145,7 @@ fn loops(resolution: Resolution, bar: f64) -> Vec<Row> {
     for other in file["mutual"].as_array().expect("a list") {
         // The flux of the first loop through the second is ∫J_2·A_1: the load of the second on the field of the first.
         let second = filament(number(other, "radius_m"), number(other, "distance_m"));
-        let far = model(&space.mesh, 0.0, resolution.order, Material::AIR, second);
+        let far = model(&space.mesh, 0.0, (resolution.family, resolution.order), Material::AIR, second);
         let linked: c64 = far.load(&space.mesh).iter().zip(solution.values()).map(|(f, a)| f * a).sum();
         rows.push(case.row("mutual inductance [H]", 4.0 * linked, number(other, "inductance_H").into(), bar));
     }
@@ -146,7 +153,17 @@ fn loops(resolution: Resolution, bar: f64) -> Vec<Row> {
 }
 
 const fn at(order: Order, size: f64, layers: f64, outer: f64) -> Resolution {
-    Resolution { order, size, layers, outer }
+    Resolution { family: ElementFamily::Nodal, order, size, layers, outer }
+}
+
+/// Field behind two plates, and of loops, by all elements on the mesh that quadratic ones have in the table.
+pub(crate) fn by_elements(family: ElementFamily, order: Order, bar: f64) -> Vec<Row> {
+    let on = |size, layers, outer| Resolution { family, ..at(order, size, layers, outer) };
+    let mut rows = loops(on(1.6, 1.0, 1.0), bar);
+    rows.push(behind("19 mm aluminium", on(2.0, 4.0, 1.0), bar));
+    rows.push(behind("5 mm steel", on(2.0, 8.0, 1.0), bar));
+    rows.push(behind("10 mm, static, mu_r = 800", on(2.0, 1.0, 3.0), bar));
+    rows
 }
 
 /// The rows of the table.

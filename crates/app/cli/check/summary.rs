@@ -190,12 +190,7 @@ pub(super) fn summary<'a>(
     Ok(Summary {
         title: &config.title,
         mesh_origin: origin(&config.mesh),
-        mesh_file: match &config.mesh {
-            MeshConfig::File { path, unit } => {
-                Some(MeshFileSummary { path: path.display().to_string(), unit: unit.name() })
-            }
-            _ => None,
-        },
+        mesh_file: MeshFileSummary::of(&config.mesh),
         field_problem: field_problem(config),
         frequencies_hz: config.analysis.frequencies(),
         order: config.analysis.order.into(),
@@ -231,6 +226,13 @@ pub(super) fn summary<'a>(
         estimate: None,
         warnings,
     })
+}
+
+impl MeshFileSummary {
+    fn of(mesh: &MeshConfig) -> Option<Self> {
+        let MeshConfig::File { path, unit } = mesh else { return None };
+        Some(Self { path: path.display().to_string(), unit: unit.name() })
+    }
 }
 
 fn origin(mesh: &MeshConfig) -> &'static str {

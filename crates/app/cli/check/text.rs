@@ -110,24 +110,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         );
     }
     row("linear solver", summary.linear_solvers.join(", "));
-    match summary.objective {
-        Some(objective) => {
-            let goal = match objective.goal {
-                Goal::Minimise => "minimise",
-                Goal::Maximise => "maximise",
-            };
-            let term = |term: &crate::config::Term| {
-                let weight = if term.weight == 1.0 { String::new() } else { format!("{} x ", term.weight) };
-                let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
-                let at = term.functional.frequency.map(|f| format!(" at {f} Hz")).unwrap_or_default();
-                format!("{weight}{}{}{at}", term.functional.kind.name(), region.unwrap_or_default())
-            };
-            let terms: Vec<String> = objective.terms().iter().map(term).collect();
-            let unit = summary.objective_unit.map(|unit| format!(" [{unit}]")).unwrap_or_default();
-            row("objective", format!("{goal} {}{unit}", terms.join(" + ")));
-        }
-        None => row("objective", "none".to_owned()),
-    }
+    row("objective", objective(summary));
     for constraint in summary.constraints {
         row("constraint", bound_of(constraint));
     }
@@ -135,6 +118,24 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         let probe = |p: &crate::config::Probe| format!("{} ({})", p.name, p.points.len());
         row("probes (points)", summary.probes.iter().map(probe).collect::<Vec<_>>().join(", "));
     }
+}
+
+/// The objective in a line: its goal, its terms and its unit.
+fn objective(summary: &Summary<'_>) -> String {
+    let Some(objective) = summary.objective else { return "none".to_owned() };
+    let goal = match objective.goal {
+        Goal::Minimise => "minimise",
+        Goal::Maximise => "maximise",
+    };
+    let term = |term: &crate::config::Term| {
+        let weight = if term.weight == 1.0 { String::new() } else { format!("{} x ", term.weight) };
+        let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
+        let at = term.functional.frequency.map(|f| format!(" at {f} Hz")).unwrap_or_default();
+        format!("{weight}{}{}{at}", term.functional.kind.name(), region.unwrap_or_default())
+    };
+    let terms: Vec<String> = objective.terms().iter().map(term).collect();
+    let unit = summary.objective_unit.map(|unit| format!(" [{unit}]")).unwrap_or_default();
+    format!("{goal} {}{unit}", terms.join(" + "))
 }
 
 fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {

@@ -3,6 +3,7 @@
 use serde::Serialize;
 use serde_json::json;
 
+use super::constraint_kind::Kind;
 use super::design::COMPONENTS;
 use super::functional::{Compared, Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
@@ -122,8 +123,8 @@ impl LimitKeys {
     /// The keys that go with other kinds.
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("kind", &WORD) {
-            Some(Kind::Thickness) => NOT_OF_A_THICKNESS.to_vec(),
-            Some(Kind::Volume | Kind::Mass) => [&OF_A_FIELD[..], &THICKNESSES[..]].concat(),
+            Some(Kind::Thickness(_)) => NOT_OF_A_THICKNESS.to_vec(),
+            Some(Kind::Body(_)) => [&OF_A_FIELD[..], &THICKNESSES[..]].concat(),
             Some(_) => THICKNESSES.to_vec(),
             // Nothing can be said of the other keys.
             None => {
@@ -221,9 +222,9 @@ pub enum Limit {
 choice! {
     /// Kinds of constraints on a body.
     pub enum BodyKind {
-        /// Volume [m³].
+        /// Volume of a region [m³], meshed or replaced by its impedance surface.
         Volume = "volume",
-        /// Mass [kg], by `density` of the material.
+        /// Mass of a region [kg], by the `density` of its material.
         Mass = "mass",
     }
 }
@@ -231,60 +232,6 @@ choice! {
 choice! {
     /// The kind of a constraint on the thickness.
     pub enum ThicknessKind {
-        /// Thickness [m].
-        Thickness = "thickness",
-    }
-}
-
-choice! {
-    /// Every word that `kind` may be.
-    pub(in crate::config) enum Kind {
-        /// As in `[objective]`.
-        FluxDensitySquared = "flux_density_squared",
-        /// As in `[objective]`.
-        TargetField = "target_field" | "uniformity",
-        /// As in `[objective]`.
-        Homogeneity = "homogeneity",
-        /// As in `[objective]`.
-        FieldComponent = "field_component",
-        /// As in `[objective]`.
-        Loss = "loss",
-        /// As in `[objective]`.
-        Energy = "energy",
-        /// As in `[objective]`.
-        Force = "force",
-        /// As in `[objective]`.
-        Torque = "torque",
-        /// As in `[objective]`.
-        Inductance = "inductance",
-        /// As in `[objective]`.
-        MutualInductance = "mutual_inductance",
-        /// As in `[objective]`.
-        Coupling = "coupling",
-        /// As in `[objective]`.
-        Resistance = "resistance",
-        /// As in `[objective]`.
-        QualityFactor = "quality_factor",
-        /// As in `[objective]`.
-        LinkEfficiency = "link_efficiency",
-        /// As in `[objective]`.
-        FluxLinkage = "flux_linkage",
-        /// As in `[objective]`.
-        Current = "current",
-        /// As in `[objective]`.
-        Voltage = "voltage",
-        /// As in `[objective]`.
-        Power = "power",
-        /// As in `[objective]`.
-        PowerFactor = "power_factor",
-        /// As in `[objective]`.
-        Multipole = "multipole",
-        /// As in `[objective]`.
-        MultipoleContent = "multipole_content",
-        /// Volume of a region [m³], meshed or replaced by its impedance surface.
-        Volume = "volume",
-        /// Mass of a region [kg], by the `density` of its material.
-        Mass = "mass",
         /// Thickness of the designed body along the direction of the design [m].
         Thickness = "thickness",
     }
@@ -333,33 +280,12 @@ impl Group for Limit {
         let Some(kind) = section.peek("kind", &WORD) else {
             return Self::Thickness { kind: ThicknessKind::Thickness, minimum: None, maximum: None };
         };
-        let field = match kind {
-            Kind::FluxDensitySquared => ObjectiveKind::FluxDensitySquared,
-            Kind::TargetField => ObjectiveKind::TargetField,
-            Kind::Homogeneity => ObjectiveKind::Homogeneity,
-            Kind::FieldComponent => ObjectiveKind::FieldComponent,
-            Kind::Loss => ObjectiveKind::Loss,
-            Kind::Energy => ObjectiveKind::Energy,
-            Kind::Force => ObjectiveKind::Force,
-            Kind::Torque => ObjectiveKind::Torque,
-            Kind::Inductance => ObjectiveKind::Inductance,
-            Kind::MutualInductance => ObjectiveKind::MutualInductance,
-            Kind::Coupling => ObjectiveKind::Coupling,
-            Kind::Resistance => ObjectiveKind::Resistance,
-            Kind::QualityFactor => ObjectiveKind::QualityFactor,
-            Kind::LinkEfficiency => ObjectiveKind::LinkEfficiency,
-            Kind::FluxLinkage => ObjectiveKind::FluxLinkage,
-            Kind::Current => ObjectiveKind::Current,
-            Kind::Voltage => ObjectiveKind::Voltage,
-            Kind::Power => ObjectiveKind::Power,
-            Kind::PowerFactor => ObjectiveKind::PowerFactor,
-            Kind::Multipole => ObjectiveKind::Multipole,
-            Kind::MultipoleContent => ObjectiveKind::MultipoleContent,
-            Kind::Volume => return Self::body(BodyKind::Volume, Dimension::Volume, written, section),
-            Kind::Mass => return Self::body(BodyKind::Mass, Dimension::Mass, written, section),
-            Kind::Thickness => return Self::thickness(&written, section),
-        };
-        Self::field(field, written, section)
+        match kind {
+            Kind::Field(kind) => Self::field(kind, written, section),
+            Kind::Body(BodyKind::Volume) => Self::body(BodyKind::Volume, Dimension::Volume, written, section),
+            Kind::Body(BodyKind::Mass) => Self::body(BodyKind::Mass, Dimension::Mass, written, section),
+            Kind::Thickness(_) => Self::thickness(&written, section),
+        }
     }
 }
 

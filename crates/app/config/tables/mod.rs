@@ -6,6 +6,7 @@ mod boundary;
 mod coil;
 mod config;
 mod constraint;
+mod constraint_kind;
 mod design;
 mod force;
 mod functional;

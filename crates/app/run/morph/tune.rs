@@ -187,13 +187,9 @@ pub(super) fn tune(
     let (remesh, quality) = best;
     let config = tuned_config(config, &remesh);
     let setup = set_up_motion(&config, source)?;
-    let report = TuneReport {
-        evaluations,
-        worst_quality: [initial, quality],
-        stiffness: [given.policy.name(), remesh.policy.name()],
-        policies,
-        regions: given.subregions.iter().zip(&remesh.subregions).map(TunedRegion::of).collect(),
-    };
+    let regions = given.subregions.iter().zip(&remesh.subregions).map(TunedRegion::of).collect();
+    let stiffness = [given.policy.name(), remesh.policy.name()];
+    let report = TuneReport { evaluations, worst_quality: [initial, quality], stiffness, policies, regions };
     Ok(Found { report, config, setup, left_out })
 }
 
