@@ -7,6 +7,7 @@ mod cli;
 mod coils;
 mod commands;
 mod designs;
+mod deviation;
 mod examples;
 mod field_pieces;
 mod folders;

@@ -7,6 +7,8 @@ use fluxmorph_geometry::quality::qualities_of;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
 use fluxmorph_optimizer::body::Body;
+use fluxmorph_optimizer::constraint::Quantity;
+use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 use rayon::prelude::*;
@@ -24,6 +26,9 @@ pub struct FieldData<'a> {
     pub thickness: Option<&'a [f64]>,
     /// What every element adds to the estimated error of the objective [unit of F], shape `(n_tets,)`; `None`: no such array.
     pub error: Option<&'a [f64]>,
+    /// What every element misses of the field quality that is asked for [T], zero in others, shape `(n_tets,)`; `None`: no such
+    /// array.
+    pub deviation: Option<&'a [f64]>,
     /// One solution per state. For a piece only the potentials at its nodes matter.
     pub solutions: &'a [FieldSolution],
     /// Bodies with the forces at their nodes in the first state; empty: no such array.
@@ -39,6 +44,7 @@ impl<'a> FieldData<'a> {
             sensitivity: analysis.sensitivity.as_deref(),
             thickness: None,
             error: None,
+            deviation: None,
             solutions: &analysis.solutions,
             bodies: &[],
         }
@@ -49,6 +55,30 @@ impl<'a> FieldData<'a> {
 pub fn thickness(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
     let shape = problem.shape()?;
     Some(shape.thickness()?.over_nodes(shape.surface(), &analysis.mesh))
+}
+
+/// The functionals of a problem: the terms of its objective, and its constraints of the field.
+fn functionals(problem: &Problem) -> impl Iterator<Item = &Term> {
+    let of_constraints = problem.constraints().iter().filter_map(|constraint| match &constraint.quantity {
+        Quantity::Field(term) => Some(term),
+        _ => None,
+    });
+    problem.objective().into_iter().flat_map(|sum| &sum.terms).chain(of_constraints)
+}
+
+/// What every element misses of the field quality that the objective or a constraint asks for [T], zero in others; `None` where
+/// none does. Of several in one element the first counts, each at its first frequency.
+pub fn deviation(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
+    let mut all: Vec<Option<f64>> = vec![None; analysis.mesh.topology().tets().len()];
+    for term in functionals(problem) {
+        let Some(&state) = term.states.first() else { continue };
+        let (model, solution) = (&problem.states()[state], &analysis.solutions[state]);
+        for (e, own) in term.functional.deviations(model, &analysis.mesh, solution) {
+            all[e.index()].get_or_insert(own);
+        }
+    }
+    let is_asked_for = all.iter().any(Option::is_some);
+    is_asked_for.then(|| all.into_iter().map(Option::unwrap_or_default).collect())
 }
 
 /// The VTU file of an analysed design: the moved mesh, potentials, displacement and sensitivity at its nodes; fields,
@@ -95,6 +125,7 @@ struct Arrays {
     region: Vec<i32>,
     quality: Vec<f64>,
     error: Option<Vec<f64>>,
+    deviation: Option<Vec<f64>>,
     force: Option<Vec<Point>>,
 }
 
@@ -102,6 +133,7 @@ impl Arrays {
     fn new(states: &[FieldModel], data: &FieldData<'_>, nodes: &[NodeId], elements: &[ElementId]) -> Self {
         let regions = data.mesh.topology().region_of();
         let at = |values: &[Point]| -> Vec<Point> { nodes.iter().map(|n| values[n.index()]).collect() };
+        let in_elements = |all: &[f64]| elements.iter().map(|e| all[e.index()]).collect();
         let force = (!data.bodies.is_empty()).then(|| {
             let mut force = vec![[0.0; 3]; data.mesh.points().len()];
             let of = |body: &Body| body.nodal(&states[0], data.mesh, &data.solutions[0]);
@@ -123,7 +155,8 @@ impl Arrays {
             thickness: data.thickness.map(|all| nodes.iter().map(|n| all[n.index()]).collect()),
             region: elements.iter().map(|e| regions[e.index()].0 as i32).collect(),
             quality: qualities_of(data.mesh, elements),
-            error: data.error.map(|error| elements.iter().map(|e| error[e.index()]).collect()),
+            error: data.error.map(in_elements),
+            deviation: data.deviation.map(in_elements),
         }
     }
 
@@ -147,6 +180,8 @@ impl Arrays {
         fields.push(Field { name: "quality", data: ArrayData::Scalar(&self.quality) });
         let error = self.error.as_ref();
         fields.extend(error.map(|error| Field { name: "error_estimate", data: ArrayData::Scalar(error) }));
+        let deviation = self.deviation.as_ref();
+        fields.extend(deviation.map(|own| Field { name: "deviation", data: ArrayData::Scalar(own) }));
         fields.extend(others.iter().flat_map(StateArrays::in_cells));
         fields
     }

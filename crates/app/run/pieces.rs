@@ -46,8 +46,13 @@ impl SharedPieces {
         problem: &Problem,
         analysis: &Analysis,
     ) -> Result<(), Error> {
-        let thickness = fields::thickness(problem, analysis);
-        let data = FieldData { thickness: thickness.as_deref(), ..FieldData::of(analysis) };
+        let (thickness, deviation) =
+            (fields::thickness(problem, analysis), fields::deviation(problem, analysis));
+        let data = FieldData {
+            thickness: thickness.as_deref(),
+            deviation: deviation.as_deref(),
+            ..FieldData::of(analysis)
+        };
         directory.begin_pieces(evaluation)?;
         let mut numbers = vec![evaluation as f64];
         numbers.extend_from_slice(analysis.mesh.points().as_flattened());
@@ -57,6 +62,8 @@ impl SharedPieces {
             None => numbers.resize(numbers.len() + 3 * data.displacement.len(), 0.0),
         }
         numbers.extend_from_slice(data.thickness.unwrap_or_default());
+        numbers.push(f64::from(u8::from(data.deviation.is_some())));
+        numbers.extend_from_slice(data.deviation.unwrap_or_default());
         for solution in data.solutions {
             numbers.extend(numbers_of(solution.values()));
         }
@@ -92,6 +99,8 @@ impl CommandHandler for PieceWriter {
         let (places, displacement, sensitivity): (Vec<Point>, Vec<Point>, Vec<Point>) =
             (points()?, points()?, points()?);
         let thickness = if self.has_thickness { Some(take(nodes)?) } else { None };
+        let elements = self.mesh.topology().tets().len();
+        let deviation = if take(1)?[0] > 0.0 { Some(take(elements)?) } else { None };
         let mut solutions = Vec::with_capacity(self.states.len());
         for state in &self.states {
             let values = complex_of(take(2 * state.unknown_count())?);
@@ -105,6 +114,7 @@ impl CommandHandler for PieceWriter {
             sensitivity: Some(&sensitivity),
             thickness,
             error: None,
+            deviation,
             solutions: &solutions,
             bodies: &[],
         };

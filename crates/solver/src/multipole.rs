@@ -11,7 +11,8 @@
 
 use std::f64::consts::PI;
 
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::{Point, centroid};
 
 use crate::coil::Frame;
 
@@ -28,9 +29,20 @@ pub enum Harmonic {
     Sine(usize, usize),
 }
 
+/// Where an expansion holds: inside a circle, or in a ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Domain {
+    frame: Frame,
+    /// [m]
+    radius: f64,
+    is_ball: bool,
+}
+
 /// Points, and each term as a linear function of B at them.
 #[derive(Clone, Debug)]
 pub struct Expansion {
+    /// Where it holds.
+    pub domain: Domain,
     /// Where B is taken [m].
     pub points: Vec<Point>,
     /// `(term, w)`: the coefficient is `Σ w·B` over the points, `w` of shape `(n_points, 3)` [1].
@@ -41,6 +53,57 @@ pub struct Expansion {
 fn place(frame: &Frame, radius: f64, local: Point) -> Point {
     let (centre, offset) = (frame.centre(), frame.vector(local.map(|c| radius * c)));
     std::array::from_fn(|d| centre[d] + offset[d])
+}
+
+impl Harmonic {
+    /// The field of a coefficient of one, at a place in units of the reference radius: in a circle across its axis, in a ball along
+    /// it alone.
+    fn field(self, [x, y, z]: Point) -> Point {
+        let (distance, around) = (x.hypot(y), y.atan2(x));
+        let plane = |n: usize, phase: f64| {
+            let (size, angle) = (distance.powi(n as i32 - 1), (n as f64 - 1.0) * around + phase);
+            [size * angle.sin(), size * angle.cos(), 0.0]
+        };
+        let solid = |n: usize, m: usize| {
+            let radius = distance.hypot(z);
+            let along = if radius > 0.0 { z / radius } else { 1.0 };
+            radius.powi(n as i32) * legendre(n, m, along)
+        };
+        match self {
+            Self::Normal(n) => plane(n, 0.0),
+            Self::Skew(n) => plane(n, 0.5 * PI),
+            Self::Cosine(n, m) => [0.0, 0.0, solid(n, m) * (m as f64 * around).cos()],
+            Self::Sine(n, m) => [0.0, 0.0, solid(n, m) * (m as f64 * around).sin()],
+        }
+    }
+}
+
+impl Domain {
+    /// Whether an element's middle lies in the ball, or in the circle while the element reaches across its plane.
+    pub fn meets(&self, vertices: [Point; 4]) -> bool {
+        let [x, y, z] = self.frame.local(centroid(vertices));
+        if self.is_ball {
+            return x.hypot(y).hypot(z) <= self.radius;
+        }
+        let heights = vertices.map(|vertex| self.frame.local(vertex)[2]);
+        let is_above = heights.map(|height| height >= 0.0);
+        x.hypot(y) <= self.radius && is_above.contains(&true) && is_above.contains(&false)
+    }
+
+    /// What is left of a field [T] at a place [m] without some terms with their coefficients [T]: both components across the axis
+    /// of a circle, the one along the axis of a ball.
+    pub fn remainder(&self, terms: &[(Harmonic, c64)], place: Point, b: [c64; 3]) -> [Option<c64>; 2] {
+        let local = self.frame.local(place).map(|c| c / self.radius);
+        let components = if self.is_ball { [Some(2), None] } else { [Some(0), Some(1)] };
+        components.map(|component| {
+            let d = component?;
+            let mut unit = [0.0; 3];
+            unit[d] = 1.0;
+            let direction = self.frame.vector(unit);
+            let own: c64 = (0..3).map(|i| b[i] * direction[i]).sum();
+            Some(own - terms.iter().map(|(term, c)| c * term.field(local)[d]).sum::<c64>())
+        })
+    }
 }
 
 impl Expansion {
@@ -61,7 +124,8 @@ impl Expansion {
             let normal = (Harmonic::Normal(n), weights(&|a| (n as f64 * a).sin()));
             [normal, (Harmonic::Skew(n), weights(&|a| (n as f64 * a).cos()))]
         };
-        Self { points, terms: (1..=order).flat_map(pair).collect() }
+        let domain = Domain { frame: *frame, radius, is_ball: false };
+        Self { domain, points, terms: (1..=order).flat_map(pair).collect() }
     }
 
     /// `c_nm, s_nm` up to `n = N` on the sphere of a radius [m], of the component along the axis of a frame.
@@ -95,7 +159,8 @@ impl Expansion {
                 }
             }
         }
-        Self { points: nodes.iter().map(point).collect(), terms }
+        let domain = Domain { frame: *frame, radius, is_ball: true };
+        Self { domain, points: nodes.iter().map(point).collect(), terms }
     }
 }
 
@@ -190,6 +255,26 @@ mod tests {
                 _ => 0.0,
             };
             assert!((found - exact).abs() < 1e-13, "{term:?}: {found} {exact}");
+        }
+    }
+
+    /// Coefficients of a term's own field are one for it and zero for all others, so that nothing is left without it.
+    #[test]
+    fn without_its_own_terms_nothing_is_left_of_a_field() {
+        let frame = frame();
+        let complex = |b: Point| b.map(c64::from);
+        for expansion in [Expansion::circle(&frame, RADIUS, 4), Expansion::ball(&frame, RADIUS, 3)] {
+            for &(term, _) in &expansion.terms {
+                let field = |p: Point| frame.vector(term.field(frame.local(p).map(|c| c / RADIUS)));
+                for (other, found) in coefficients(&expansion, field) {
+                    let exact = if other == term { 1.0 } else { 0.0 };
+                    assert!((found - exact).abs() < 1e-12, "{term:?} {other:?}: {found}");
+                }
+                let inside = place(&frame, RADIUS, [0.3, -0.4, 0.2]);
+                let terms = [(term, c64::from(1.0))];
+                let left = expansion.domain.remainder(&terms, inside, complex(field(inside)));
+                assert!(left.iter().flatten().all(|c| c.norm() < 1e-14), "{term:?}: {left:?}");
+            }
         }
     }
 

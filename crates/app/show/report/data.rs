@@ -54,6 +54,8 @@ pub(super) struct Snapshot {
     pub(super) points: Vec<Point>,
     /// |B| of every element at the first frequency [T].
     pub(super) flux_density: Vec<f64>,
+    /// What every element misses of the field quality that is asked for [T]; `None` where the file says nothing of it.
+    pub(super) deviation: Option<Vec<f64>>,
 }
 
 impl RunData {
@@ -250,11 +252,17 @@ impl Snapshot {
         let Some(VtuArray::Scalar(flux_density)) = contents.cell_data.remove("B_abs") else {
             return Err(missing("B_abs").into());
         };
+        let deviation = match contents.cell_data.remove("deviation") {
+            Some(VtuArray::Scalar(deviation)) => Some(deviation),
+            Some(_) => return Err(damaged(&path)("its array `deviation` is not one of numbers").into()),
+            None => None,
+        };
         let points = contents.points;
-        let finite = points.iter().flatten().chain(&flux_density).all(|v| v.is_finite());
+        let numbers = points.iter().flatten().chain(&flux_density).chain(deviation.iter().flatten());
+        let finite = numbers.copied().all(f64::is_finite);
         if !finite {
             return Err(damaged(&path)("it holds a value that is not finite").into());
         }
-        Ok(Ok(Self { evaluation, points, flux_density }))
+        Ok(Ok(Self { evaluation, points, flux_density, deviation }))
     }
 }

@@ -30,8 +30,12 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
     };
     let densities: Vec<f64> = outline.mesh.topology().tets().iter().zip(error).map(density).collect();
     let sum: f64 = error.iter().sum();
-    let shares =
-        Snapshot { evaluation: field.evaluation, points: field.points.clone(), flux_density: densities };
+    let shares = Snapshot {
+        evaluation: field.evaluation,
+        points: field.points.clone(),
+        flux_density: densities,
+        deviation: None,
+    };
     let window = Window::new(data, outline, field);
     let cut = FieldCut::new(&window, outline, &shares);
     let values = cut.triangles.iter().flat_map(|triangle| triangle.patch.map(|(_, value)| value));

@@ -16,6 +16,7 @@ mod colour;
 mod convergence;
 mod cut;
 mod data;
+mod deviation;
 mod error_map;
 mod facts;
 mod field;

@@ -9,7 +9,7 @@ use super::markup::{document, footer, json, missing, section};
 use super::surface::Surface;
 use super::ticks::{group_digits, trim_zeros};
 use super::words::capital;
-use super::{convergence, error_map, facts, field, histogram, iron, map, tables};
+use super::{convergence, deviation, error_map, facts, field, histogram, iron, map, tables};
 use crate::build::{Outline, OutlinedDesign};
 
 const VIEW: &str = include_str!("view.js");
@@ -73,6 +73,9 @@ fn of_outline(
 fn field(data: &RunData) -> Markup {
     html! {
         (or_missing("the cut through the field", of_outline(data, field::figure)))
+        @if let Some(figure) = data.outline.as_ref().ok().and_then(|outline| deviation::figure(data, outline)) {
+            (or_missing("the map of the deviation", figure))
+        }
         @if let Some(figure) = data.outline.as_ref().ok().and_then(|outline| iron::figure(data, outline)) { (figure) }
     }
 }

@@ -23,6 +23,27 @@ pub enum Compared {
     Modulus,
 }
 
+impl Compared {
+    /// Of a flux density; of a component or the modulus in the first place.
+    pub(super) fn of(self, b: &Complex3) -> Complex3 {
+        let scalar = |c: c64| [c, c64::default(), c64::default()];
+        match self {
+            Self::Vector => *b,
+            Self::Component(direction) => scalar((0..3).map(|d| b[d] * direction[d]).sum()),
+            Self::Modulus => scalar(norm_sqr(b).sqrt().into()),
+        }
+    }
+
+    /// Whether it is one real number, of which one has more and another less.
+    pub(super) fn has_sign(self, is_static: bool) -> bool {
+        match self {
+            Self::Vector => false,
+            Self::Component(_) => is_static,
+            Self::Modulus => true,
+        }
+    }
+}
+
 /// The figures of a field's homogeneity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldQuality {
@@ -47,19 +68,18 @@ pub(super) struct Spread<'a> {
 impl<'a> Spread<'a> {
     /// Of samples with their weights.
     pub(super) fn new(samples: &'a [(Complex3, f64)], of: Compared) -> Self {
-        let scalar = |c: c64| [c, c64::default(), c64::default()];
-        let compare = |b: &Complex3| match of {
-            Compared::Vector => *b,
-            Compared::Component(direction) => scalar((0..3).map(|d| b[d] * direction[d]).sum()),
-            Compared::Modulus => scalar(norm_sqr(b).sqrt().into()),
-        };
-        let compared: Vec<Complex3> = samples.iter().map(|(b, _)| compare(b)).collect();
+        let compared: Vec<Complex3> = samples.iter().map(|(b, _)| of.of(b)).collect();
         let weight: f64 = samples.iter().map(|(_, w)| w).sum();
         let mut mean = [c64::default(); 3];
         for (b, (_, w)) in compared.iter().zip(samples) {
             (0..3).for_each(|d| mean[d] += w * b[d] / weight);
         }
         Self { samples, of, compared, weight, mean }
+    }
+
+    /// `b̄` [T].
+    pub(super) fn mean(&self) -> Complex3 {
+        self.mean
     }
 
     /// `F`.

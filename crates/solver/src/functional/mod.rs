@@ -5,8 +5,9 @@
 //! `observation` holds what is a function of B in cells that do not move, `homogeneity` its deviation from its own mean,
 //! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body, `terminal` what is a
 //! function of current and flux linkage of a coil, `inductance` what is one of the inductances, `multipole` what is one of terms of
-//! an expansion. Weighted sums, bounds and several frequencies are the optimiser's business.
+//! an expansion, `deviation` where the field misses what a quality asks for. Weighted sums, bounds and several frequencies are the optimiser's business.
 
+mod deviation;
 mod force;
 mod homogeneity;
 mod inductance;

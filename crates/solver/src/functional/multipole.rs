@@ -12,7 +12,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use super::FunctionalValue;
 use crate::error::SolverError;
 use crate::model::FieldModel;
-use crate::multipole::{Expansion, Harmonic};
+use crate::multipole::{Domain, Expansion, Harmonic};
 use crate::recovery::RecoveredPoint;
 use crate::solution::FieldSolution;
 
@@ -33,6 +33,24 @@ pub struct Multipoles {
     places: Vec<RecoveredPoint>,
     /// Weights as of [`Expansion::terms`], of the fields at the images.
     terms: Vec<(Harmonic, Vec<Point>)>,
+    domain: Domain,
+}
+
+/// The main terms of an expansion with their coefficients in a field.
+pub(super) struct MainField {
+    domain: Domain,
+    terms: Vec<(Harmonic, c64)>,
+}
+
+impl MainField {
+    pub(super) fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// What is left of a field without them, as [`Domain::remainder`].
+    pub(super) fn remainder(&self, place: Point, b: [c64; 3]) -> [Option<c64>; 2] {
+        self.domain.remainder(&self.terms, place, b)
+    }
 }
 
 /// What is made of some terms.
@@ -103,7 +121,7 @@ impl Multipoles {
             weights.iter().zip(&factors).map(of).collect()
         };
         let terms = expansion.terms.iter().map(|(term, weights)| (*term, mirrored(weights))).collect();
-        Ok(Self { places, terms })
+        Ok(Self { places, terms, domain: expansion.domain })
     }
 
     /// Elements that take part: these must not move.
@@ -146,6 +164,19 @@ impl MultipoleFunctional {
 
     pub(super) fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.multipoles.elements()
+    }
+
+    /// What the content is compared with; `None` for a single coefficient.
+    pub(super) fn main_field(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        state: &FieldSolution,
+    ) -> Option<MainField> {
+        let OfTerms::Content { main, .. } = &self.of else { return None };
+        let mut terms = self.multipoles.coefficients(model, mesh, state);
+        terms.retain(|(term, _)| main.contains(term));
+        Some(MainField { domain: self.multipoles.domain, terms })
     }
 
     pub(super) fn evaluate(&self, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> FunctionalValue {

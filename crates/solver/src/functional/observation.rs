@@ -8,6 +8,7 @@ use fluxmorph_geometry::tet4::{Point, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use super::FunctionalValue;
+use super::deviation::length;
 use super::homogeneity::{Compared, FieldQuality, Spread};
 use crate::element::Complex3;
 use crate::element::quadrature::{self, Node};
@@ -168,6 +169,31 @@ impl Observation {
     ) -> Option<FieldQuality> {
         let Observed::Homogeneity { of, weighting } = self.observed else { return None };
         Some(Spread::new(&weighted(&self.samples(model, mesh, solution), weighting), of).quality())
+    }
+
+    /// What a flux density [T] misses of what is asked for [T], where a quality of the field is.
+    pub(super) fn deviation_of(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Option<impl Fn(Complex3) -> f64 + use<>> {
+        let (compared, ideal) = match self.observed {
+            Observed::Deviation { target, .. } if target != [0.0; 3] => {
+                (Compared::Vector, target.map(c64::from))
+            }
+            Observed::Homogeneity { of, weighting } => {
+                let samples = weighted(&self.samples(model, mesh, solution), weighting);
+                (of, Spread::new(&samples, of).mean())
+            }
+            Observed::Deviation { .. } | Observed::Component { .. } => return None,
+        };
+        let has_sign = compared.has_sign(model.angular_frequency() == 0.0);
+        Some(move |b: Complex3| {
+            let own = compared.of(&b);
+            let missed: Complex3 = std::array::from_fn(|d| own[d] - ideal[d]);
+            if has_sign { missed[0].re } else { length(missed) }
+        })
     }
 
     /// The term of a cell with the mean `b` [T] and its volume [m³], and its derivative `q`: `d term = 2 Re(q·db)`.
