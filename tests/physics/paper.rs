@@ -10,6 +10,7 @@ use fluxmorph::files::{ObjectiveResult, StopReason};
 use fluxmorph::run::mesh_independence::{FreshMesh, MeshIndependence, ShapePair};
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
+use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::Analysis;
 use fluxmorph_solver::recovery;
 
@@ -194,6 +195,7 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
         shapes: &shapes,
         fresh,
         meshes: None,
+        sizes: Sizes::of(&setup.problem),
     };
     gain.verify(&mut objective, &|| false, &mut Silent);
     let verified = objective.verified_ratio.expect("the shield can be generated anew");

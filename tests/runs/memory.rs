@@ -1,5 +1,6 @@
 //! What `check` says of the memory of a run, against what the run held at its peak.
 
+use crate::support::folder::read_json;
 use crate::support::program::{finish, folder, program};
 use crate::support::repository;
 
@@ -30,6 +31,13 @@ fn assert_estimated(command: &str, configuration: &str, options: &[&str]) {
 fn the_estimate_of_a_run_is_within_thirty_per_cent_of_its_peak() {
     assert_estimated("run", "shield_quick.toml", &["--max-evaluations", "4"]);
     assert_estimated("solve", "sphere.toml", &[]);
+    // The estimated error of the mesh takes more than the run.
+    assert_estimated("run", "pole.toml", &["--max-evaluations", "3", "--set", "analysis.order=1"]);
+    // A mesh that cannot be generated anew is cut, also each element in more than four.
+    let few = ["--max-evaluations", "2", "--set", "analysis.order=1"];
+    let halved = ["--set", "output.verify_refinement=4"];
+    assert_estimated("run", "inductor.toml", &few);
+    assert_estimated("run", "inductor.toml", &[&few[..], &halved].concat());
 }
 
 #[test]
@@ -41,8 +49,26 @@ fn the_estimate_holds_for_larger_devices_and_every_kind_of_solver() {
     assert_estimated("run", "shield_impedance.toml", &["--max-evaluations", "3"]);
     assert_estimated("run", "pole.toml", &["--max-evaluations", "6"]);
     assert_estimated("solve", "inductor.toml", &[]);
+    assert_estimated("run", "inductor.toml", &["--max-evaluations", "2"]);
+    assert_estimated("run", "actuator.toml", &["--max-evaluations", "2"]);
     assert_estimated("run", "shield_two_frequencies.toml", &["--max-evaluations", "4"]);
     assert_estimated("solve", "team21a_0.toml", &[]);
     assert_estimated("solve", "team7_50hz.toml", &[]);
     assert_estimated("solve", "shield.toml", &["--set", fine, "--set", no_check]);
+}
+
+/// The run has room in the memory that it is given, and the check of its best design on halved elements has not.
+#[cfg(unix)]
+#[test]
+fn a_check_on_finer_elements_that_does_not_fit_is_skipped_with_a_notice() {
+    let folder = folder();
+    let path = repository("configs").join("inductor.toml").display().to_string();
+    let out = folder.path().join("out").display().to_string();
+    let options = ["--max-evaluations", "2", "--threads", "1"];
+    let mut command = std::process::Command::new("sh");
+    // 131 MiB are held by the run with elements of second order, some 600 by the check.
+    command.args(["-c", "ulimit -d 307200 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
+    command.args(["run", &path, "--out", &out]).args(options);
+    finish(&mut command).with(1, &["the best shape is not checked on a finer mesh, which takes about"]);
+    assert!(!read_json(&std::path::Path::new(&out).join("result.json"))["objective"]["verification"].is_object());
 }

@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::fem::workspace;
-use fluxmorph_optimizer::memory_estimate::{needs_workspace, of_evaluation};
+use fluxmorph_optimizer::memory_estimate::{Sizes, needs_workspace};
 use fluxmorph_optimizer::problem::Problem;
 
 use crate::config::{Config, ConfigError, MeshConfig, SourceMap};
@@ -82,7 +82,7 @@ pub(crate) fn check_problem(
         return Ok(());
     }
     let threads = if needs_workspace(problem) { rayon::current_num_threads() } else { 0 };
-    check_estimate(of_evaluation(problem) as u64, threads, source)
+    check_estimate(Sizes::of(problem).here() as u64, threads, source)
 }
 
 /// The same for a problem of about so many bytes, with this many threads in dense kernels.

@@ -14,9 +14,12 @@ use fluxmorph_remesh::Moved;
 use super::Session;
 use super::estimate::estimate;
 use super::finer::{Cut, FinerProblem};
+use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use crate::error::Error;
-use crate::files::{Accuracy, CrossCheck, ObjectiveResult, Refinements, StopReason, Verdict, relative_bar};
+use crate::files::{
+    Accuracy, CrossCheck, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict, relative_bar,
+};
 use crate::show::Observer;
 
 /// The meshes of the initial and of the best shape, and the one with all regions that both began as.
@@ -141,6 +144,7 @@ pub(super) fn cross_check(
     (other.analysis.elements, other.analysis.order) = (Elements::Edge, order);
     (other.analysis.penalty, other.analysis.linear_solver.method) = (1.0, SolverMethod::Automatic);
     let problem = FinerProblem::new(&other, source, &meshes.full, Cut::Halvings(0))?;
+    memory_limit::check_problem(&problem.setup.problem, source, OverwritePolicy::Keep)?;
     let values = problem.values(&meshes.solved, interrupted)?;
     Ok(values.map(|[initial, best]| CrossCheck {
         elements: "edge".to_owned(),

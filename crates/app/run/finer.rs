@@ -17,6 +17,19 @@ use crate::build::{Setup, memory_limit, remaining_nodes, set_up_field, with_cell
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 
+/// A mesh that was cut, with the configuration of the field alone.
+#[derive(Debug)]
+pub struct FinerMesh {
+    config: Config,
+    refinement: Refinement,
+    /// All nodes of the mesh that was cut [m].
+    coarse: Vec<Point>,
+    /// Those of them that are solved on.
+    remaining: Vec<NodeId>,
+    /// Elements of the mesh that was cut.
+    tets: usize,
+}
+
 /// A field problem on a finer mesh.
 #[derive(Debug)]
 pub struct FinerProblem {
@@ -38,19 +51,43 @@ pub enum Cut {
     Growth(f64),
 }
 
+impl FinerMesh {
+    /// A mesh with all its regions, cut.
+    ///
+    /// # Errors
+    /// [`MeshError::RefinementLimit`] where the memory does not suffice.
+    pub fn new(config: &Config, mesh: &Mesh, cut: Cut) -> Result<Self, Error> {
+        let config = field_alone(config);
+        let mesh = with_cells_written_down(&config, mesh)?;
+        let (coarse, tets) = (mesh.points().to_vec(), mesh.topology().tets().len());
+        let remaining = remaining_nodes(&config, mesh.topology());
+        let refinement = cut.of(mesh).map_err(fluxmorph_optimizer::Error::from)?;
+        Ok(Self { config, refinement, coarse, remaining, tets })
+    }
+
+    /// Its elements over those of the mesh that was cut.
+    pub fn growth(&self) -> f64 {
+        self.refinement.mesh().topology().tets().len() as f64 / self.tets as f64
+    }
+}
+
 impl FinerProblem {
     /// The problem of a configuration on a mesh with all its regions, cut; its design moves nothing here.
     ///
     /// # Errors
-    /// [`MeshError::RefinementLimit`] where the memory does not suffice, and what the set-up fails with.
+    /// As [`FinerMesh::new`], and what the set-up fails with.
     pub fn new(config: &Config, source: &SourceMap, mesh: &Mesh, cut: Cut) -> Result<Self, Error> {
-        let config = field_alone(config);
-        let mesh = with_cells_written_down(&config, mesh)?;
-        let coarse = mesh.points().to_vec();
-        let before = remaining_nodes(&config, mesh.topology());
-        let refinement = cut.of(mesh).map_err(fluxmorph_optimizer::Error::from)?;
+        Self::on(FinerMesh::new(config, mesh, cut)?, source)
+    }
+
+    /// The same on a mesh that was cut before.
+    ///
+    /// # Errors
+    /// What the set-up fails with.
+    pub fn on(mesh: FinerMesh, source: &SourceMap) -> Result<Self, Error> {
+        let FinerMesh { config, refinement, coarse, remaining, .. } = mesh;
         let setup = set_up_field(&config, source, refinement.mesh().clone())?;
-        let remaining = [before, remaining_nodes(&config, refinement.mesh().topology())];
+        let remaining = [remaining, remaining_nodes(&config, refinement.mesh().topology())];
         Ok(Self { setup, refinement, coarse, remaining })
     }
 

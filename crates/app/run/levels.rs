@@ -13,7 +13,7 @@ use std::time::Instant;
 use fluxmorph_geometry::ElementId;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
-use fluxmorph_optimizer::memory_estimate::of_other_mesh;
+use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{
     Analysis, Derivatives, ErrorEstimate, NoProgress, RoundEvent, SolverCache,
 };
@@ -291,7 +291,7 @@ impl Session<'_> {
         finer.halve(marked).map_err(|error| error.to_string())?;
         let count = |mesh: &RefinedMesh| mesh.mesh().topology().tets().len() as f64;
         let growth = count(&finer) / count(mesh);
-        if let Some(shortage) = memory_limit::shortage(of_other_mesh(&self.setup.problem, growth)) {
+        if let Some(shortage) = memory_limit::shortage(Sizes::of(&self.setup.problem).on_other_mesh(growth)[0]) {
             return Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
         }
         let setup = self.set_up(&finer).map_err(|error| error.to_string())?;

@@ -18,16 +18,16 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Bound;
 use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::memory_estimate::of_other_mesh;
+use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 use super::confirmation::ShapeMeshes;
-use super::finer::{Cut, FinerProblem};
+use super::finer::{Cut, FinerMesh, FinerProblem};
 use super::summary;
 use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, OverwritePolicy, Verification};
+use crate::files::{ObjectiveResult, Verification};
 use crate::show::Observer;
 
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
@@ -114,6 +114,17 @@ pub struct MeshIndependence<'a> {
     pub fresh: Option<&'a FreshMesh>,
     /// The meshes of both shapes: what is cut where no mesh can be generated anew.
     pub meshes: Option<&'a ShapeMeshes>,
+    /// What the run's problem holds, from which the memory of a finer one follows.
+    pub sizes: Sizes,
+}
+
+/// What a check comes to.
+enum Outcome {
+    Found(Verification),
+    /// A signal came first.
+    CutShort,
+    /// There is not enough memory.
+    TooLarge(String),
 }
 
 /// The mesh of a check.
@@ -122,8 +133,8 @@ pub struct FreshMesh {
     mesh: DividedMesh,
     /// Parts of a cell along each axis.
     parts: usize,
-    /// Bytes that the process holds at the peak of the check, about.
-    memory: usize,
+    /// Bytes that the process holds at the peak of the check, about: the least and the most.
+    memory: [usize; 2],
 }
 
 impl FreshMesh {
@@ -136,11 +147,11 @@ impl FreshMesh {
         let parts = factor.ceil() as usize;
         let mesh = DividedMesh::of(config, problem, parts)?;
         let growth = mesh.tet_count()? as f64 / config.mesh.tet_count()?.max(1) as f64;
-        Some(Self { memory: of_other_mesh(problem, growth), mesh, parts })
+        Some(Self { memory: Sizes::of(problem).on_other_mesh(growth), mesh, parts })
     }
 
-    /// Bytes that the process holds at the peak of the check, about.
-    pub fn memory(&self) -> usize {
+    /// Bytes that the process holds at the peak of the check, about: the least and the most, as [`Sizes::on_other_mesh`].
+    pub fn memory(&self) -> [usize; 2] {
         self.memory
     }
 }
@@ -162,14 +173,14 @@ impl MeshIndependence<'_> {
             objective.verified_ratio = Some(1.0);
             return Check::Finished;
         }
-        if let Some(shortage) = self.fresh.and_then(|fresh| memory_limit::shortage(fresh.memory)) {
+        if let Some(shortage) = self.fresh.and_then(|fresh| memory_limit::shortage(fresh.memory[0])) {
             observer
                 .notice(&format!("the best shape is not checked on a fresh mesh, which takes {shortage}"));
             return Check::Finished;
         }
         let cut_short = matches!(self.stop_reason, StopReason::Interrupted | StopReason::MaxTime);
         let outcome = match self.fresh {
-            _ if cut_short || interrupted() => Ok(None),
+            _ if cut_short || interrupted() => Ok(Outcome::CutShort),
             Some(fresh) => {
                 observer.phase("checking the best shape on a fresh mesh");
                 self.compute(fresh, interrupted)
@@ -180,7 +191,7 @@ impl MeshIndependence<'_> {
             }
         };
         match outcome {
-            Ok(Some(verification)) => {
+            Ok(Outcome::Found(verification)) => {
                 for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
                     let (name, share) = (&constraint.name, constraint.value / constraint.bound - 1.0);
                     observer.warning(&format!(
@@ -191,7 +202,9 @@ impl MeshIndependence<'_> {
                 objective.verified_ratio = Some(verification.ratio);
                 objective.verification = Some(verification);
             }
-            Ok(None) => {
+            Ok(Outcome::TooLarge(shortage)) => observer
+                .notice(&format!("the best shape is not checked on a finer mesh, which takes {shortage}")),
+            Ok(Outcome::CutShort) => {
                 observer
                     .notice("the best shape is not checked on a fresh mesh: the run was stopped before that");
                 if !cut_short {
@@ -205,27 +218,26 @@ impl MeshIndependence<'_> {
         Check::Finished
     }
 
-    /// Both values on the run's own meshes with all elements cut; `None` where a signal came first.
-    fn compute_on_finer_elements(
-        &self,
-        interrupted: &dyn Fn() -> bool,
-    ) -> Result<Option<Verification>, Error> {
-        let Some(meshes) = self.meshes else { return Ok(None) };
+    /// Both values on the run's own meshes with all elements cut.
+    fn compute_on_finer_elements(&self, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
+        let Some(meshes) = self.meshes else { return Ok(Outcome::CutShort) };
         let parts = self.config.output.verify_refinement;
-        let finer = FinerProblem::new(self.config, self.source, &meshes.full, Cut::Growth(parts))?;
-        memory_limit::check_problem(&finer.setup.problem, self.source, OverwritePolicy::Keep)?;
+        let mesh = FinerMesh::new(self.config, &meshes.full, Cut::Growth(parts))?;
+        if let Some(shortage) = memory_limit::shortage(self.sizes.on_other_mesh(mesh.growth())[0]) {
+            return Ok(Outcome::TooLarge(shortage));
+        }
+        let finer = FinerProblem::on(mesh, self.source)?;
+        if let Some(shortage) = memory_limit::shortage(Sizes::of(&finer.setup.problem).here()) {
+            return Ok(Outcome::TooLarge(shortage));
+        }
         let tets = finer.setup.problem.original().topology().tets().len();
         let values = finer.values(&meshes.solved, interrupted)?;
-        values.map(|values| verification(parts, tets, values)).transpose()
+        let found = values.map(|values| verification(parts, tets, values)).transpose()?;
+        Ok(found.map_or(Outcome::CutShort, Outcome::Found))
     }
 
-    /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape; `None` where a signal came
-    /// first.
-    fn compute(
-        &self,
-        fresh: &FreshMesh,
-        interrupted: &dyn Fn() -> bool,
-    ) -> Result<Option<Verification>, Error> {
+    /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape.
+    fn compute(&self, fresh: &FreshMesh, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         match self.compute_on(fresh, interrupted) {
             Err(Error::Optimizer(error)) if error.is_unreached() && self.meshes.is_some() => {
                 self.compute_on_finer_elements(interrupted)
@@ -235,15 +247,15 @@ impl MeshIndependence<'_> {
     }
 
     /// Both values on the fresh mesh.
-    fn compute_on(
-        &self,
-        fresh: &FreshMesh,
-        interrupted: &dyn Fn() -> bool,
-    ) -> Result<Option<Verification>, Error> {
+    fn compute_on(&self, fresh: &FreshMesh, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         let config = fresh_configuration(self.config);
         let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
+        // What the factor of this very mesh takes is known now.
+        if let Some(shortage) = memory_limit::shortage(Sizes::of(&setup.problem).here()) {
+            return Ok(Outcome::TooLarge(shortage));
+        }
         if interrupted() {
-            return Ok(None);
+            return Ok(Outcome::CutShort);
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
         let mut problem = setup.problem;
@@ -252,10 +264,10 @@ impl MeshIndependence<'_> {
         let mut cache = SolverCache::default();
         for displacement in displacements {
             if interrupted() {
-                return Ok(None);
+                return Ok(Outcome::CutShort);
             }
             let analysis = match analysis_at(&mut problem, &mut cache, displacement, interrupted) {
-                Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(None),
+                Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(Outcome::CutShort),
                 analysis => analysis?,
             };
             if values.is_empty() {
@@ -266,7 +278,7 @@ impl MeshIndependence<'_> {
         }
         let (refinement, values) = (fresh.parts as f64, [values[0], values[1]]);
         let found = verification(refinement, tets, values)?;
-        Ok(Some(Verification { constraints, ..found }))
+        Ok(Outcome::Found(Verification { constraints, ..found }))
     }
 }
 
@@ -379,12 +391,10 @@ mod tests {
             terms: Vec::new(),
         };
         let mut recorded = Recorded::default();
-        // Another generator has not the shield's names, and no fresh mesh either.
-        let setup = set_up(config, source, Mode::Optimisation).ok();
-        let fresh = setup.and_then(|setup| FreshMesh::of(config, &setup.problem));
-        let fresh = fresh.map(|fresh| FreshMesh { memory: 0, ..fresh });
-        let check =
-            MeshIndependence { config, source, stop_reason, shapes, fresh: fresh.as_ref(), meshes: None };
+        let problem = set_up(config, source, Mode::Optimisation).expect("a sound problem").problem;
+        let fresh = FreshMesh::of(config, &problem).map(|fresh| FreshMesh { memory: [0; 2], ..fresh });
+        let (fresh, meshes, sizes) = (fresh.as_ref(), None, Sizes::of(&problem));
+        let check = MeshIndependence { config, source, stop_reason, shapes, fresh, meshes, sizes };
         check.verify(&mut objective, &|| interrupted, &mut recorded);
         (objective, recorded)
     }

@@ -11,6 +11,7 @@ pub mod finer;
 pub mod journal;
 pub(crate) mod launcher;
 mod levels;
+pub(crate) mod memory;
 pub mod mesh_independence;
 pub mod morph;
 mod pieces;
@@ -32,6 +33,7 @@ use confirmation::ShapeMeshes;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::RoundEvent;
 use journal::{Identity, Journal};
 use levels::Searched;
@@ -301,6 +303,7 @@ impl Session<'_> {
         } else {
             FreshMesh::of(self.config, &self.setup.problem)
         };
+        let sizes = Sizes::of(&self.setup.problem);
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
@@ -312,6 +315,7 @@ impl Session<'_> {
             shapes,
             fresh: fresh.as_ref(),
             meshes: Some(meshes),
+            sizes,
         };
         if let Some(objective) = &mut result.objective {
             if check.verify(objective, self.interrupted, observer) == Check::CutShort {

@@ -28,34 +28,50 @@ const MOVING: usize = 170;
 /// What a run still holds of its own mesh and patterns while the fresh mesh is worked on, per element.
 const HELD_BY_SETUP: usize = 300;
 
-/// Entries of the factor of a three-dimensional mesh under nested dissection grow with this power of its unknowns: George
-/// and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 8.
-const FACTOR_GROWTH: f64 = 4.0 / 3.0;
+/// Entries of a factor under nested dissection grow with this power of the unknowns: 4/3 where a mesh is as fine along all
+/// directions (George and Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 8), 1.0 measured where
+/// the flat cells of skin layers are halved. What lies between is wrong by a quarter at both ends for eight times the elements.
+const FACTOR_GROWTH: f64 = 1.2;
 
 /// Bytes of both levels of the two-level preconditioner per unknown: 474 and 598 on the TEAM problems.
 const TWO_LEVELS_PER_UNKNOWN: usize = 600;
 
-/// What an evaluation of a problem adds to the process [bytes].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Evaluation {
+/// What an evaluation of a problem adds to the process [bytes], and what that grows with on another mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
     /// Arrays by element, and the elastic solver.
     arrays: usize,
     /// Matrices of the field.
     matrices: usize,
     /// Their preconditioners.
     preconditioners: usize,
+    /// Elements of the mesh.
+    tets: usize,
+    /// Unknowns of the largest field problem.
+    unknowns: usize,
+    /// Whether a factor preconditions one of them.
+    has_factor: bool,
+    /// Whether two levels may take its place on a finer mesh.
+    may_have_two_levels: bool,
 }
 
-impl Evaluation {
-    fn of(problem: &Problem) -> Self {
+impl Sizes {
+    /// Those of a problem that is set up.
+    pub fn of(problem: &Problem) -> Self {
         let quadratic = problem.states().iter().any(|state| state.space().order() == Order::Quadratic);
         let moving = if problem.shape().is_some() { MOVING } else { 0 };
         let element = moving + if quadratic { QUADRATIC_ELEMENT } else { LINEAR_ELEMENT };
         let elastic = problem.shape().map_or(0, |shape| shape.motion().map().solver_bytes());
-        let mut evaluation = Self {
-            arrays: problem.original().topology().tets().len() * element + elastic,
+        let tets = problem.original().topology().tets().len();
+        let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
+        let mut sizes = Self {
+            arrays: tets * element + elastic,
             matrices: 0,
             preconditioners: 0,
+            tets,
+            unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
+            has_factor: solvers().any(|solver| is_factor(solver.method())),
+            may_have_two_levels: problem.states().iter().any(|state| state.angular_frequency() != 0.0),
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
@@ -64,34 +80,45 @@ impl Evaluation {
             // Newton's method holds the matrix of the linear parts beside that of the tangent.
             let matrices = if state.is_linear() { 1 } else { 2 };
             let preconditioner = solver.preconditioner_bytes(solver.method()).unwrap_or_default();
-            let sizes = (matrices * solver.matrix_bytes(), preconditioner);
+            let own = (matrices * solver.matrix_bytes(), preconditioner);
             match solver.reuse() {
                 Reuse::WhileItPays => {
-                    evaluation.matrices += sizes.0;
-                    evaluation.preconditioners += sizes.1;
+                    sizes.matrices += own.0;
+                    sizes.preconditioners += own.1;
                 }
-                Reuse::Never if sizes.0 + sizes.1 > largest.0 + largest.1 => largest = sizes,
+                Reuse::Never if own.0 + own.1 > largest.0 + largest.1 => largest = own,
                 Reuse::Never => {}
             }
         }
-        evaluation.matrices += largest.0;
-        evaluation.preconditioners += largest.1;
-        evaluation
+        sizes.matrices += largest.0;
+        sizes.preconditioners += largest.1;
+        sizes
     }
 
-    fn bytes(&self) -> usize {
-        self.arrays + self.matrices + self.preconditioners
+    /// Bytes that the process holds at the peak of one evaluation, about.
+    pub fn here(&self) -> usize {
+        PROCESS + self.arrays + self.matrices + self.preconditioners
     }
 
-    /// The same on a mesh with so many times the elements.
-    fn grown(&self, problem: &Problem, growth: f64) -> usize {
+    /// Bytes that the process holds while it works on something else that takes so many for each element, about.
+    pub fn beside(&self, bytes_per_tet: usize) -> usize {
+        PROCESS + self.tets * (HELD_BY_SETUP + bytes_per_tet)
+    }
+
+    /// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the
+    /// problem's own mesh and patterns are still held, about: the least, with two levels in place of a factor where that may be,
+    /// and the most, with a factor.
+    pub fn on_other_mesh(&self, growth: f64) -> [usize; 2] {
+        let held = PROCESS + self.tets * HELD_BY_SETUP;
+        [self.may_have_two_levels, false].map(|may| held + self.grown(growth, may))
+    }
+
+    fn grown(&self, growth: f64, may_have_two_levels: bool) -> usize {
         let times = |bytes: usize, factor: f64| (bytes as f64 * factor) as usize;
-        let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
-        let unknowns = times(solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0), growth);
-        let preconditioners = if solvers().any(|solver| is_factor(solver.method())) {
+        let unknowns = times(self.unknowns, growth);
+        let preconditioners = if self.has_factor {
             let factor = times(self.preconditioners, growth.powf(FACTOR_GROWTH));
-            let is_static = problem.states().iter().all(|state| state.angular_frequency() == 0.0);
-            if is_static || unknowns < TWO_LEVELS_FROM {
+            if !may_have_two_levels || unknowns < TWO_LEVELS_FROM {
                 factor
             } else {
                 factor.min(unknowns * TWO_LEVELS_PER_UNKNOWN).max(self.preconditioners)
@@ -107,11 +134,6 @@ fn is_factor(method: Method) -> bool {
     !matches!(method, Method::Incomplete | Method::TwoLevel)
 }
 
-/// Bytes that the process holds at the peak of one evaluation, about.
-pub fn of_evaluation(problem: &Problem) -> usize {
-    PROCESS + Evaluation::of(problem).bytes()
-}
-
 /// Whether a factor of the problem is so large that every thread asks for the workspace of the dense kernels: addresses, of
 /// which it uses a small part. Limits on addresses count them, the memory of the machine does not.
 pub fn needs_workspace(problem: &Problem) -> bool {
@@ -120,11 +142,4 @@ pub fn needs_workspace(problem: &Problem) -> bool {
         is_factor(solver.method()) && bytes >= LARGE_FACTOR
     };
     problem.states().iter().filter_map(FieldModel::linear_solver).any(is_large)
-}
-
-/// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the
-/// problem's own mesh and patterns are still held, about.
-pub fn of_other_mesh(problem: &Problem, growth: f64) -> usize {
-    let held = problem.original().topology().tets().len() * HELD_BY_SETUP;
-    PROCESS + held + Evaluation::of(problem).grown(problem, growth)
 }

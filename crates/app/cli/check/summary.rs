@@ -5,7 +5,6 @@
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_optimizer::memory_estimate::of_evaluation;
 use fluxmorph_optimizer::problem::Progress;
 use fluxmorph_solver::FieldModel;
 use serde::Serialize;
@@ -20,7 +19,7 @@ use crate::config::{
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
-use crate::run::mesh_independence::FreshMesh;
+use crate::run::memory;
 use crate::run::morph::{self, MotionSummary};
 
 /// What `check` found.
@@ -221,8 +220,7 @@ pub(super) fn summary<'a>(
         optimizer: &config.optimizer,
         probes: &config.probes,
         output_directory: config.output.directory.display().to_string(),
-        memory_estimate_bytes: of_evaluation(problem)
-            .max(FreshMesh::of(config, problem).map_or(0, |fresh| fresh.memory())),
+        memory_estimate_bytes: memory::peak(config, &setup)?,
         estimate: None,
         warnings,
     })
