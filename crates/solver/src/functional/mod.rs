@@ -46,7 +46,7 @@ pub enum Functional {
     /// A function of the inductances of coils.
     Inductance(InductanceFunctional),
     /// A function of terms of an expansion of B.
-    Multipole(MultipoleFunctional),
+    Multipole(Box<MultipoleFunctional>),
 }
 
 /// Value of a functional, and what its gradient needs.
@@ -124,7 +124,7 @@ impl Functional {
     /// # Errors
     /// [`SolverError::Parameter`] for a term that the expansion does not have.
     pub fn multipole(multipoles: Multipoles, of: OfTerms) -> Result<Self, SolverError> {
-        Ok(Self::Multipole(MultipoleFunctional::new(multipoles, of)?))
+        Ok(Self::Multipole(Box::new(MultipoleFunctional::new(multipoles, of)?)))
     }
 
     /// Places of the windings whose responses to 1 A the state must have ([`FieldModel::respond`]).
@@ -139,7 +139,7 @@ impl Functional {
     pub fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         let (observation, multipole) = match self {
             Self::Observation(observation) => (Some(observation), None),
-            Self::Multipole(multipole) => (None, Some(multipole)),
+            Self::Multipole(multipole) => (None, Some(multipole.as_ref())),
             _ => (None, None),
         };
         let observed = observation.into_iter().flat_map(Observation::elements);
