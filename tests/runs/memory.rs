@@ -70,5 +70,7 @@ fn a_check_on_finer_elements_that_does_not_fit_is_skipped_with_a_notice() {
     command.args(["-c", "ulimit -d 307200 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
     command.args(["run", &path, "--out", &out]).args(options);
     finish(&mut command).with(1, &["the best shape is not checked on a finer mesh, which takes about"]);
-    assert!(!read_json(&std::path::Path::new(&out).join("result.json"))["objective"]["verification"].is_object());
+    assert!(
+        !read_json(&std::path::Path::new(&out).join("result.json"))["objective"]["verification"].is_object()
+    );
 }

@@ -291,7 +291,9 @@ impl Session<'_> {
         finer.halve(marked).map_err(|error| error.to_string())?;
         let count = |mesh: &RefinedMesh| mesh.mesh().topology().tets().len() as f64;
         let growth = count(&finer) / count(mesh);
-        if let Some(shortage) = memory_limit::shortage(Sizes::of(&self.setup.problem).on_other_mesh(growth)[0]) {
+        if let Some(shortage) =
+            memory_limit::shortage(Sizes::of(&self.setup.problem).on_other_mesh(growth)[0])
+        {
             return Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
         }
         let setup = self.set_up(&finer).map_err(|error| error.to_string())?;

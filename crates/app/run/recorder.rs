@@ -158,8 +158,7 @@ pub(super) fn write_field(
 
 /// The VTU file of a field.
 fn field_bytes(problem: &Problem, analysis: &Analysis, error: Option<&[f64]>) -> Result<Vec<u8>, Error> {
-    let (thickness, deviation) =
-        (fields::thickness(problem, analysis), fields::deviation(problem, analysis));
+    let (thickness, deviation) = (fields::thickness(problem, analysis), fields::deviation(problem, analysis));
     let data = FieldData {
         error,
         thickness: thickness.as_deref(),

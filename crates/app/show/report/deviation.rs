@@ -90,11 +90,11 @@ fn drawn(outline: &Outline, window: &Window, all: &[Deviation<'_>]) -> Result<Ma
     }
     let (unit, name) = UNITS.into_iter().find(|(unit, _)| most >= 0.1 * unit).unwrap_or(UNITS[3]);
     let is_signed = low < 0.0;
-    let (map, lowest) =
-        if is_signed { (ColourMap::Signed, -most / unit) } else { (ColourMap::Field, 0.0) };
+    let (map, lowest) = if is_signed { (ColourMap::Signed, -most / unit) } else { (ColourMap::Field, 0.0) };
     let pixels = [LEFT, WIDTH - RIGHT];
     let scale = Scale { low: lowest, high: most / unit, count: Count::Linear, pixels };
-    let drawing = Drawing { outline, window, frame: Frame::new(window.low, window.high, TALLEST), scale, map };
+    let drawing =
+        Drawing { outline, window, frame: Frame::new(window.low, window.high, TALLEST), scale, map };
     let title = |k: usize| match (all.len(), k) {
         (1, _) => "Deviation".to_owned(),
         (_, 0) => format!("Before (evaluation {})", all[0].field.evaluation),
