@@ -6,7 +6,9 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_solver::coil::{self, CoilShape, Frame, Path, Racetrack, RegionCurrent, Terminal};
+use fluxmorph_solver::coil::{
+    self, CoilShape, Frame, Path, Racetrack, RegionCurrent, SolidConductor, Terminal,
+};
 use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
 };
@@ -292,7 +294,14 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
                 }
                 config::CoilPath::Closed { center, axis } => Path::Closed(frame(*center, *axis, None)?),
             };
-            RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
+            match region.conductor {
+                config::ConductorWord::Stranded => {
+                    RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
+                }
+                config::ConductorWord::Solid => {
+                    SolidConductor::new(mesh, &coil.name, &elements, &path)?.into()
+                }
+            }
         }
     };
     Ok(coil::Coil { name: coil.name.clone(), ampere_turns: phasor(coil), shape })
@@ -352,7 +361,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
                 (config.boundaries.uniform_field.is_some(), format!("coils[{i}].voltage"));
             let message = match (is_static, has_applied) {
                 (_, true) => Some("the voltage that an applied field induces is not known to the circuit"),
-                (true, _) if coil.resistance.unwrap_or(0.0) == 0.0 => {
+                (true, _) if coil.resistance.unwrap_or(0.0) == 0.0 && !coil.is_solid() => {
                     Some("at 0 Hz no resistance limits the current")
                 }
                 (true, _) if coil.series_capacitance.is_some() => {
@@ -370,6 +379,8 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
         if config.regions.get(name).is_some_and(|r| r.model != RegionModel::Volume) {
             let fault = source.diagnostic(&path, format!("`{name}` is replaced by its surface"));
             faults.push(fault.expected("a region that is meshed"));
+        } else if coil.is_solid() {
+            faults.extend(solid_fault(config, source, &path, name));
         } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
             && material(config, name).conductivity > 0.0
         {
@@ -382,6 +393,15 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
         }
     }
     faults
+}
+
+/// A solid conductor that does not conduct.
+fn solid_fault(config: &Config, source: &SourceMap, path: &str, region: &str) -> Option<Diagnostic> {
+    if material(config, region).conductivity > 0.0 {
+        return None;
+    }
+    let fault = source.diagnostic(path, format!("`{region}` is a solid conductor, but does not conduct"));
+    Some(fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""))
 }
 
 /// Remanence of every region [T], by `RegionId`; zero where there is no magnet.

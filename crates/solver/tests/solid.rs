@@ -122,6 +122,9 @@ fn resistance_and_inner_inductance_of_a_round_wire_are_those_of_bessel_functions
         (ElementFamily::Edge, Order::Linear, 40),
         (ElementFamily::Edge, Order::Quadratic, 16),
         (ElementFamily::Nodal, Order::Quadratic, 16),
+        // Three cells in the thinnest skin, and one.
+        (ElementFamily::Edge, Order::Linear, 15),
+        (ElementFamily::Edge, Order::Quadratic, 5),
     ];
     for (family, order, cells) in cases {
         for skin_depth in [0.2, 0.4, 1.0, 3.0] {
@@ -434,6 +437,117 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
                 // Truncation by the square of a step of some micrometres on cells of 5 mm; rounding of the solver over the step.
                 assert!((difference / exact - 1.0).abs() < 1e-6, "{elements:?}: {difference} {exact}");
             }
+        }
+    }
+}
+
+/// `∫∫ ln √(x² + y²) dx dy` from the origin to a corner.
+fn log_potential([x, y]: [f64; 2]) -> f64 {
+    let product = if x * y == 0.0 { 0.0 } else { x * y * (x * x + y * y).ln() };
+    0.5 * (product - 3.0 * x * y + x * x * (y / x).atan() + y * y * (x / y).atan())
+}
+
+/// The impedance per length [Ω/m] of a quarter of a pair of long bars by the integral equation of their current densities
+/// (Silvester, Modern Electromagnetic Fields, 1968): `J/σ − jωμ0/(2π) ∫J ln r = V`, constant on `n` by `m` cells, met at their centres.
+/// The bar is `[gap, gap + width] × [0, half]`; the sign is that of the current beyond x = 0.
+fn bars_by_filaments([gap, width, half]: [f64; 3], sign: f64, omega: f64, [n, m]: [usize; 2]) -> c64 {
+    // Fine near the faces, as the current is.
+    let lines = |from: f64, length: f64, count: usize, both: bool| -> Vec<f64> {
+        let at = |t: f64| if both { 0.5 - 0.5 * (PI * t).cos() } else { (0.5 * PI * t).sin() };
+        (0..=count).map(|i| from + length * at(i as f64 / count as f64)).collect()
+    };
+    let (x, y) = (lines(gap, width, n, true), lines(0.0, half, m, false));
+    let cells: Vec<[[f64; 2]; 2]> =
+        x.windows(2).flat_map(|a| y.windows(2).map(move |b| [[a[0], a[1]], [b[0], b[1]]])).collect();
+    let centre = |[a, b]: [f64; 2]| 0.5 * (a + b);
+    let entry = |to: &[[f64; 2]; 2], from: &[[f64; 2]; 2]| -> f64 {
+        let [u, v] = to.map(centre);
+        let image = |sx: f64, sy: f64| -> f64 {
+            let corner = |i: usize, j: usize| log_potential([from[0][i] - sx * u, from[1][j] - sy * v]);
+            corner(1, 1) - corner(0, 1) - corner(1, 0) + corner(0, 0)
+        };
+        image(1.0, 1.0) + image(1.0, -1.0) + sign * (image(-1.0, 1.0) + image(-1.0, -1.0))
+    };
+    let factor = c64::new(0.0, -omega * VACUUM_PERMEABILITY / (2.0 * PI));
+    let mut rows: Vec<Vec<c64>> = cells
+        .iter()
+        .enumerate()
+        .map(|(i, to)| {
+            let own =
+                |(j, from): (usize, _)| factor * entry(to, from) + if i == j { 1.0 / COPPER } else { 0.0 };
+            cells.iter().enumerate().map(own).chain([c64::from(1.0)]).collect()
+        })
+        .collect();
+    for k in 0..rows.len() {
+        let (above, below) = rows.split_at_mut(k + 1);
+        let pivot = &above[k];
+        for row in below {
+            let part = row[k] / pivot[k];
+            row[k..].iter_mut().zip(&pivot[k..]).for_each(|(value, own)| *value -= part * own);
+        }
+    }
+    let mut density = vec![c64::default(); cells.len()];
+    for k in (0..cells.len()).rev() {
+        let known: c64 = (k + 1..cells.len()).map(|j| rows[k][j] * density[j]).sum();
+        density[k] = (rows[k][cells.len()] - known) / rows[k][k];
+    }
+    let area = |[a, b]: &[[f64; 2]; 2]| (a[1] - a[0]) * (b[1] - b[0]);
+    1.0 / density.iter().zip(&cells).map(|(j, cell)| j * area(cell)).sum::<c64>()
+}
+
+/// The same by elements: a slice in a box that is far away.
+fn bars_by_elements([gap, width, half]: [f64; 3], is_pair: bool, hertz: f64, cells: [usize; 2]) -> c64 {
+    let far = |from: f64| {
+        let step = |i: i32| from + 4e-3 * (1.5_f64.powi(i) - 1.0);
+        (1..12).map(step).collect::<Vec<_>>()
+    };
+    let x: Vec<f64> = if gap > 0.0 { vec![0.0, 0.5 * gap, gap] } else { vec![0.0] };
+    let x = x.into_iter().chain(parts(gap, gap + width, cells[0])).chain(far(gap + width));
+    let y = std::iter::once(0.0).chain(parts(0.0, half, cells[1])).chain(far(half));
+    let height = 2e-3;
+    let grid = Grid::new("slice", [x.collect(), y.collect(), vec![0.0, height]]).expect("ascending lines");
+    let in_bar = |[x, y, _]: Point| x > gap && x < gap + width && y < half;
+    let topology = grid.topology(&["air", "bar"], |x| RegionId(u32::from(in_bar(x)))).expect("regions");
+    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let mut boundaries = flux_parallel(&["z_min", "z_max", "x_max", "y_max"]);
+    boundaries.extend(is_pair.then(|| flux_parallel(&["x_min"])).into_iter().flatten());
+    let setup = FieldModelSetup {
+        frequency: hertz,
+        order: Order::Quadratic,
+        materials: vec![Material::AIR, METAL],
+        coils: vec![coil(&mesh, "bar", ["z_min", "z_max"], 1.0)],
+        boundaries,
+        ..FieldModelSetup::default()
+    };
+    let model = FieldModel::new(&mesh, setup).expect("a model");
+    let (state, _) = model.solve(&mesh).expect("a field");
+    let found = terminals(&model, &mesh, &state).expect("terminals");
+    impedance(&found, 2.0 * PI * hertz) / height
+}
+
+/// A bar of 8 by 40 mm alone, and a pair of them 8 mm apart.
+#[test]
+fn busbars_have_the_resistance_of_their_integral_equation() {
+    for (size, is_pair) in [([0.0, 4e-3, 20e-3], false), ([4e-3, 8e-3, 20e-3], true)] {
+        for hertz in [50.0, 400.0, 2000.0] {
+            let omega = 2.0 * PI * hertz;
+            let sign = if is_pair { -1.0 } else { 1.0 };
+            let [coarse, exact] =
+                [[12, 16], [20, 26]].map(|cells| bars_by_filaments(size, sign, omega, cells));
+            let found = bars_by_elements(size, is_pair, hertz, [8, 14]);
+            let direct = 1.0 / (COPPER * size[1] * size[2]);
+            let error = found.re / exact.re - 1.0;
+            println!(
+                "pair {is_pair} {hertz} Hz: R/R0 {:.4}, integral {:.4} ({:+.3} %, coarse {:+.3} %), X {:+.3} %",
+                found.re / direct,
+                exact.re / direct,
+                100.0 * error,
+                100.0 * (coarse.re / exact.re - 1.0),
+                100.0 * (found.im / exact.im - 1.0)
+            );
+            assert!(error.abs() < 0.02, "{hertz}: {error}");
+            // Alone, a bar has an inductance only with where its current returns.
+            assert!(!is_pair || (found.im / exact.im - 1.0).abs() < 0.02, "{found} {exact}");
         }
     }
 }

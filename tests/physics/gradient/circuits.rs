@@ -9,6 +9,7 @@ use crate::problems::variables;
 use crate::support::{changed, setup_of};
 
 const COILS: &str = include_str!("../../support/coils.toml");
+const BUSBAR: &str = include_str!("../../../configs/busbar.toml");
 
 /// A bound on a kind of one coil or a pair, whatever its value.
 fn bound(kind: &str, coils: &str, number: usize) -> String {
@@ -118,4 +119,24 @@ fn currents_that_voltages_drive_follow_the_shape() {
     kinds += &bound("current", "\"two\"", 2);
     kinds += "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 2\n";
     all_hold(&problem(&kinds, &driven));
+}
+
+/// A busbar whose own face moves: what it is as a coil, at a current and at a voltage.
+#[test]
+fn what_a_solid_conductor_is_follows_its_own_face() {
+    let of = |kinds: &[&str], changes: &[(&str, &str)]| {
+        let mut kinds: String = kinds.iter().map(|kind| bound(kind, "\"bar\"", 1)).collect();
+        kinds += "[[constraints]]\nkind = \"loss\"\nregion = \"bar\"\nupper_ratio = 2\n";
+        let design = format!("{kinds}[design]\n");
+        let order = ("order = 2", "order = 1\nlinear_solver = { tolerance = 1e-13 }");
+        let coarse = ("size = [\"2 mm\", \"2 mm\", \"4 mm\"]", "size = [\"4 mm\", \"4 mm\", \"4 mm\"]");
+        let changes = [&[("[design]\n", design.as_str()), order, coarse], changes].concat();
+        setup_of(&changed(BUSBAR, &changes)).problem
+    };
+    all_hold(&of(&["inductance", "quality_factor", "voltage", "power", "power_factor"], &[]));
+    let voltage = "voltage = \"2 mV\"\nresistance = \"0.001 mohm\"\nseries_inductance = \"1 nH\"";
+    let driven = [("ampere_turns = \"1 kA\"", voltage)];
+    all_hold(&of(&["current", "flux_linkage", "power", "power_factor"], &driven));
+    let nodal = [("elements = \"edge\"", "elements = \"nodal\"")];
+    all_hold(&of(&["inductance", "voltage"], &nodal));
 }

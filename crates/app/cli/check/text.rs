@@ -263,6 +263,7 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
                     at(c.center)
                 )
             }
+            CoilShape::Region(c) if coil.is_solid() => format!("solid conductor, region {}", c.region),
             CoilShape::Region(c) => format!("region {}", c.region),
         };
         let phase = format!("{}", (coil.phase.to_degrees() * 1e6).round() / 1e6 + 0.0);

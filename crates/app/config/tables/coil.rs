@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::json;
 
+use super::axis::{Axis, check_axis, length};
 use crate::config::section::Section;
 use crate::config::table::kinds::WORD;
-use crate::config::table::rules::{Rules, Then};
-use crate::config::table::{Group, one_of, table};
+use crate::config::table::rules::{Rules, Then, is};
+use crate::config::table::{Group, table};
 use crate::config::value::choice::choice;
 
 table! {
@@ -20,7 +21,8 @@ table! {
     /// A `region` without `terminals` closes on itself: `center` and `axis` give any line through its hole, and positive
     /// current runs counter-clockwise about it. The current has the direction of conduction and the same magnitude everywhere,
     /// as in a stranded winding, less what is needed to free it of divergence; what is left of that, and the current through
-    /// cross-sections, is printed.
+    /// cross-sections, is printed. With `conductor = "solid"` the region is a conductor of its material, such as a busbar: above
+    /// 0 Hz its current follows from the field, with skin effect and proximity, and it may move with the design.
     ///
     /// ```toml
     /// [[coils]]
@@ -38,6 +40,13 @@ table! {
     /// ampere_turns = "500 A"
     /// phase = "90 deg"
     /// terminals = ["y_min", "x_min"]
+    ///
+    /// [[coils]]
+    /// name = "busbar"
+    /// region = "busbar"
+    /// conductor = "solid"
+    /// voltage = "50 mV"
+    /// terminals = ["z_min", "z_max"]
     /// ```
     pub struct Coil {
         /// What the coil is called in messages and results; each name once.
@@ -45,13 +54,14 @@ table! {
         /// Amplitude of current times turns [A]; positive is counter-clockwise about the axis, or from the first terminal to the
         /// second. Not 0, but of a coil with `turns` that is open. Either this or `voltage`.
         ampere_turns: Option<f64> = quantity(Current, FINITE);
-        /// Turns of the winding. With them the result has the coil's current, flux linkage, resistance and voltage, and the matrix of
+        /// Turns of the winding; one of a solid conductor. With them the result has the coil's current, flux linkage, resistance and voltage, and the matrix of
         /// inductances, all of the meshed part.
         turns: Option<f64> = number(POSITIVE);
         /// Amplitude of the voltage that drives the current [V], instead of `ampere_turns`: across the winding and what is in series
         /// with it, of the meshed part.
         voltage: Option<f64> = quantity(Voltage, FINITE);
-        /// Resistance of the wire and of what is in series [Ω]; of a voltage-driven coil at 0 Hz above zero. Default 0.
+        /// Resistance of the wire and of what is in series [Ω]; of a solid conductor the latter alone. Above zero for a coil of
+        /// strands that a voltage drives at 0 Hz. Default 0.
         resistance: Option<f64> = quantity(Resistance, NOT_NEGATIVE);
         /// Of a voltage-driven coil: an inductance in series [H]. Default 0.
         series_inductance: Option<f64> = quantity(Inductance, NOT_NEGATIVE);
@@ -72,8 +82,13 @@ fn keys_of_the_drive(rules: Rules) -> Rules {
     // A coil that is open must have terminals.
     let open = json!({ "required": ["ampere_turns"], "properties": { "ampere_turns": { "const": 0 } } });
     let rules = rules.exactly_one(&["ampere_turns", "voltage"]);
-    let rules = rules.add(json!({ "if": open, "then": { "required": ["turns"] } }));
-    let rules = rules.needs("voltage", &["turns"]).needs("resistance", &["turns"]);
+    let solid = is("conductor", &["solid"]);
+    let turns = [
+        json!({ "if": open, "then": { "required": ["turns"] } }),
+        json!({ "dependentRequired": { "voltage": ["turns"], "resistance": ["turns"] } }),
+    ];
+    let one_turn = json!({ "properties": { "turns": { "const": 1 } } });
+    let rules = rules.add(json!({ "if": solid, "then": one_turn, "else": { "allOf": turns } }));
     rules.needs("series_inductance", &["voltage"]).needs("series_capacitance", &["voltage"])
 }
 
@@ -82,8 +97,10 @@ table! {
     pub(in crate::config) struct ShapeKeys {
         /// The shape of the winding. Either this or `region`.
         shape: Option<ShapeWord> = WORD;
-        /// Instead of `shape`: the region of the mesh that is the winding. It must not conduct at a frequency above 0.
+        /// Instead of `shape`: the region of the mesh that is the winding. One of strands must not conduct at a frequency above 0.
         region: Option<String> = TEXT;
+        /// With `region`: strands that share the current equally, or one solid conductor. Default `"stranded"`.
+        conductor: Option<ConductorWord> = WORD;
         /// Centre of the coil [m]; required with `shape`. Of a `region` without `terminals`: a point of a line through its hole.
         center: Option<[f64; 3]> = length(FINITE);
         /// Axis of the winding; the length of a vector does not matter.
@@ -107,8 +124,8 @@ table! {
         /// the window.
         inner_radius: Option<f64> = length(POSITIVE);
         /// With `region`: the surface where the current comes in, and the one where it goes out; both flux-parallel. Only
-        /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of the region are
-        /// in series: each carries all ampere-turns.
+        /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of a stranded
+        /// region are in series: each carries all ampere-turns; those of a solid one are in parallel.
         terminals: Option<[String; 2]> =
             two_names("two surfaces: where the current comes in, where it goes out");
     }
@@ -127,9 +144,9 @@ impl ShapeKeys {
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("shape", &WORD) {
             _ if section.has("region") && !section.has("shape") => NOT_OF_A_REGION.to_vec(),
-            None | Some(ShapeWord::Racetrack) => vec!["radius"],
-            Some(ShapeWord::Rectangular) => [&["radius"], &CORNERS[..]].concat(),
-            Some(ShapeWord::Circular) => [SIDES, CORNERS].concat(),
+            None | Some(ShapeWord::Racetrack) => vec!["radius", "conductor"],
+            Some(ShapeWord::Rectangular) => [&["radius", "conductor"], &CORNERS[..]].concat(),
+            Some(ShapeWord::Circular) => [&["conductor"], &SIDES[..], &CORNERS[..]].concat(),
         }
     }
 }
@@ -153,6 +170,7 @@ fn keys_of_the_shape(rules: Rules) -> Rules {
                 refused: &["terminals", SIDES[0], SIDES[1], CORNERS[0], CORNERS[1]],
             },
         )
+        .needs("conductor", &["region"])
         .with("region", Then { required: &[], refused: &NOT_OF_A_REGION })
         .with("terminals", Then { required: &[], refused: &["center", "axis"] })
         .add(json!({ "anyOf": [
@@ -214,6 +232,9 @@ pub struct Circular {
 pub struct RegionCoil {
     /// Name of the region.
     pub region: String,
+    /// Strands, or one solid conductor. Default strands.
+    #[serde(skip_serializing_if = "ConductorWord::is_stranded")]
+    pub conductor: ConductorWord,
     /// The way of the current.
     #[serde(flatten)]
     pub path: CoilPath,
@@ -238,6 +259,22 @@ pub enum CoilPath {
 }
 
 choice! {
+    /// Words for `conductor`.
+    pub enum ConductorWord {
+        /// The current is given, with the same magnitude everywhere.
+        Stranded = "stranded",
+        /// The current is that of conduction and of the field.
+        Solid = "solid",
+    }
+}
+
+impl ConductorWord {
+    fn is_stranded(&self) -> bool {
+        *self == Self::Stranded
+    }
+}
+
+choice! {
     /// Words for `shape`.
     pub enum ShapeWord {
         /// Four straight sides with corners of choice.
@@ -246,61 +283,6 @@ choice! {
         Rectangular = "rectangular",
         /// A circle.
         Circular = "circular",
-    }
-}
-
-choice! {
-    /// A coordinate axis.
-    pub enum AxisWord {
-        /// x.
-        X = "x",
-        /// y.
-        Y = "y",
-        /// z.
-        Z = "z",
-    }
-}
-
-impl AxisWord {
-    /// Its coordinate: 0, 1 or 2.
-    pub fn index(self) -> usize {
-        match self {
-            Self::X => 0,
-            Self::Y => 1,
-            Self::Z => 2,
-        }
-    }
-}
-
-one_of! {
-    /// The axis of a coil or of a rotation: the name of a coordinate, or a vector.
-    #[derive(Copy)]
-    pub enum Axis {
-        /// A coordinate axis.
-        Coordinate(AxisWord) = WORD;
-        /// Along a vector of any length but zero.
-        #[also(not_all_zero)]
-        Vector([f64; 3]) = number(FINITE), if list;
-    }
-}
-
-impl Default for Axis {
-    fn default() -> Self {
-        Self::Coordinate(AxisWord::Z)
-    }
-}
-
-impl Axis {
-    /// A vector along the axis.
-    pub fn vector(self) -> [f64; 3] {
-        match self {
-            Self::Coordinate(word) => {
-                let mut vector = [0.0; 3];
-                vector[word.index()] = 1.0;
-                vector
-            }
-            Self::Vector(vector) => vector,
-        }
     }
 }
 
@@ -324,6 +306,11 @@ pub enum Corner {
 }
 
 impl Coil {
+    /// Whether it is a solid conductor of the mesh.
+    pub fn is_solid(&self) -> bool {
+        matches!(&self.shape, CoilShape::Region(region) if region.conductor == ConductorWord::Solid)
+    }
+
     fn check(&mut self, section: &Section<'_>) {
         match ["ampere_turns", "voltage"].map(|key| section.has(key)) {
             [false, false] => section.missing(&["ampere_turns"], "ampere_turns = \"40 kA\""),
@@ -333,7 +320,15 @@ impl Coil {
             }
             _ => {}
         }
-        if self.ampere_turns == Some(0.0) && !section.has("turns") {
+        let is_solid = self.is_solid();
+        if let Some(turns) = self.turns.filter(|turns| is_solid && *turns != 1.0) {
+            let message = format!("`{}` is a solid conductor with {turns} turns", section.path());
+            section.wrong("turns", message, "one turn or no such key, or conductor = \"stranded\"");
+        }
+        if is_solid {
+            self.turns = Some(1.0);
+        }
+        if self.ampere_turns == Some(0.0) && self.turns.is_none() {
             let message = format!("`{}.ampere_turns` is 0 A: the coil makes no field", section.path());
             section.wrong("ampere_turns", message, "any current but 0 A, or turns of an open coil");
         }
@@ -343,7 +338,8 @@ impl Coil {
             ("series_inductance", "voltage"),
             ("series_capacitance", "voltage"),
         ];
-        for (key, other) in needs.into_iter().filter(|(key, other)| section.has(key) && !section.has(other)) {
+        let is_there = |key: &str| section.has(key) || is_solid && key == "turns";
+        for (key, other) in needs.into_iter().filter(|(key, other)| section.has(key) && !is_there(other)) {
             let message = format!("`{}.{key}` has no use without `{other}`", section.path());
             section.wrong(key, message, format!("{other} beside it, or no such key"));
         }
@@ -367,7 +363,8 @@ impl Group for CoilShape {
         check_axis(written.axis, section);
         match written.region.clone() {
             Some(region) if !has_shape => {
-                Self::Region(RegionCoil { region, path: CoilPath::of(written, section) })
+                let conductor = written.conductor.unwrap_or(ConductorWord::Stranded);
+                Self::Region(RegionCoil { region, conductor, path: CoilPath::of(written, section) })
             }
             _ => Self::analytic(written, section),
         }
@@ -451,14 +448,6 @@ impl Corner {
     }
 }
 
-/// An axis must have a length.
-pub(super) fn check_axis(axis: Axis, section: &Section<'_>) {
-    if length(axis.vector()) == 0.0 {
-        let message = format!("`{}.axis` has no length", section.path());
-        section.wrong("axis", message, "\"x\", \"y\", \"z\", or a vector that is not zero");
-    }
-}
-
 /// Whether a direction has a part across the axis.
 fn check_direction(direction: [f64; 3], axis: Axis, section: &Section<'_>) -> bool {
     let [a, b] = [axis.vector(), direction];
@@ -470,8 +459,4 @@ fn check_direction(direction: [f64; 3], axis: Axis, section: &Section<'_>) -> bo
         section.wrong("direction", message, "a vector that is not along the axis");
     }
     has_part
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }

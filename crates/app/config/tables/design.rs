@@ -1,6 +1,6 @@
 //! `[design]`: which surface moves, which way, and how far.
 
-use super::coil::AxisWord;
+use super::axis::AxisWord;
 use super::initial::InitialDesign;
 use crate::config::section::Section;
 use crate::config::table::{one_of, table};

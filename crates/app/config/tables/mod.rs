@@ -2,6 +2,7 @@
 
 mod accuracy;
 mod analysis;
+mod axis;
 mod boundary;
 mod coil;
 mod config;
@@ -26,9 +27,10 @@ mod remesh;
 
 pub use accuracy::Accuracy;
 pub use analysis::{Analysis, ElementOrder, Elements, Frequencies};
+pub use axis::{Axis, AxisWord};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
-    Axis, AxisWord, Circular, Coil, CoilPath, CoilShape, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
+    Circular, Coil, CoilPath, CoilShape, ConductorWord, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
 };
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, ValueBound};

@@ -1,6 +1,6 @@
 //! `[[multipoles]]`: circles and balls in which the field is expanded.
 
-use super::coil::{Axis, check_axis};
+use super::axis::{Axis, check_axis};
 use crate::config::section::Section;
 use crate::config::table::table;
 use crate::config::value::choice::choice;

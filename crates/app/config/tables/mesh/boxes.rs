@@ -5,7 +5,7 @@ use fluxmorph_geometry::generate::{AxisSize, BoxRegion, BoxesParameters, SizeLim
 use super::grading::REFINEMENTS;
 use crate::config::section::Section;
 use crate::config::table::table;
-use crate::config::tables::coil::AxisWord;
+use crate::config::tables::axis::AxisWord;
 use crate::config::tables::order::{CORNERS, Corners, box_with_volume, check_within, flat_box};
 use crate::config::value::range::Range;
 

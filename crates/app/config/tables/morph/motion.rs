@@ -6,7 +6,7 @@ use serde_json::json;
 use crate::config::section::Section;
 use crate::config::table::rules::{Then, present};
 use crate::config::table::{Group, one_of, table};
-use crate::config::tables::coil::{Axis, check_axis};
+use crate::config::tables::axis::{Axis, check_axis};
 use crate::config::tables::order::{Corners, flat_box};
 use crate::config::value::choice::choice;
 
