@@ -225,33 +225,45 @@ fn overlap_faults(
         let fault = source.diagnostic("open", message);
         faults.push(fault.expected("a remesh region inside the shell, which does not move"));
     }
-    if let Some(e) = model.source_elements().find(moves) {
-        let place = centroid(mesh.vertices(e));
-        faults.push(
-            source
-                .diagnostic(
-                    &coil_at(config, mesh, e),
-                    format!("a coil reaches into the remesh region, at {}", millimetres(place)),
-                )
-                .expected(
-                    "coils and their windows outside the remesh region: a coil does not move with the mesh",
-                )
-                .help(match plausible::unit_hint(config, inputs.full_mesh) {
-                    Some(hint) => format!("{hint}; else shrink the remesh region, or move the coil"),
-                    None => "shrink the remesh region, or move the coil".to_owned(),
-                }),
+    faults.extend(model.source_elements().find(moves).map(|e| source_fault(inputs, config, e)));
+    faults
+}
+
+/// A coil in an element that would move.
+fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Diagnostic {
+    let Inputs { source, mesh, .. } = *inputs;
+    let at = millimetres(centroid(mesh.vertices(element)));
+    let fault = source.diagnostic(
+        &coil_at(config, mesh, element),
+        format!("a coil reaches into the remesh region, at {at}"),
+    );
+    if region_coil_at(config, mesh, element).is_some_and(|i| config.coils[i].is_solid()) {
+        return fault.expected("a frequency above 0 Hz").help(
+            "at 0 Hz the current of a solid conductor is that of conduction in the initial shape, and must not move; a low \
+             frequency has the same field, and follows the shape",
         );
     }
-    faults
+    let fault = fault
+        .expected("coils and their windows outside the remesh region: a coil does not move with the mesh");
+    fault.help(match plausible::unit_hint(config, inputs.full_mesh) {
+        Some(hint) => format!("{hint}; else shrink the remesh region, or move the coil"),
+        None => "shrink the remesh region, or move the coil".to_owned(),
+    })
+}
+
+/// The coil whose region an element is in.
+fn region_coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> Option<usize> {
+    let topology = mesh.topology();
+    let name = &topology.region_names()[topology.region_of()[element.index()].index()];
+    config
+        .coils
+        .iter()
+        .position(|coil| matches!(&coil.shape, config::CoilShape::Region(own) if own.region == *name))
 }
 
 /// The key path of the position of the coil in an element; all coils where several may be it.
 fn coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> String {
-    let topology = mesh.topology();
-    let name = &topology.region_names()[topology.region_of()[element.index()].index()];
-    let in_region =
-        |coil: &config::Coil| matches!(&coil.shape, config::CoilShape::Region(own) if own.region == *name);
-    if let Some(i) = config.coils.iter().position(in_region) {
+    if let Some(i) = region_coil_at(config, mesh, element) {
         return format!("coils[{i}].region");
     }
     let analytic = |coil: &config::Coil| !matches!(coil.shape, config::CoilShape::Region(_));
