@@ -7,7 +7,7 @@ use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_solver::coil::{
-    self, CoilShape, Frame, Path, Racetrack, RegionCurrent, SolidConductor, Terminal,
+    self, CoilShape, Connection, Frame, Path, Racetrack, RegionCurrent, SolidConductor, Terminal,
 };
 use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
@@ -299,7 +299,11 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
                     RegionCurrent::new(mesh, &coil.name, &elements, &path)?.into()
                 }
                 config::ConductorWord::Solid => {
-                    SolidConductor::new(mesh, &coil.name, &elements, &path)?.into()
+                    let connection = match region.connection {
+                        config::ConnectionWord::Series => Connection::Series,
+                        config::ConnectionWord::Parallel => Connection::Parallel,
+                    };
+                    SolidConductor::new(mesh, &coil.name, &elements, (&path, connection))?.into()
                 }
             }
         }

@@ -101,6 +101,9 @@ table! {
         region: Option<String> = TEXT;
         /// With `region`: strands that share the current equally, or one solid conductor. Default `"stranded"`.
         conductor: Option<ConductorWord> = WORD;
+        /// Of a solid conductor: how separate parts between its terminals are connected. In series each carries the whole current.
+        /// Default `"series"`.
+        connection: Option<ConnectionWord> = WORD;
         /// Centre of the coil [m]; required with `shape`. Of a `region` without `terminals`: a point of a line through its hole.
         center: Option<[f64; 3]> = length(FINITE);
         /// Axis of the winding; the length of a vector does not matter.
@@ -124,8 +127,8 @@ table! {
         /// the window.
         inner_radius: Option<f64> = length(POSITIVE);
         /// With `region`: the surface where the current comes in, and the one where it goes out; both flux-parallel. Only
-        /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of a stranded
-        /// region are in series: each carries all ampere-turns; those of a solid one are in parallel.
+        /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of the region are
+        /// in series: each carries all ampere-turns.
         terminals: Option<[String; 2]> =
             two_names("two surfaces: where the current comes in, where it goes out");
     }
@@ -144,9 +147,9 @@ impl ShapeKeys {
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("shape", &WORD) {
             _ if section.has("region") && !section.has("shape") => NOT_OF_A_REGION.to_vec(),
-            None | Some(ShapeWord::Racetrack) => vec!["radius", "conductor"],
-            Some(ShapeWord::Rectangular) => [&["radius", "conductor"], &CORNERS[..]].concat(),
-            Some(ShapeWord::Circular) => [&["conductor"], &SIDES[..], &CORNERS[..]].concat(),
+            None | Some(ShapeWord::Racetrack) => vec!["radius", "conductor", "connection"],
+            Some(ShapeWord::Rectangular) => [&["radius", "conductor", "connection"], &CORNERS[..]].concat(),
+            Some(ShapeWord::Circular) => [&["conductor", "connection"], &SIDES[..], &CORNERS[..]].concat(),
         }
     }
 }
@@ -171,6 +174,7 @@ fn keys_of_the_shape(rules: Rules) -> Rules {
             },
         )
         .needs("conductor", &["region"])
+        .add(json!({ "if": { "required": ["connection"] }, "then": is("conductor", &["solid"]) }))
         .with("region", Then { required: &[], refused: &NOT_OF_A_REGION })
         .with("terminals", Then { required: &[], refused: &["center", "axis"] })
         .add(json!({ "anyOf": [
@@ -235,6 +239,9 @@ pub struct RegionCoil {
     /// Strands, or one solid conductor. Default strands.
     #[serde(skip_serializing_if = "ConductorWord::is_stranded")]
     pub conductor: ConductorWord,
+    /// Of a solid conductor: how its parts are connected. Default in series.
+    #[serde(skip_serializing_if = "ConnectionWord::is_series")]
+    pub connection: ConnectionWord,
     /// The way of the current.
     #[serde(flatten)]
     pub path: CoilPath,
@@ -265,6 +272,22 @@ choice! {
         Stranded = "stranded",
         /// The current is that of conduction and of the field.
         Solid = "solid",
+    }
+}
+
+choice! {
+    /// Words for `connection`.
+    pub enum ConnectionWord {
+        /// Each part carries the whole current.
+        Series = "series",
+        /// The parts share it.
+        Parallel = "parallel",
+    }
+}
+
+impl ConnectionWord {
+    fn is_series(&self) -> bool {
+        *self == Self::Series
     }
 }
 
@@ -364,7 +387,13 @@ impl Group for CoilShape {
         match written.region.clone() {
             Some(region) if !has_shape => {
                 let conductor = written.conductor.unwrap_or(ConductorWord::Stranded);
-                Self::Region(RegionCoil { region, conductor, path: CoilPath::of(written, section) })
+                let connection = written.connection.unwrap_or(ConnectionWord::Series);
+                if conductor == ConductorWord::Stranded && section.has("connection") {
+                    let message = format!("`{}.connection` has no use for strands", section.path());
+                    section.wrong("connection", message, "conductor = \"solid\" beside it, or no such key");
+                }
+                let path = CoilPath::of(written, section);
+                Self::Region(RegionCoil { region, conductor, connection, path })
             }
             _ => Self::analytic(written, section),
         }

@@ -30,7 +30,8 @@ pub use analysis::{Analysis, ElementOrder, Elements, Frequencies};
 pub use axis::{Axis, AxisWord};
 pub use boundary::{Boundaries, UniformField};
 pub use coil::{
-    Circular, Coil, CoilPath, CoilShape, ConductorWord, Corner, CornerWord, Racetrack, RegionCoil, ShapeWord,
+    Circular, Coil, CoilPath, CoilShape, ConductorWord, ConnectionWord, Corner, CornerWord, Racetrack,
+    RegionCoil, ShapeWord,
 };
 pub use config::Config;
 pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, ValueBound};

@@ -46,7 +46,7 @@ impl Border {
         let mut responses: Vec<Vec<c64>> =
             solids.loads.iter().map(|load| respond(load)).collect::<Result<_, SolverError>>()?;
         for (driven, _) in windings.with_source() {
-            responses.push(match driven.solid {
+            responses.push(match &driven.solid {
                 Some(_) => Vec::new(),
                 None => respond(&driven.load)?,
             });
@@ -69,9 +69,9 @@ impl Border {
             let own = solids + k;
             schur[own][own] +=
                 driven.winding.impedance(self.angular_frequency) / c64::new(0.0, self.angular_frequency);
-            if let Some(conductor) = driven.solid {
-                schur[own][conductor] += 1.0;
-                schur[conductor][own] += 1.0;
+            for segment in driven.solid.clone().into_iter().flatten() {
+                schur[own][segment] += 1.0;
+                schur[segment][own] += 1.0;
             }
         }
         schur

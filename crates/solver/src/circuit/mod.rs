@@ -17,6 +17,8 @@ mod border;
 pub(crate) mod solids;
 mod terminals;
 
+use std::ops::Range;
+
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh};
 
@@ -69,10 +71,10 @@ struct Driven {
     /// Place of its coil in the model.
     coil: usize,
     winding: Winding,
-    /// Of a solid conductor above 0 Hz, by its number: it is in the field, and no source.
-    solid: Option<usize>,
+    /// Of a solid conductor above 0 Hz, its segments by their numbers: it is in the field, and no source.
+    solid: Option<Range<usize>>,
     sources: Sources,
-    /// `F` [m per unit of a test function]; of a solid conductor 1 in its own row behind those of the field.
+    /// `F` [m per unit of a test function]; of a solid conductor 1 in its own rows behind those of the field.
     load: Vec<c64>,
 }
 
@@ -102,9 +104,9 @@ impl Windings {
             Some(Sources::new(mesh, &unit, &[]).map(|sources| {
                 let mut load = vec![c64::default(); unknowns.dofs.count()];
                 sources.add_load(space, unknowns, mesh, &mut load);
-                if let Some(conductor) = solid {
-                    load.resize(load.len() + conductor + 1, c64::default());
-                    load[unknowns.dofs.count() + conductor] = c64::from(1.0);
+                if let Some(segments) = &solid {
+                    load.resize(load.len() + segments.start, c64::default());
+                    load.resize(load.len() + segments.len(), c64::from(1.0));
                 }
                 Driven { coil, winding, solid, sources, load }
             }))
@@ -153,10 +155,13 @@ impl Windings {
 
     /// Net currents [A] of the solid conductors whose current is given, zero of the others: behind the load of the field.
     pub(crate) fn solid_currents<'a>(&'a self, coils: &'a [Coil]) -> impl Iterator<Item = c64> + 'a {
-        let solids = self.coils.iter().filter(|driven| driven.solid.is_some());
-        solids.map(|driven| match driven.winding.voltage {
-            None => coils[driven.coil].ampere_turns,
-            Some(_) => c64::default(),
+        let solids = self.coils.iter().filter_map(|driven| Some((driven, driven.solid.clone()?)));
+        solids.flat_map(|(driven, segments)| {
+            let current = match driven.winding.voltage {
+                None => coils[driven.coil].ampere_turns,
+                Some(_) => c64::default(),
+            };
+            segments.map(move |_| current)
         })
     }
 

@@ -7,11 +7,12 @@
 //!
 //! complex symmetric as `K` is. `∇χ` has no curl, so that nothing but conduction sees it; `U` stands behind the unknowns of the
 //! field, wherever these are. Of a conductor as a coil the load of 1 A is 1 in this row, and its flux linkage `V/(jω)` is `U`:
-//! its imaginary part is what the resistance takes.
+//! its imaginary part is what the resistance takes. Segments in series are such conductors each, with the same current.
 //!
 //! At 0 Hz the current has the distribution of conduction and is a source.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
@@ -29,7 +30,7 @@ use crate::unknowns::{Conductors, PSI};
 /// Coefficients of `∇χ` in an element.
 #[derive(Clone, Copy, Debug)]
 struct Gradient {
-    /// The conductor, by its number.
+    /// The segment of a conductor, by its number.
     conductor: usize,
     /// One a carrier.
     coefficients: [f64; MOST],
@@ -38,7 +39,7 @@ struct Gradient {
 /// The solid conductors of a model above 0 Hz.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Solids {
-    /// Their coils, by place in the model.
+    /// The coil of every segment, by place in the model.
     coils: Vec<usize>,
     /// The component that the coefficients are of.
     component: usize,
@@ -64,24 +65,27 @@ impl Solids {
         };
         let mut solids = Self { component, ..Self::default() };
         for (coil, conductor) in conductors(coils).filter(|_| angular_frequency > 0.0) {
-            let number = solids.coils.len();
-            solids.coils.push(coil);
-            solids.gradients.extend(conductor.potential().iter().map(|(e, chi)| {
-                (*e, Gradient { conductor: number, coefficients: space.gradient_coefficients(*e, chi) })
+            let first = solids.coils.len();
+            solids.coils.resize(first + conductor.segment_count(), coil);
+            let elements = conductor.potential().iter().zip(conductor.segments());
+            solids.gradients.extend(elements.map(|((e, chi), segment)| {
+                let coefficients = space.gradient_coefficients(*e, chi);
+                (*e, Gradient { conductor: first + segment, coefficients })
             }));
         }
         solids.gradients.sort_by_key(|(e, _)| *e);
         solids
     }
 
-    /// Number of conductors, each with an unknown of its own.
+    /// Number of segments of all conductors, each with an unknown of its own.
     pub(crate) fn count(&self) -> usize {
         self.coils.len()
     }
 
-    /// The conductor that a coil of the model is, by its number.
-    pub(crate) fn of_coil(&self, coil: usize) -> Option<usize> {
-        self.coils.iter().position(|own| *own == coil)
+    /// The segments of a coil of the model, by their numbers; `None` where it is no solid conductor.
+    pub(crate) fn of_coil(&self, coil: usize) -> Option<Range<usize>> {
+        let first = self.coils.iter().position(|own| *own == coil)?;
+        Some(first..first + self.coils.iter().filter(|own| **own == coil).count())
     }
 
     fn gradient_in(&self, e: ElementId) -> Option<&Gradient> {

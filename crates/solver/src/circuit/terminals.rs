@@ -54,8 +54,8 @@ impl Windings {
 
     /// Flux linkage [Wb] of a winding in a state.
     pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
-        if let Some(conductor) = self.coils[k].solid {
-            return state.solid_unknowns(model)[conductor];
+        if let Some(segments) = &self.coils[k].solid {
+            return state.solid_unknowns(model)[segments.clone()].iter().sum();
         }
         self.coils[k].sources.linkage(model.space(), mesh, |e| state.element(model, e))
     }

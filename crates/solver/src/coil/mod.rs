@@ -28,7 +28,7 @@ pub use frame::Frame;
 pub use planes::{Condition, ConditionedSurface};
 pub use racetrack::{Corner, Racetrack};
 pub use region::{Path, RegionCurrent, Terminal};
-pub use solid::SolidConductor;
+pub use solid::{Connection, SolidConductor};
 pub use terms::SourceTerms;
 
 use fluxmorph_geometry::fem::c64;

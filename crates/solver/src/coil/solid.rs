@@ -5,12 +5,13 @@
 //! `∫∇χ·∇q = 0`, so that what `ψ` is left with is small. On the mesh that moves it keeps its values at the nodes. Current at
 //! 0 Hz: `J = −∇χ/g` for 1 A, with the resistance `1/(σg)`, `g = ∫|∇χ|²` [m].
 //!
-//! Separate parts between the same terminals are in parallel. What the circuit makes of `V` is in [`crate::circuit`].
+//! Separate parts between the same terminals are in series, each with its own `V`, or in parallel with one. What the circuit makes of
+//! `V` is in [`crate::circuit`].
 
 use std::f64::consts::TAU;
 
-use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_geometry::tet4::{Point, Tet4, dot};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use super::divergence::Section;
 use super::fault::RegionFault;
@@ -19,12 +20,25 @@ use super::potential::Potential;
 use super::region::{self, NO_RING, Path, RegionCurrent};
 use crate::error::SolverError;
 
+/// How separate parts between the same terminals are connected.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Connection {
+    /// Each carries the whole current: the turns of a winding that a plane cuts.
+    #[default]
+    Series,
+    /// They share it: the sheets of a busbar.
+    Parallel,
+}
+
 /// The way of the current through a conductor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidConductor {
     potential: Vec<(ElementId, [f64; 4])>,
+    /// The segment of every element in the same order.
+    segments: Vec<usize>,
     direct: RegionCurrent,
-    conductance: f64,
+    /// `g` of every segment.
+    conductances: Vec<f64>,
 }
 
 impl SolidConductor {
@@ -32,7 +46,12 @@ impl SolidConductor {
     ///
     /// # Errors
     /// As [`RegionCurrent::new`].
-    pub fn new(mesh: &Mesh, coil: &str, elements: &[ElementId], path: &Path) -> Result<Self, SolverError> {
+    pub fn new(
+        mesh: &Mesh,
+        coil: &str,
+        elements: &[ElementId],
+        (path, connection): (&Path, Connection),
+    ) -> Result<Self, SolverError> {
         let refuse = |fault| SolverError::CoilRegion { coil: coil.to_owned(), fault };
         if elements.is_empty() {
             return Err(refuse(RegionFault::NoElements));
@@ -49,7 +68,8 @@ impl SolidConductor {
                 let vertices = patch.connectivity.iter().map(|nodes| nodes.map(|n| chi[n.index()]));
                 let names = Some([from.name.clone(), to.name.clone()]);
                 let sections = Section::LevelsOf(&chi);
-                Ok(Self::of((&patch, &problem), vertices.collect(), (terminals, names), sections))
+                let chi = vertices.collect();
+                Ok(Self::of((&patch, &problem), (chi, connection), (terminals, names), sections))
             }
             Path::Closed(frame) => {
                 if patch.parts != 1 {
@@ -65,29 +85,48 @@ impl SolidConductor {
                 given[0] = true;
                 let problem = Potential::new(&patch, &given)?;
                 let rest = problem.solve(&turning, &vec![0.0; given.len()]);
-                let of = |(nodes, turns): (&[fluxmorph_geometry::NodeId; 4], &[f64; 4])| {
+                let of = |(nodes, turns): (&[NodeId; 4], &[f64; 4])| {
                     std::array::from_fn(|a| rest[nodes[a].index()] - turns[a])
                 };
                 let chi: Vec<[f64; 4]> = patch.connectivity.iter().zip(&turns).map(of).collect();
                 if patch.norm(&gradients(&patch, &chi)) < NO_RING * patch.norm(&turning) {
                     return Err(refuse(RegionFault::NoRing));
                 }
-                Ok(Self::of((&patch, &problem), chi, (Vec::new(), None), Section::HalfPlanesOf(frame)))
+                let ends = (Vec::new(), None);
+                Ok(Self::of((&patch, &problem), (chi, connection), ends, Section::HalfPlanesOf(frame)))
             }
         }
     }
 
     fn of(
         (patch, problem): (&Patch, &Potential<'_>),
-        chi: Vec<[f64; 4]>,
+        (chi, connection): (Vec<[f64; 4]>, Connection),
         terminals: (Vec<region::TerminalFace>, Option<[String; 2]>),
         sections: Section<'_>,
     ) -> Self {
         let gradient = gradients(patch, &chi);
-        let conductance = patch.inner(&gradient, &gradient);
-        let current = gradient.into_iter().map(|g| g.map(|c| -c / conductance)).collect();
+        let segment = |e: usize| if connection == Connection::Series { patch.part_of_element(e) } else { 0 };
+        let segments: Vec<usize> = (0..patch.elements.len()).map(segment).collect();
+        let mut conductances = vec![0.0; segments.iter().max().map_or(0, |last| last + 1)];
+        for ((tet, g), segment) in patch.tets.iter().zip(&gradient).zip(&segments) {
+            conductances[*segment] += tet.volume * dot(*g, *g);
+        }
+        let scaled = |(g, segment): (Point, &usize)| g.map(|c| -c / conductances[*segment]);
+        let current = gradient.into_iter().zip(&segments).map(scaled).collect();
         let direct = RegionCurrent::of_conduction((patch, problem), current, terminals, sections);
-        Self { potential: patch.elements.iter().copied().zip(chi).collect(), direct, conductance }
+        let potential = patch.elements.iter().copied().zip(chi).collect();
+        Self { potential, segments, direct, conductances }
+    }
+
+    /// The number of every element's segment, in the order of [`SolidConductor::potential`]: segments are in series, each with a
+    /// voltage of its own.
+    pub fn segments(&self) -> &[usize] {
+        &self.segments
+    }
+
+    /// How many segments there are.
+    pub fn segment_count(&self) -> usize {
+        self.conductances.len()
     }
 
     /// `χ` [1] at the vertices of every element, in the mesh's order, ascending by element; round a ring up to a constant of each
@@ -103,13 +142,13 @@ impl SolidConductor {
 
     /// Resistance at 0 Hz [Ω] on the reference mesh, for a conductivity [S/m].
     pub fn direct_resistance(&self, conductivity: f64) -> f64 {
-        1.0 / (conductivity * self.conductance)
+        self.conductances.iter().map(|g| 1.0 / (conductivity * g)).sum()
     }
 }
 
 /// The gradients of linear functions by their values at the vertices of every element.
 fn gradients(patch: &Patch, values: &[[f64; 4]]) -> Vec<Point> {
-    let of = |(tet, values): (&fluxmorph_geometry::tet4::Tet4, &[f64; 4])| {
+    let of = |(tet, values): (&Tet4, &[f64; 4])| {
         std::array::from_fn(|d| (0..4).map(|a| values[a] * tet.gradients[a][d]).sum())
     };
     patch.tets.iter().zip(values).map(of).collect()

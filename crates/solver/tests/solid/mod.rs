@@ -11,7 +11,7 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::circuit::{Terminals, terminals};
-use fluxmorph_solver::coil::{Coil, Frame, Path, RegionCurrent, SolidConductor};
+use fluxmorph_solver::coil::{Coil, Connection, Frame, Path, RegionCurrent, SolidConductor};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::functional::{AtTerminals, Inductive};
 use fluxmorph_solver::linear::LinearSolverSettings;
@@ -35,7 +35,7 @@ fn solid(mesh: &Mesh, name: &str, [from, to]: [&str; 2]) -> SolidConductor {
     let topology = mesh.topology();
     let elements = topology.elements_of(topology.region(name).expect("a region"));
     let path = Path::Terminals { from: terminal(mesh, from), to: terminal(mesh, to) };
-    SolidConductor::new(mesh, name, &elements, &path).expect("a conductor")
+    SolidConductor::new(mesh, name, &elements, (&path, Connection::Series)).expect("a conductor")
 }
 
 fn coil(mesh: &Mesh, name: &str, ends: [&str; 2], current: f64) -> Coil {
@@ -203,7 +203,8 @@ fn a_closed_ring_is_two_halves_in_series() {
         } else {
             Path::Closed(Frame::new([1e-3, -2e-3, 0.0], [0.0, 0.0, 1.0], None).expect("a frame"))
         };
-        let conductor = SolidConductor::new(&mesh, "ring", &elements, &path).expect("a ring");
+        let conductor =
+            SolidConductor::new(&mesh, "ring", &elements, (&path, Connection::Series)).expect("a ring");
         let setup = FieldModelSetup {
             frequency: 500.0,
             materials: vec![Material::AIR, METAL],
@@ -381,5 +382,50 @@ fn solid_conductors_that_cannot_be_are_refused() {
     ] {
         let said = said(setup);
         assert!(said.contains(expected), "{said}");
+    }
+}
+
+/// Two bars as one region: in series they need the sum of their voltages, in parallel they take the sum of their currents.
+#[test]
+fn parts_of_a_conductor_are_in_series_or_in_parallel() {
+    let mesh = bar_in_a_box();
+    let bars = ["bar", "winding"];
+    let solve = |coils: Vec<Coil>, voltage: Option<c64>, frequency: f64| {
+        let setup = FieldModelSetup {
+            frequency,
+            materials: vec![Material::AIR, METAL, METAL, METAL],
+            windings: vec![Some(Winding { voltage, ..NO_CIRCUIT }); coils.len()],
+            coils,
+            boundaries: flux_parallel(&OUTSIDE),
+            linear_solver: LinearSolverSettings { tolerance: 1e-13, ..LinearSolverSettings::default() },
+            ..FieldModelSetup::default()
+        };
+        let model = FieldModel::new(&mesh, setup).expect("a model");
+        let (state, _) = model.solve(&mesh).expect("a field");
+        terminals(&model, &mesh, &state).expect("terminals").coils
+    };
+    let topology = mesh.topology();
+    let both: Vec<ElementId> =
+        bars.iter().flat_map(|name| topology.elements_of(topology.region(name).expect("a region"))).collect();
+    let path = Path::Terminals { from: terminal(&mesh, "x_min"), to: terminal(&mesh, "x_max") };
+    let joined = |connection| {
+        let shape =
+            SolidConductor::new(&mesh, "both", &both, (&path, connection)).expect("a conductor").into();
+        vec![Coil { name: "both".to_owned(), ampere_turns: c64::from(10.0), shape }]
+    };
+    let apart = || bars.map(|name| coil(&mesh, name, ["x_min", "x_max"], 10.0)).to_vec();
+    for frequency in [0.0, 400.0] {
+        let series = &solve(joined(Connection::Series), None, frequency)[0];
+        let voltage: c64 = solve(apart(), None, frequency).iter().map(|coil| coil.voltage).sum();
+        assert!(
+            (series.voltage - voltage).norm() < 1e-9 * voltage.norm(),
+            "{frequency}: {series:?} {voltage}"
+        );
+        let driven = &solve(joined(Connection::Series), Some(voltage), frequency)[0];
+        assert!((driven.current - 10.0).norm() < 1e-8, "{frequency}: {driven:?}");
+        let parallel = &solve(joined(Connection::Parallel), None, frequency)[0];
+        let currents = solve(apart(), Some(parallel.voltage), frequency);
+        let current: c64 = currents.iter().map(|coil| coil.current).sum();
+        assert!((current - 10.0).norm() < 1e-8, "{frequency}: {current}");
     }
 }
