@@ -43,15 +43,9 @@ pub(super) fn remesh_setup(
             boundaries.push(Boundary::of_surface(mesh.topology(), name, kind)?);
         }
     }
-    let policy = match remesh.stiffness {
-        StiffnessLaw::Uniform => StiffnessPolicy::Uniform,
-        StiffnessLaw::InverseSize => StiffnessPolicy::InverseSize,
-        StiffnessLaw::InverseVolume => StiffnessPolicy::InverseVolume,
-        StiffnessLaw::Directional => StiffnessPolicy::Directional,
-    };
     Ok(RemeshSetup {
         subregions,
-        policy,
+        policy: stiffness_policy(remesh, law),
         kinematic_constraint,
         law,
         design_nodes: design_nodes.to_vec(),
@@ -60,6 +54,18 @@ pub(super) fn remesh_setup(
         solver: SolverChoice::Automatic,
         ownership: None,
     })
+}
+
+/// How stiffness follows element size by a law: as written, or what serves the law best.
+pub(crate) fn stiffness_policy(remesh: &Remesh, law: MotionLaw) -> StiffnessPolicy {
+    match (remesh.stiffness, law) {
+        (Some(StiffnessLaw::Uniform), _) => StiffnessPolicy::Uniform,
+        (Some(StiffnessLaw::InverseSize), _) => StiffnessPolicy::InverseSize,
+        (Some(StiffnessLaw::InverseVolume), _) => StiffnessPolicy::InverseVolume,
+        (Some(StiffnessLaw::Directional), _) => StiffnessPolicy::Directional,
+        (None, MotionLaw::Hyperelastic) => StiffnessPolicy::InverseVolume,
+        (None, MotionLaw::Linear | MotionLaw::Rails(_)) => StiffnessPolicy::InverseSize,
+    }
 }
 
 /// The parts of the body with their elements: the regions named and those at the design surface, or what a box holds of
@@ -133,40 +139,52 @@ pub(super) fn common_axis(directions: &[Point]) -> Option<usize> {
     (0..3).find(|&axis| largest > 0.0 && !directions.iter().any(|u| is_across(axis, u)))
 }
 
-/// The law of the motion for nodes that all move along `axis`, if there is one; where none is written, `default`, or the linear
-/// one without an axis or with forces.
+/// What a motion is prescribed by: it decides the law where none is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mover {
+    /// A design, whose mesh should be one function of it.
+    Design,
+    /// `[morph]`, the paper's method.
+    Morph,
+}
+
+/// The law of the motion for nodes that all move along `axis`, if there is one.
 pub(super) fn motion_law(
     source: &SourceMap,
     remesh: &Remesh,
     axis: Option<usize>,
-    default: config::MotionLaw,
+    mover: Mover,
 ) -> Result<MotionLaw, Error> {
     let has_force = has_force(remesh);
-    let message = match (remesh.law.unwrap_or(default), axis) {
-        (config::MotionLaw::Linear, _) => return Ok(MotionLaw::Linear),
-        (config::MotionLaw::Rails, Some(axis)) if !has_force => return Ok(MotionLaw::Rails(axis)),
-        _ if remesh.law.is_none() => return Ok(MotionLaw::Linear),
-        (_, None) => "not all nodes move along one of x, y and z",
-        _ => "motion on rails knows no force",
+    let fault = match (remesh.law, axis) {
+        (None, _) if mover == Mover::Morph || has_force => return Ok(MotionLaw::Linear),
+        (Some(config::MotionLaw::Linear), _) => return Ok(MotionLaw::Linear),
+        (Some(law), _) if has_force => {
+            let message = format!("motion by the law `{}` knows no force", law.name());
+            source.diagnostic("remesh.law", message).expected("law = \"linear\", or no `force`")
+        }
+        (None | Some(config::MotionLaw::Rails), Some(axis)) => return Ok(MotionLaw::Rails(axis)),
+        (None | Some(config::MotionLaw::Hyperelastic), _) => return Ok(MotionLaw::Hyperelastic),
+        (Some(config::MotionLaw::Rails), None) => source
+            .diagnostic("remesh.law", "not all nodes move along one of x, y and z")
+            .expected("law = \"hyperelastic\" or \"linear\", or a motion along one axis"),
     };
-    let fault = source.diagnostic("remesh.law", message);
-    Err(source
-        .error(vec![fault.expected("law = \"linear\", or a motion along one axis without `force`")])
-        .into())
+    Err(source.error(vec![fault]).into())
 }
 
 /// How the mesh of a design moves, and why so where the configuration leaves it open.
 pub(crate) fn motion_in_words(remesh: &Remesh, motion: &Motion) -> String {
     let why = |reason: &str| if remesh.law.is_none() { format!(", as {reason}") } else { String::new() };
-    match (motion.is_one_function(), motion.map().kinematic_constraint()) {
-        (true, KinematicConstraint::Axis(axis)) => {
+    let several = "the design moves in several directions";
+    match motion.law() {
+        MotionLaw::Rails(axis) => {
             let axis = ["x", "y", "z"][axis];
             let why = why(&format!("the design moves along {axis} alone"));
             format!("rails along {axis}, one mesh a design{why}")
         }
-        _ => {
-            let reason =
-                if has_force(remesh) { "a force acts" } else { "the design moves in several directions" };
+        MotionLaw::Hyperelastic => format!("hyperelastic, one mesh a design{}", why(several)),
+        MotionLaw::Linear => {
+            let reason = if has_force(remesh) { "a force acts" } else { several };
             format!("linear elasticity, at most {} rounds{}", remesh.rounds, why(reason))
         }
     }

@@ -30,7 +30,7 @@ pub(crate) mod steels;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
-pub(crate) use elastic_body::motion_in_words;
+pub(crate) use elastic_body::{motion_in_words, stiffness_policy};
 pub(crate) use entries::material;
 pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;

@@ -9,11 +9,11 @@ use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
-use super::elastic_body::{common_axis, guidance, motion_law, remesh_setup};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup};
 use super::names::name_faults;
 use super::{field, mesh, soundness};
 use crate::config::{
-    Config, DesignMotion, DesignWord, Diagnostic, Morphing, MotionLaw, PrescribedMotion, SourceMap, Target,
+    Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
 };
 use crate::error::Error;
 use crate::place::millimetres;
@@ -85,7 +85,7 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     let path = Path::new(nodes, motions, transforms);
     // What turns leaves its axis on the way, where it does not at the end.
     let on_the_way = [path.at(0.37), path.at(1.0)].concat();
-    let law = motion_law(source, remesh, common_axis(&on_the_way), MotionLaw::Linear)?;
+    let law = motion_law(source, remesh, common_axis(&on_the_way), Mover::Morph)?;
     let setup = remesh_setup(source, remesh, &mesh, path.nodes(), (law, guidance), &mut warnings)?;
     if path.at(1.0).iter().all(|u| *u == [0.0; 3]) {
         warnings.push(

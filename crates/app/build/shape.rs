@@ -11,7 +11,7 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits};
 use fluxmorph_solver::FieldModel;
 
-use super::elastic_body::{common_axis, guidance, motion_law, regions_at, remesh_setup};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup};
 use super::outline::same_nodes;
 use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
@@ -85,7 +85,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
-    let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), config::MotionLaw::Rails)?;
+    let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), (law, guidance), warnings)?;
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
@@ -128,7 +128,7 @@ pub(super) fn shape(
         faults.extend(vanishing_faults(source, design, mesh, &surface, thickness));
     }
     source.check(faults)?;
-    // On rails elements keep their sides, and it is their room that is held.
+    // Where elements push back it is their room that is held.
     let least_quality = if motion.is_one_function() { 0.0 } else { LEAST_QUALITY_SHARE * quality };
     let limits = StepLimits {
         inversion_share: inputs.remesh.inversion_share,

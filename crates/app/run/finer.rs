@@ -106,7 +106,7 @@ impl FinerProblem {
         let mesh =
             Mesh::new(original.topology().clone(), points).map_err(fluxmorph_optimizer::Error::from)?;
         let displacement = vec![[0.0; 3]; mesh.points().len()];
-        Ok(Moved { mesh, displacement, inversion: StepToInversion::NEVER, tangent: None })
+        Ok(Moved { mesh, displacement, inversion: StepToInversion::NEVER, tangent: None, newton_steps: 0 })
     }
 
     /// The analysis of a shape.

@@ -22,13 +22,19 @@ pub(crate) struct Density {
 
 /// `ψ(J)` and its derivatives.
 pub(crate) fn density(stretch: f64) -> Density {
-    let at = stretch.max(KNEE);
+    let Density { energy, slope, curvature } = logarithm(stretch, KNEE);
+    Density { energy: 0.5 * stretch * stretch + energy, slope: stretch + slope, curvature: 1.0 + curvature }
+}
+
+/// `−ln J` and its derivatives; below `knee` its Taylor polynomial of second order.
+pub(crate) fn logarithm(stretch: f64, knee: f64) -> Density {
+    let at = stretch.max(knee);
     let beyond = stretch - at;
     let (slope, curvature) = (-1.0 / at, 1.0 / (at * at));
     Density {
-        energy: 0.5 * stretch * stretch - at.ln() + beyond * (slope + 0.5 * beyond * curvature),
-        slope: stretch + slope + beyond * curvature,
-        curvature: 1.0 + curvature,
+        energy: -at.ln() + beyond * (slope + 0.5 * beyond * curvature),
+        slope: slope + beyond * curvature,
+        curvature,
     }
 }
 

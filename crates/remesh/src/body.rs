@@ -41,17 +41,19 @@ impl Body {
         stiffness(&Tet4::new(vertices), &law, &tensor)
     }
 
-    /// Young's modulus of an element along an axis, by its position in the body, on a reference mesh.
+    /// Young's modulus of an element along an axis, or its mean of all directions, by its position in the body, on a reference
+    /// mesh.
     pub(crate) fn weight(
         &self,
         reference: &Mesh,
         weighting: &Weighting,
         position: usize,
-        axis: usize,
+        axis: Option<usize>,
     ) -> f64 {
         let law = self.laws[self.law_of[position] as usize];
         let (factor, tensor) = weighting.of(reference.vertices(self.elements[position]));
-        law.young * factor * dot(tensor[axis], tensor[axis])
+        let square = |axis: usize| dot(tensor[axis], tensor[axis]);
+        law.young * factor * axis.map_or_else(|| (0..3).map(square).sum::<f64>() / 3.0, square)
     }
 }
 

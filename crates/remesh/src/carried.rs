@@ -1,18 +1,19 @@
-//! How far the mesh follows a design on rails, and how much room is left there.
+//! How far the mesh follows a design by a law of least energy, and how much room is left there.
 //!
-//! The designs that motion along one axis can carry form a convex set, since stretches are linear in all displacements: where a
-//! design is beyond it, the way there from a design inside it is cut short, and everything up to the cut is carried. The
+//! Where a design is not carried, the way there from one that is is cut short. The designs that motion along one axis can carry
+//! form a convex set, since stretches are linear in all displacements: on rails everything up to the cut is carried. The
 //! *room* of a design is a smooth lower bound of the least stretch of an element (Kreisselmeier and Steinhauser),
 //! `r = −1/β ln Σ_e exp(−β J_e)`: defined for every design, carried or not, with an exact gradient by the tangent.
 
 use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::fem::scalar::ordered_sum;
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::tet4::{Point, dot, sub};
 
+use crate::deform::ElasticMap;
+use crate::equilibrium::{EnergyLaw, Equilibrium};
 use crate::error::RemeshError;
 use crate::guard::{StepToInversion, check_step};
 use crate::motion::{Motion, Moved};
-use crate::rails::{Equilibrium, Rails};
 
 /// Least room of a design that is carried: flatter elements are valid, and next to useless.
 pub const LEAST_ROOM: f64 = 0.03;
@@ -25,6 +26,9 @@ const INTENDED_STRETCH: f64 = 0.08;
 
 /// Halvings in the search for the share of a path that is carried.
 const SHARE_BITS: usize = 7;
+
+/// Part of a path below which none is carried.
+const SHORTEST_PART: f64 = 1.0 / (1 << SHARE_BITS) as f64;
 
 /// How far a path of designs is carried.
 #[derive(Clone, Debug)]
@@ -56,58 +60,112 @@ pub struct Shortfall {
     pub value: f64,
     /// Its derivative by the displacements of the design nodes [1/m], shape `(n_design, 3)`.
     pub gradient: Vec<Point>,
+    /// Where it was found; `None` for a design that is carried.
+    equilibrium: Option<Equilibrium>,
 }
 
 impl Motion {
-    /// How much is missing for design displacements [m] to be carried; `None` where the law is not that of rails.
+    /// How much is missing for design displacements [m] to be carried; `None` by the linear law, and where the nodes do not come
+    /// to rest. `near` is that of a design near it.
     ///
     /// # Errors
-    /// [`RemeshError::NotSettled`], [`RemeshError::NotFinite`].
-    pub fn shortfall(&self, design: &[Point]) -> Result<Option<Shortfall>, RemeshError> {
-        let Some(rails) = self.rails() else { return Ok(None) };
-        let equilibrium = rails.equilibrium(design)?;
-        if rails.soft_minimum(&equilibrium).0 >= LEAST_ROOM {
-            return Ok(Some(Shortfall { value: 0.0, gradient: vec![[0.0; 3]; design.len()] }));
+    /// [`RemeshError::NotFinite`].
+    pub fn shortfall(
+        &self,
+        design: &[Point],
+        near: Option<&Shortfall>,
+    ) -> Result<Option<Shortfall>, RemeshError> {
+        let Some(law) = self.energy_law() else { return Ok(None) };
+        let own = match near.and_then(|near| near.equilibrium.as_ref()) {
+            Some(near) => law.near(near, design),
+            None => law.equilibrium(design),
+        };
+        let Some(equilibrium) = settled(own)? else { return Ok(None) };
+        let stretches = law.stretches(&equilibrium.displacement);
+        if soft_minimum(&stretches).0 >= LEAST_ROOM {
+            return Ok(Some(Shortfall {
+                value: 0.0,
+                gradient: vec![[0.0; 3]; design.len()],
+                equilibrium: None,
+            }));
         }
-        let stretches = rails.stretches_of(&equilibrium.displacement);
         let missing: Vec<f64> = stretches.iter().map(|j| (INTENDED_STRETCH - j).max(0.0)).collect();
         let value = ordered_sum(missing.len(), |i| 0.5 * missing[i] * missing[i]);
         let shares: Vec<f64> = missing.iter().map(|m| -m).collect();
-        let nodal = rails.stretch_derivative(&shares, equilibrium.displacement.len());
-        Ok(Some(Shortfall { value, gradient: equilibrium.tangent.gradient(&nodal)? }))
+        let nodal = law.stretch_derivative(&equilibrium.displacement, &shares);
+        let gradient = equilibrium.tangent.gradient(&nodal)?;
+        Ok(Some(Shortfall { value, gradient, equilibrium: Some(equilibrium) }))
     }
 
     /// How far the mesh follows a path `t → Δx_b(t)` of design displacements [m], `0 ≤ t ≤ 1`, whose beginning it carries;
-    /// `None` where the law is not that of rails.
+    /// `None` by the linear law.
     ///
     /// # Errors
-    /// [`RemeshError::NotSettled`], [`RemeshError::NotFinite`], and [`RemeshError::Inverted`] where not even the beginning is
+    /// [`RemeshError::NotFinite`]; [`RemeshError::Inverted`] and [`RemeshError::NotSettled`] where not even the beginning is
     /// carried.
     pub fn carried_along(&self, path: &dyn Fn(f64) -> Vec<Point>) -> Result<Option<Carried>, RemeshError> {
-        let Some(rails) = self.rails() else { return Ok(None) };
-        let asked = rails.equilibrium(&path(1.0))?;
-        let room = rails.room(&asked)?;
-        if room.value >= LEAST_ROOM
-            && let Ok(moved) = self.at(asked)
+        let Some(law) = self.energy_law() else { return Ok(None) };
+        let goal = path(1.0);
+        let asked = settled(law.equilibrium(&goal))?;
+        let room = asked.as_ref().map(|own| room_of(law, &own.displacement, &own.tangent)).transpose()?;
+        if let (Some(asked), Some(room)) = (&asked, &room)
+            && room.value >= LEAST_ROOM
+            && let Ok(moved) = self.at(asked.clone())
         {
-            return Ok(Some(Carried { share: 1.0, moved, room }));
+            return Ok(Some(Carried { share: 1.0, moved, room: room.clone() }));
         }
+        let (share, moved) = self.longest_part(law, path, asked)?;
+        let room = match (room, &moved.tangent) {
+            (None, Some(tangent)) => {
+                let near = room_of(law, &moved.displacement, tangent)?;
+                near.continued(&path(share), &goal)
+            }
+            (room, _) => room.expect("an equilibrium has a tangent"),
+        };
+        Ok(Some(Carried { share, moved, room }))
+    }
+
+    /// The longest part of a path that is carried, and the mesh there; `near` is an equilibrium near the path.
+    fn longest_part(
+        &self,
+        law: &dyn EnergyLaw,
+        path: &dyn Fn(f64) -> Vec<Point>,
+        mut near: Option<Equilibrium>,
+    ) -> Result<(f64, Moved), RemeshError> {
         let (mut low, mut high, mut best) = (0.0, 1.0, None);
         for _ in 0..SHARE_BITS {
             let middle = 0.5 * (low + high);
-            let equilibrium = rails.equilibrium(&path(middle))?;
-            let is_roomy = rails.soft_minimum(&equilibrium).0 >= LEAST_ROOM;
-            match self.at(equilibrium) {
-                Ok(moved) if is_roomy => (low, best) = (middle, Some(moved)),
-                Ok(_) | Err(RemeshError::Inverted { .. }) => high = middle,
-                Err(other) => return Err(other),
+            let design = path(middle);
+            let own = match &near {
+                Some(near) => settled(law.near(near, &design))?,
+                None => settled(law.equilibrium(&design))?,
+            };
+            match self.roomy(law, own.clone())? {
+                Some(moved) => (low, best) = (middle, Some(moved)),
+                None => high = middle,
             }
+            near = own.or(near);
         }
-        let moved = match best {
-            Some(moved) => moved,
-            None => self.at(rails.equilibrium(&path(0.0))?)?,
-        };
-        Ok(Some(Carried { share: low, moved, room }))
+        // The mesh of a design is that which is found from nothing else.
+        let is_final = law.has_one_equilibrium();
+        while low > 0.0 {
+            let own =
+                if is_final { best.take() } else { self.roomy(law, settled(law.equilibrium(&path(low)))?)? };
+            if let Some(moved) = own {
+                return Ok((low, moved));
+            }
+            low = if low > SHORTEST_PART { 0.5 * low } else { 0.0 };
+        }
+        Ok((0.0, self.at(law.equilibrium(&path(0.0))?)?))
+    }
+
+    /// The mesh of an equilibrium, where there is one and it has the least room.
+    fn roomy(&self, law: &dyn EnergyLaw, own: Option<Equilibrium>) -> Result<Option<Moved>, RemeshError> {
+        let has_room = |own: &Equilibrium| soft_minimum(&law.stretches(&own.displacement)).0 >= LEAST_ROOM;
+        match own.filter(has_room).map(|own| self.at(own)) {
+            None | Some(Err(RemeshError::Inverted { .. })) => Ok(None),
+            Some(moved) => moved.map(Some),
+        }
     }
 
     /// The mesh of an equilibrium.
@@ -115,37 +173,53 @@ impl Motion {
     /// # Errors
     /// [`RemeshError::Inverted`].
     pub(crate) fn at(&self, equilibrium: Equilibrium) -> Result<Moved, RemeshError> {
-        let Equilibrium { displacement, least: (stretch, element), tangent, .. } = equilibrium;
+        let Equilibrium { displacement, least: (stretch, element), tangent, steps } = equilibrium;
         let mesh = check_step(self.original(), &displacement)?;
-        // Stretches are linear along the straight motion.
+        // Stretches are linear along the straight motion on rails; else it is what they are to first order.
         let inversion = match stretch {
             stretch if stretch < 1.0 => {
                 StepToInversion { step: 1.0 / (1.0 - stretch), element: Some(element) }
             }
             _ => StepToInversion::NEVER,
         };
-        Ok(Moved { mesh, displacement, inversion, tangent: Some(tangent) })
+        Ok(Moved { mesh, displacement, inversion, tangent: Some(tangent), newton_steps: steps })
     }
 }
 
-impl Rails {
-    /// The room of an equilibrium.
-    ///
-    /// # Errors
-    /// [`RemeshError::NotFinite`].
-    fn room(&self, equilibrium: &Equilibrium) -> Result<Room, RemeshError> {
-        let (value, shares) = self.soft_minimum(equilibrium);
-        let nodal = self.stretch_derivative(&shares, equilibrium.displacement.len());
-        let gradient = equilibrium.tangent.gradient(&nodal)?;
-        Ok(Room { value, gradient, element: equilibrium.least.1 })
+impl Room {
+    /// What the room at one design promises of another one that has no equilibrium: no more than none.
+    fn continued(self, from: &[Point], to: &[Point]) -> Self {
+        let along = |((from, to), slope): ((&Point, &Point), &Point)| dot(sub(*to, *from), *slope);
+        let change: f64 = from.iter().zip(to).zip(&self.gradient).map(along).sum();
+        Self { value: (self.value + change).min(0.0), ..self }
     }
+}
 
-    /// `−1/β ln Σ_e exp(−β J_e)`, and its derivative by each `J_e`.
-    fn soft_minimum(&self, equilibrium: &Equilibrium) -> (f64, Vec<f64>) {
-        let least = equilibrium.least.0;
-        let stretches = self.stretches_of(&equilibrium.displacement);
-        let terms: Vec<f64> = stretches.iter().map(|j| (-SHARPNESS * (j - least)).exp()).collect();
-        let sum = ordered_sum(terms.len(), |i| terms[i]);
-        (least - sum.ln() / SHARPNESS, terms.iter().map(|term| term / sum).collect())
+/// An equilibrium; `None` where the nodes do not come to rest.
+fn settled(own: Result<Equilibrium, RemeshError>) -> Result<Option<Equilibrium>, RemeshError> {
+    match own {
+        Err(RemeshError::NotSettled { .. }) => Ok(None),
+        own => own.map(Some),
     }
+}
+
+/// The room of displacements of all nodes, with their derivative by those of the design nodes.
+///
+/// # Errors
+/// [`RemeshError::NotFinite`].
+fn room_of(law: &dyn EnergyLaw, displacement: &[Point], tangent: &ElasticMap) -> Result<Room, RemeshError> {
+    let stretches = law.stretches(displacement);
+    let (value, shares) = soft_minimum(&stretches);
+    let gradient = tangent.gradient(&law.stretch_derivative(displacement, &shares))?;
+    let least = (0..stretches.len()).min_by(|&a, &b| stretches[a].total_cmp(&stretches[b]));
+    let element = law.rest().elements()[least.expect("a body has elements")];
+    Ok(Room { value, gradient, element })
+}
+
+/// `−1/β ln Σ_e exp(−β J_e)`, and its derivative by each `J_e`.
+fn soft_minimum(stretches: &[f64]) -> (f64, Vec<f64>) {
+    let least = stretches.iter().copied().fold(f64::INFINITY, f64::min);
+    let terms: Vec<f64> = stretches.iter().map(|j| (-SHARPNESS * (j - least)).exp()).collect();
+    let sum = ordered_sum(terms.len(), |i| terms[i]);
+    (least - sum.ln() / SHARPNESS, terms.iter().map(|term| term / sum).collect())
 }

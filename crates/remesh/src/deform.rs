@@ -54,6 +54,9 @@ pub enum MotionLaw {
     /// All nodes along one coordinate axis (0, 1, 2), by a convex energy on the undeformed mesh (`rails`): for
     /// designs that move along that axis. There are no rounds, and all in one process.
     Rails(usize),
+    /// All nodes in all directions, by a hyperelastic energy on the undeformed mesh (`hyperelastic`). There are no rounds,
+    /// and all in one process.
+    Hyperelastic,
 }
 
 /// What is remeshed and how.
@@ -166,12 +169,24 @@ impl ElasticMap {
         Ok(Self { plan, policy: self.policy, solver, coupling, offset })
     }
 
-    /// Weight a volume of every element of the body on a mesh, for motion along an axis: Young's modulus of its subregion by the
+    /// Weight a volume of every element of the body on a mesh, for motion along an axis, or in all directions: Young's modulus of its subregion by the
     /// stiffness policy.
-    pub(crate) fn weights(&self, mesh: &Mesh, axis: usize) -> Vec<f64> {
+    pub(crate) fn weights(&self, mesh: &Mesh, axis: Option<usize>) -> Vec<f64> {
         let body = &self.plan.body;
         let weighting = self.policy.weighting(mesh, &body.elements);
         (0..body.elements.len()).map(|position| body.weight(mesh, &weighting, position, axis)).collect()
+    }
+
+    /// `K_dd⁻¹` of a nodal right side, shape `(n_nodes, 3)`; zero where there is no unknown.
+    ///
+    /// # Errors
+    /// As [`ElasticMap::linear`].
+    pub(crate) fn solve_nodal(&self, right_side: Vec<Point>) -> Result<Vec<Point>, RemeshError> {
+        let mut unknowns = vec![0.0; self.plan.unknowns.count()];
+        for (node, value) in (0..).map(NodeId).zip(right_side) {
+            self.plan.unknowns.scatter_add(&mut unknowns, node, value);
+        }
+        self.solve(unknowns)
     }
 
     /// `K_dd⁻¹` of one component of a nodal right side, along an axis; zero where it is no unknown.
@@ -179,13 +194,9 @@ impl ElasticMap {
     /// # Errors
     /// As [`ElasticMap::linear`].
     pub(crate) fn solve_along(&self, right_side: Vec<f64>, axis: usize) -> Result<Vec<f64>, RemeshError> {
-        let mut unknowns = vec![0.0; self.plan.unknowns.count()];
-        for (node, value) in (0..).map(NodeId).zip(right_side) {
-            let mut components = [0.0; 3];
-            components[axis] = value;
-            self.plan.unknowns.scatter_add(&mut unknowns, node, components);
-        }
-        Ok(self.solve(unknowns)?.iter().map(|u| u[axis]).collect())
+        let point = |value: f64| std::array::from_fn(|d| if d == axis { value } else { 0.0 });
+        let solution = self.solve_nodal(right_side.into_iter().map(point).collect())?;
+        Ok(solution.iter().map(|u| u[axis]).collect())
     }
 
     /// `Δx` of every mesh node [m] for the displacement `Δx_b` of the design nodes [m], shapes `(n_nodes, 3)` and

@@ -2,10 +2,9 @@
 //!
 //! The design nodes move by `Δx_b`; a fictitious elastic body, frozen on the reference mesh, carries the motion to all
 //! other nodes of the remesh region: `K_dd Δx_d = f_d − K_db Δx_b`. [`ElasticMap`] is that affine map and its
-//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. For designs along one axis there is another law, which
-//! is one function of the design however far it goes: `rails`, with the energy of `barrier`; `carried` says how far that
-//! is. Who moves freely, slides or stays is decided
-//! in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
+//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Two other laws are one function of the design however
+//! far it goes (`equilibrium`): `rails` for designs along one axis, with the energy of `barrier`, and `hyperelastic` for all
+//! others, with that of `neo_hooke`; `carried` says how far that is. Who moves freely, slides or stays is decided in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
 //! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,
 //! each frozen on its own reference mesh, [`load_stepping`] takes a given motion in as many of them as needed, and
 //! [`fallback`] is what is tried when a step is refused; [`smoothing`] is one of its levels.
@@ -17,16 +16,20 @@ pub mod carried;
 pub mod deform;
 mod distributed;
 pub mod elasticity;
+mod equilibrium;
 pub mod error;
 pub mod fallback;
 pub mod force;
 pub mod guard;
+mod hyperelastic;
 pub mod load_stepping;
 pub mod motion;
+mod neo_hooke;
 pub mod policy;
 mod rails;
 mod restraint;
 mod sensitivity;
+mod singular_values;
 pub mod smoothing;
 mod solver;
 pub mod subregion;

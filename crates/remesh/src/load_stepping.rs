@@ -3,8 +3,8 @@
 //! The motion is a path `t → Δx_b(t)`, `0 ≤ t ≤ 1`. Each round goes as far along it as [`StepLimits`] let a single linear
 //! step go: not too near to the first inversion, and not below a quality. Then the mesh reached is the next reference, its
 //! interior smoothed if elements are degraded. Where even a short step is refused, the fallbacks of [`crate::fallback`] are
-//! tried. Nothing here is chosen by a field or an objective. On rails there is one mesh a design, and the longest part of the path
-//! that is carried is taken at once.
+//! tried. Nothing here is chosen by a field or an objective. By a law of least energy there is one mesh a design, and the longest
+//! part of the path that is carried is taken at once.
 
 use std::ops::ControlFlow;
 

@@ -16,8 +16,10 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use crate::deform::{ElasticMap, KinematicConstraint, MotionLaw, RemeshSetup};
+use crate::equilibrium::EnergyLaw;
 use crate::error::RemeshError;
 use crate::guard::{StepToInversion, check_step, step_to_inversion};
+use crate::hyperelastic::Hyperelastic;
 use crate::load_stepping::StepLimits;
 use crate::policy::StiffnessPolicy;
 use crate::rails::Rails;
@@ -42,8 +44,8 @@ pub struct Motion {
     displacement: Vec<Point>,
     reference_design: Vec<Point>,
     map: Arc<ElasticMap>,
-    /// The law of motion along one axis, where that is the law.
-    rails: Option<Arc<Rails>>,
+    /// The law by which the mesh is one function of the design, where that is the law.
+    law: Option<Arc<dyn EnergyLaw>>,
     moving: Arc<[ElementId]>,
     force: Force,
     round: usize,
@@ -60,6 +62,8 @@ pub struct Moved {
     pub inversion: StepToInversion,
     /// The derivative of the displacements by those of the design nodes; `None` where nothing moves.
     pub tangent: Option<Arc<ElasticMap>>,
+    /// Newton steps to the mesh; none by the linear law.
+    pub newton_steps: usize,
 }
 
 impl Moved {
@@ -79,15 +83,21 @@ impl Motion {
     /// # Errors
     /// As [`ElasticMap::new`].
     pub fn new(original: Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
-        let MotionLaw::Rails(axis) = setup.law else {
-            let map = Arc::new(ElasticMap::new(&original, setup)?);
-            return Ok(Self::start(original, map));
+        let kinematic_constraint = match setup.law {
+            MotionLaw::Linear => {
+                let map = Arc::new(ElasticMap::new(&original, setup)?);
+                return Ok(Self::start(original, map));
+            }
+            MotionLaw::Rails(axis) => KinematicConstraint::Axis(axis),
+            MotionLaw::Hyperelastic => KinematicConstraint::Free,
         };
-        let kinematic_constraint = KinematicConstraint::Axis(axis);
-        let setup = RemeshSetup { kinematic_constraint, ownership: None, ..setup };
-        let rails = Rails::new(&original, &ElasticMap::new(&original, setup)?, axis)?;
-        let motion = Self::start(original, Arc::clone(rails.rest()));
-        Ok(Self { rails: Some(Arc::new(rails)), ..motion })
+        let map = ElasticMap::new(&original, RemeshSetup { kinematic_constraint, ownership: None, ..setup })?;
+        let law: Arc<dyn EnergyLaw> = match kinematic_constraint {
+            KinematicConstraint::Axis(axis) => Arc::new(Rails::new(&original, &map, axis)?),
+            KinematicConstraint::Free => Arc::new(Hyperelastic::new(&original, &map)?),
+        };
+        let motion = Self::start(original, Arc::clone(law.rest()));
+        Ok(Self { law: Some(law), ..motion })
     }
 
     /// The first round with its map.
@@ -101,7 +111,7 @@ impl Motion {
             displacement,
             reference_design,
             map,
-            rails: None,
+            law: None,
             moving,
             force: Force::Due,
             round: 0,
@@ -128,8 +138,8 @@ impl Motion {
         let map = Arc::new(self.map.rebased(&reference, policy)?);
         let (original, moving) = (self.original.clone(), Arc::clone(&self.moving));
         let (force, round) = (Force::Taken, self.round + 1);
-        let (reference_design, rails) = (design, None);
-        Ok(Self { original, reference, displacement, reference_design, map, rails, moving, force, round })
+        let (reference_design, law) = (design, None);
+        Ok(Self { original, reference, displacement, reference_design, map, law, moving, force, round })
     }
 
     /// This motion, counted as the round after another.
@@ -142,7 +152,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::new`].
     pub fn restarted(&self) -> Result<Self, RemeshError> {
-        if self.rails.is_some() {
+        if self.law.is_some() {
             return Ok(self.clone());
         }
         let map = Arc::new(self.map.restarted(&self.original)?);
@@ -178,8 +188,8 @@ impl Motion {
     /// If there is not one displacement per design node.
     pub fn step(&self, design: &[Point]) -> Result<Vec<Point>, RemeshError> {
         assert_eq!(design.len(), self.reference_design.len(), "one displacement per design node");
-        if let Some(rails) = &self.rails {
-            return Ok(rails.equilibrium(design)?.displacement);
+        if let Some(law) = &self.law {
+            return Ok(law.equilibrium(design)?.displacement);
         }
         let change: Vec<Point> =
             design.iter().zip(&self.reference_design).map(|(u, reference)| sub(*u, *reference)).collect();
@@ -196,6 +206,7 @@ impl Motion {
             displacement: self.displacement.clone(),
             inversion: StepToInversion::NEVER,
             tangent: Some(Arc::clone(&self.map)),
+            newton_steps: 0,
         }
     }
 
@@ -207,8 +218,8 @@ impl Motion {
     /// # Panics
     /// If there is not one displacement per design node.
     pub fn moved(&self, design: &[Point]) -> Result<Moved, RemeshError> {
-        if let Some(rails) = &self.rails {
-            return self.at(rails.equilibrium(design)?);
+        if let Some(law) = &self.law {
+            return self.at(law.equilibrium(design)?);
         }
         let step = self.step(design)?;
         self.apply(&step, self.inversion(&step))
@@ -218,7 +229,7 @@ impl Motion {
     pub(crate) fn apply(&self, step: &[Point], inversion: StepToInversion) -> Result<Moved, RemeshError> {
         let mesh = check_step(&self.reference, step)?;
         let displacement = self.displacement.iter().zip(step).map(|(u, step)| add(*u, *step)).collect();
-        Ok(Moved { mesh, displacement, inversion, tangent: Some(Arc::clone(&self.map)) })
+        Ok(Moved { mesh, displacement, inversion, tangent: Some(Arc::clone(&self.map)), newton_steps: 0 })
     }
 
     /// First inversion along a step from the round's reference.
@@ -285,14 +296,22 @@ impl Motion {
         &self.reference_design
     }
 
-    /// The law of motion along one axis, where that is the law.
-    pub(crate) fn rails(&self) -> Option<&Rails> {
-        self.rails.as_deref()
+    /// The law by which the mesh is one function of the design, where that is the law.
+    pub(crate) fn energy_law(&self) -> Option<&dyn EnergyLaw> {
+        self.law.as_deref()
+    }
+
+    /// How the mesh follows the design: in a round after the first by a linear map.
+    pub fn law(&self) -> MotionLaw {
+        match &self.law {
+            Some(_) => self.map.setup().law,
+            None => MotionLaw::Linear,
+        }
     }
 
     /// Whether all meshes follow from the undeformed one by one function of the design: there are no rounds.
     pub fn is_one_function(&self) -> bool {
-        self.rails.is_some()
+        self.law.is_some()
     }
 
     /// The elastic map of the round; that of a mesh at rest on rails.

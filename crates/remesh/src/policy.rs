@@ -15,6 +15,7 @@ use fluxmorph_geometry::tet4::{self, FACES, Point, centroid, sub};
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::elasticity::{ISOTROPIC, Tensor};
+use crate::singular_values::eigen_decomposition;
 
 /// Exponents of the directional weights: of the size along the direction, and of the element's mean size.
 ///
@@ -126,39 +127,6 @@ pub fn principal_axes(vertices: [Point; 4]) -> [(f64, Point); 3] {
     // Of an element as flat as numbers can tell, the least eigenvalue is rounding and may be negative.
     let size = |k: usize| scale * squares[k].max(f64::EPSILON).sqrt();
     std::array::from_fn(|k| (size(k), axes[k]))
-}
-
-/// Eigenvalues and unit eigenvectors of a symmetric matrix, in no order, by cyclic Jacobi rotations (Golub & Van Loan,
-/// Matrix Computations, 4th ed., section 8.5): small eigenvalues come out to their own precision where the matrix is
-/// graded, and nothing is allocated.
-fn eigen_decomposition(mut a: Tensor) -> ([f64; 3], [Point; 3]) {
-    let mut axes = ISOTROPIC;
-    // Converges quadratically: 3 × 3 matrices take four or five sweeps.
-    for _ in 0..10 {
-        let rest = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if rest <= f64::MIN_POSITIVE {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = 1.0f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
-            let cosine = 1.0 / t.hypot(1.0);
-            let sine = t * cosine;
-            let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
-            for k in 0..3 {
-                (a[k][p], a[k][q]) = turn(a[k][p], a[k][q]);
-            }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = turn(a[p][k], a[q][k]);
-                (axes[p][k], axes[q][k]) = turn(axes[p][k], axes[q][k]);
-            }
-            (a[p][q], a[q][p]) = (0.0, 0.0);
-        }
-    }
-    ([a[0][0], a[1][1], a[2][2]], axes)
 }
 
 /// Smallest altitude [m] of a tetrahedron: `3 V` over the area of its largest face.

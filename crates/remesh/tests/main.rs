@@ -3,6 +3,7 @@
 
 mod boundaries;
 mod guards;
+mod hyperelastic;
 mod inversion;
 mod mapping;
 mod rails;

@@ -130,7 +130,7 @@ fn room_and_shortfall_have_exact_derivatives_on_both_sides_of_the_limit() {
     let mesh = support::shaken(&unit_cells([4, 4, 4]), 0.1);
     let motion = motion(&mesh, StiffnessPolicy::InverseSize);
     let room = |design: &[Point]| motion.carried_along(&|_| design.to_vec());
-    let shortfall = |design: &[Point]| motion.shortfall(design).unwrap().unwrap();
+    let shortfall = |design: &[Point]| motion.shortfall(design, None).unwrap().unwrap();
     let shifted = |design: &[Point], direction: &[Point], h: f64| -> Vec<Point> {
         design.iter().zip(direction).map(|(u, d)| [0.0, 0.0, u[2] + h * d[2]]).collect()
     };

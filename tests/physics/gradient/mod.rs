@@ -4,7 +4,7 @@ use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_optimizer::verify::{Certificate, Settings, certify, measure};
-use fluxmorph_remesh::Moved;
+use fluxmorph_remesh::{MotionLaw, Moved};
 
 use crate::problems::{initial, variables};
 use crate::support::folder::read_text;
@@ -119,6 +119,25 @@ fn the_gradient_is_exact_on_rails() {
         holds(&problem, &initial(&problem));
         holds(&problem, &wavy(&problem));
     }
+}
+
+/// On one axis, and along the normals of two faces that meet at an edge, far enough for elements to turn.
+#[test]
+fn the_gradient_is_exact_by_the_hyperelastic_law() {
+    let law = ["remesh.law=\"hyperelastic\"", "remesh.stiffness=\"inverse_volume\""];
+    for overrides in [&law[..], &[&MESHED[..], &law].concat()] {
+        let problem = setup("shield_quick.toml", overrides).problem;
+        holds(&problem, &initial(&problem));
+        holds(&problem, &wavy(&problem));
+    }
+    let faces = [
+        ("surface = \"plate_bottom\"", "surface = [\"plate_bottom\", \"plate_side\"]"),
+        (", \"plate_side\"]\n", "]\n"),
+        ("[optimizer]", "law = \"hyperelastic\"\n[optimizer]"),
+    ];
+    let problem = designed(FILTERED, &faces);
+    assert_eq!(problem.shape().expect("a shape").motion().law(), MotionLaw::Hyperelastic);
+    holds(&problem, &wavy(&problem));
 }
 
 /// The quick shield with another `[design]` in place of its direction and grid.

@@ -5,17 +5,18 @@
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_optimizer::problem::Progress;
+use fluxmorph_optimizer::problem::{Progress, Shape};
+use fluxmorph_remesh::MotionLaw;
 use fluxmorph_solver::FieldModel;
 use serde::Serialize;
 
 use super::advice::advice;
 use super::estimate::EstimateSummary;
 use super::truncation::Truncation;
-use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched};
+use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched, stiffness_policy};
 use crate::config::{
-    Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Open, Optimizer, Probe, RegionModel,
-    Remesh, SourceMap,
+    self, Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Open, Optimizer, Probe,
+    RegionModel, Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
@@ -44,6 +45,8 @@ pub(super) struct Summary<'a> {
     pub(super) filter_radius_m: Option<f64>,
     /// How the mesh follows the design, and why so.
     pub(super) mesh_motion: Option<String>,
+    /// How stiffness follows element size.
+    pub(super) stiffness: Option<String>,
     pub(super) bounding_box_m: [[f64; 3]; 2],
     pub(super) regions: Vec<RegionSummary>,
     pub(super) surfaces: Vec<SurfaceSummary>,
@@ -166,6 +169,16 @@ fn model_name(model: RegionModel) -> &'static str {
     }
 }
 
+/// How stiffness follows element size: in the motion of a design, or of `[morph]`.
+fn stiffness(remesh: &Remesh, shape: Option<&Shape>) -> String {
+    let law = match remesh.law {
+        Some(config::MotionLaw::Hyperelastic) => MotionLaw::Hyperelastic,
+        _ => MotionLaw::Linear,
+    };
+    let policy = shape.map_or_else(|| stiffness_policy(remesh, law), |shape| shape.motion().policy());
+    policy.name().to_owned()
+}
+
 /// Inspects a configuration; every stage is reported to `progress` as it begins.
 ///
 /// # Errors
@@ -200,6 +213,7 @@ pub(super) fn summary<'a>(
         design_variables: problem.shape().map_or(0, |shape| shape.surface().variable_count()),
         filter_radius_m: problem.shape().and_then(|shape| shape.surface().filter_radius()),
         mesh_motion: moves.map(|(remesh, shape)| motion_in_words(remesh, shape.motion())),
+        stiffness: config.remesh.as_ref().map(|remesh| stiffness(remesh, problem.shape())),
         bounding_box_m: mesh.bounding_box(),
         regions: regions(config, mesh),
         surfaces: surfaces(mesh)?,

@@ -162,7 +162,8 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
             0 => String::new(),
             count => format!(": {count} equations"),
         };
-        row("mesh motion", format!("{body}, stiffness {}{equations}", remesh.stiffness.name()));
+        let stiffness = summary.stiffness.as_ref().map_or(String::new(), |own| format!(", stiffness {own}"));
+        row("mesh motion", format!("{body}{stiffness}{equations}"));
     }
     if let Some(motion) = &summary.mesh_motion {
         row("law of motion", motion.clone());

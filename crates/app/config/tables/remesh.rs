@@ -26,8 +26,8 @@ table! {
         /// The part of the mesh that moves.
         #[serde(flatten)]
         extent: RemeshExtent = KEYS;
-        /// How the mesh follows the design. Default: `"rails"` where all nodes of the design move along one of x, y and z and no
-        /// `force` acts, else `"linear"`; for `[morph]` `"linear"`.
+        /// How the mesh follows the design. Default: `"rails"` where all nodes of the design move along one of x, y and z,
+        /// `"hyperelastic"` where they do not, `"linear"` where a `force` acts; for `[morph]` `"linear"`.
         law: Option<MotionLaw> = WORD;
         /// Poisson's ratio of the body, with the law `"linear"`. The default is the paper's.
         poisson: f64 = number(POISSON) => 0.3;
@@ -36,7 +36,8 @@ table! {
         /// Fictitious force on every node that is free to move, in units of `young` times square metres.
         force: [f64; 3] = number(FINITE) => [0.0; 3];
         /// How the modulus depends on the element: small elements stay stiff and keep their shape, large ones take the motion.
-        stiffness: StiffnessLaw = WORD => StiffnessLaw::InverseSize;
+        /// Default: `"inverse_volume"` with the law `"hyperelastic"`, else `"inverse_size"`.
+        stiffness: Option<StiffnessLaw> = WORD;
         /// Which way nodes may move. The default is the paper's elasticity.
         motion: Motion = WORD => Motion::Free;
         /// Most rounds of an optimisation: in each the mesh moves from a reference mesh of its own (`docs/theory.md`, section
@@ -99,6 +100,10 @@ choice! {
         /// All nodes move along the axis of the design, by a convex energy that keeps elements from being squeezed: the mesh is one
         /// function of the design, without rounds. `poisson`, `motion`, `rounds` and `inversion_share` have no meaning.
         Rails = "rails",
+        /// All nodes move in all directions, by a hyperelastic energy that knows finite rotations and keeps elements from being
+        /// squeezed: the mesh is one function of the design, without rounds. `poisson`, `motion`, `rounds` and
+        /// `inversion_share` have no meaning.
+        Hyperelastic = "hyperelastic",
         /// Linear elasticity on a reference mesh (Eq. 3), in rounds where that does not reach far enough.
         Linear = "linear",
     }

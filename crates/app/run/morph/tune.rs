@@ -290,7 +290,7 @@ fn tuned_config(config: &Config, setup: &RemeshSetup) -> Config {
     let mut config = config.clone();
     if let Some(remesh) = &mut config.remesh {
         let Remesh { stiffness, subregions, .. } = remesh;
-        *stiffness = StiffnessLaw::of_policy(setup.policy).unwrap_or(*stiffness);
+        *stiffness = StiffnessLaw::of_policy(setup.policy).or(*stiffness);
         *subregions = setup
             .subregions
             .iter()

@@ -1,9 +1,10 @@
 //! A design that the mesh does not carry: the step to it is cut short, and the method sees one smooth problem.
 //!
-//! On rails the carried designs form a convex set, and the *room* of a design ([`fluxmorph_remesh::Room`]) is smooth on both sides
-//! of its boundary. Where a design that is asked for is not carried, a carried one near it is evaluated in its place, and counts:
-//! squeezed elements push the variables around them back, and what is missing then is cut off the way from the best design. Where
-//! that is a gain, the method searches on from there. Else it is given the linear continuation of objective and constraints, and
+//! Where the mesh is one function of the design, the *room* of a design ([`fluxmorph_remesh::Room`]) is smooth on both sides of the
+//! boundary of the carried ones, which are a convex set on rails. Where a design that is asked for is not carried, a carried one
+//! near it is evaluated in its place, and counts: squeezed elements push the variables around them back, and what is missing then
+//! is cut off the way from the best design. Where that is a gain, the method searches on from there. Else it is given the linear
+//! continuation of objective and constraints, and
 //! one more constraint on the room, which is violated: it knows that it has gone too far, and in which direction there is room.
 //! Its model goes on. Away from the boundary that constraint is flat, and has no say.
 //!
@@ -86,7 +87,7 @@ impl Run<'_> {
         if share < 1.0 {
             cut = Some(self.why_cut(p, room.element));
             let pushed = shape.pushed_back(p).map_err(Error::from)?;
-            let nearer = carried_to(&pushed)?.expect("the law is that of rails");
+            let nearer = carried_to(&pushed)?.expect("one law carries all designs");
             let distance = |other: &[f64]| p.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
             if distance(&between(&from, &pushed, nearer.share)) < distance(&between(&from, p, share)) {
                 (goal, share, moved) = (pushed, nearer.share, nearer.moved);

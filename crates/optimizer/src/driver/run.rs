@@ -34,9 +34,9 @@ pub(super) struct Run<'a> {
     pub(super) best: Option<Incumbent>,
     /// The mesh of the best design has changed: the next evaluation replaces it.
     pub(super) best_is_stale: bool,
-    /// On rails: whether the mesh holds the best design back.
+    /// Without rounds: whether the mesh holds the best design back.
     pub(super) is_held_back: bool,
-    /// On rails: what would help the mesh, each of which is said once.
+    /// Without rounds: what would help the mesh, each of which is said once.
     pub(super) cures: BTreeSet<&'static str>,
     worst_residual: f64,
     timings: Timings,
@@ -120,7 +120,7 @@ impl<'a> Run<'a> {
         worst.map_or(0, |objective| objective.terms.len())
     }
 
-    /// Constraints that the method sees: those of the problem, and the room of a mesh on rails.
+    /// Constraints that the method sees: those of the problem, and the room of a mesh without rounds.
     pub(super) fn method_constraint_count(&self) -> usize {
         let room = self.takes_constraints() && self.shape().motion().is_one_function();
         self.constraint_count() + usize::from(room)

@@ -162,6 +162,7 @@ impl Problem {
         match &self.shape {
             Some(shape) => shape.motion().moved(&shape.displacement(p)),
             None => Ok(Moved {
+                newton_steps: 0,
                 mesh: self.original.clone(),
                 displacement: vec![[0.0; 3]; self.original.points().len()],
                 inversion: StepToInversion::NEVER,

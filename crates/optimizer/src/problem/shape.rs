@@ -119,7 +119,7 @@ impl Shape {
     }
 
     /// How far the mesh follows the straight way from a design to another one, and the room there by the variables; `None` where
-    /// the law is not that of rails.
+    /// the mesh moves in rounds.
     ///
     /// # Errors
     /// As [`Motion::carried_along`].
@@ -141,12 +141,13 @@ impl Shape {
     /// If `p` has another length than there are variables.
     pub fn pushed_back(&self, p: &[f64]) -> Result<Vec<f64>, RemeshError> {
         let mut design = p.to_vec();
+        let mut near: Option<Shortfall> = None;
         for _ in 0..MOST_PUSHES {
-            let Some(Shortfall { value, gradient }) = self.motion.shortfall(&self.displacement(&design))?
-            else {
+            let Some(shortfall) = self.motion.shortfall(&self.displacement(&design), near.as_ref())? else {
                 break;
             };
-            let gradient = self.surface.gradient(&gradient);
+            let (value, gradient) = (shortfall.value, self.surface.gradient(&shortfall.gradient));
+            near = Some(shortfall);
             let square: f64 = gradient.iter().map(|g| g * g).sum();
             if square == 0.0 {
                 break;

@@ -84,7 +84,7 @@ pub(crate) fn rotor_about_cross_axis() -> Case {
 }
 
 /// A point turned about a unit axis through the origin (Rodrigues).
-fn turned(p: Point, axis: Point, angle: f64) -> Point {
+pub(crate) fn turned(p: Point, axis: Point, angle: f64) -> Point {
     let once = cross(axis, p);
     let twice = cross(axis, once);
     std::array::from_fn(|d| p[d] + angle.sin() * once[d] + (1.0 - angle.cos()) * twice[d])

@@ -3,6 +3,7 @@
 //! `cargo test --release -p fluxmorph-remesh --test remesh torture -- --nocapture` prints what is measured, `write_the_table`
 //! (`just torture`) puts all of it into docs/torture.md.
 
+mod ball;
 mod case;
 mod cases;
 mod page;
