@@ -12,6 +12,7 @@
 //!
 //! The blocks of a page run in order in one copy of the project's files. `rules` lists what is never run, and why.
 
+mod audit;
 mod command_pages;
 mod contents;
 mod page;

@@ -20,6 +20,7 @@ use crate::bh::{BhCurve, Tangent};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
+use crate::line_search;
 use crate::linear::gmres::{self, Ended};
 use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
@@ -216,14 +217,15 @@ impl Problem<'_> {
         Iterate { values, residual }
     }
 
-    /// Where to start: the field of the linear parts where it has less of a residual than none.
+    /// Where to start: a share of the field of the linear parts, as in statics.
     fn start(&self, cache: &mut LinearSolverCache) -> Result<(Iterate, usize), SolverError> {
         let mut system = self.model.prepare_with(self.matrix.clone(), cache)?;
         let (values, report) = system.solve_field(&self.load)?;
-        *cache = system.into_cache().without_initial_guess();
-        let (linear, zero) = (self.at(values), self.at(vec![c64::default(); self.load.len()]));
-        let is_nearer = norm(&linear.residual) < norm(&zero.residual);
-        Ok((if is_nearer { linear } else { zero }, report.iterations))
+        let zero = self.at(vec![c64::default(); self.load.len()]);
+        let mut nearest = system.into_field();
+        let found = self.search(&zero, &values, &mut nearest)?;
+        *cache = nearest.into_cache().without_initial_guess();
+        Ok((found.map_or(zero, |(start, _)| start), report.iterations))
     }
 
     /// The derivative at some unknowns.
@@ -254,28 +256,39 @@ impl Problem<'_> {
         }
     }
 
-    /// The longest of Newton's step and its halves that lowers the residual, and its length. The residual is measured by
-    /// `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field: unlike its plain norm that does
-    /// not ask saturated iron, whose reluctivity is a thousand times that of the rest, to come first.
+    /// A length of a step that lowers the residual, first the one at which it has next to no part along the step: a new iterate with
+    /// it. The residual is measured by `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field:
+    /// unlike its plain norm that does not ask saturated iron, whose reluctivity is a thousand times that of the rest, to come first.
     fn search(
         &self,
         from: &Iterate,
         step: &[c64],
         nearest: &mut FieldSystem,
     ) -> Result<Option<(Iterate, f64)>, SolverError> {
+        let product = |a: &[c64], b: &[c64]| ordered_sum(a.len(), |i| a[i].re * b[i].re + a[i].im * b[i].im);
         let mut measure = |residual: &[c64]| -> Result<f64, SolverError> {
-            let (z, _) = nearest.solve_once(residual)?;
-            Ok(ordered_sum(z.len(), |i| residual[i].re * z[i].re + residual[i].im * z[i].im))
+            Ok(product(residual, &nearest.solve_once(residual)?.0))
         };
-        let (before, mut length) = (measure(&from.residual)?, 1.0);
-        for _ in 0..MOST_HALVINGS {
+        let place = |length: f64| {
             let mut values = from.values.clone();
             axpy(c64::from(length), step, &mut values);
-            let trial = self.at(values);
-            if measure(&trial.residual)? <= (1.0 - ARMIJO * length) * before {
+            self.at(values)
+        };
+        let along = line_search::longest_useful(product(&from.residual, step), |length| {
+            let trial = place(length);
+            (product(&trial.residual, step), trial)
+        });
+        if along.is_level {
+            return Ok(Some((along.state, along.length)));
+        }
+        let before = measure(&from.residual)?;
+        let (mut length, mut trial) = (along.length, along.state);
+        for _ in 0..MOST_HALVINGS {
+            if measure(&trial.residual)? <= (1.0 - ARMIJO * length.min(1.0)) * before {
                 return Ok(Some((trial, length)));
             }
             length *= 0.5;
+            trial = place(length);
         }
         Ok(None)
     }

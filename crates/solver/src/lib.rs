@@ -25,6 +25,7 @@ mod fixed_directions;
 pub mod functional;
 mod gauge;
 mod harmonic;
+mod line_search;
 pub mod linear;
 mod load;
 mod local_entities;

@@ -1,8 +1,8 @@
 //! Magnetostatics with B–H laws: the minimum of the energy by Newton's method.
 //!
 //! The state minimises `W(A) = ∫w(|B|) − ∫T·B` (with the penalty of nodal elements), which is convex. Newton's steps have the
-//! exact tangent; a step is halved until the energy falls by a small part of what its slope promises (Armijo; Nocedal and
-//! Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, or what the caller gives: the
+//! exact tangent; a step is as long as the energy falls along it, about (`line_search`), and halved until the energy falls by a small
+//! part of what its slope promises (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, or what the caller gives: the
 //! field on the reference mesh of a round, so that a state is a function of mesh, model and that reference, and not of the designs
 //! before. Within one solution a factor serves as long as it
 //! pays.
@@ -14,6 +14,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::element::Complex3;
 use crate::error::SolverError;
+use crate::line_search;
 use crate::linear::{LinearSolverCache, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::nonlinear::{self, Added};
@@ -46,7 +47,7 @@ pub struct NewtonProgress {
     pub residual: f64,
     /// `W` [J]; `None` in harmonics, where eddy currents leave nothing that is minimised.
     pub energy: Option<f64>,
-    /// Length of the last step over Newton's own: one, or what halving left of it.
+    /// Length of the last step over Newton's own.
     pub damping: f64,
 }
 
@@ -92,28 +93,46 @@ impl Energy<'_> {
         }
     }
 
-    /// Where to start: the field of the linear parts where it has less energy than none. Newton's step from zero has the initial
+    /// Where to start: the share of the field of the linear parts that has the least energy. Newton's step from zero has the initial
     /// permeability, far below the largest, and creeps along the foot of a curve.
     fn start(&self, cache: &mut LinearSolverCache) -> Result<(Iterate, usize), SolverError> {
         let mut system = self.model.prepare_with(self.matrix.clone(), cache)?;
         let (values, report) = system.solve(&self.load)?;
         *cache = system.into_cache().without_initial_guess();
-        let (linear, zero) = (self.at(values), self.at(vec![c64::default(); self.load.len()]));
-        Ok((if linear.energy < zero.energy { linear } else { zero }, report.iterations))
+        let zero = self.at(vec![c64::default(); self.load.len()]);
+        let found = self.search(&zero, &values);
+        Ok((found.map_or(zero, |(start, _)| start), report.iterations))
     }
 
-    /// The longest of Newton's step and its halves that lowers the energy, and its length.
+    /// A length of a step that lowers the energy, and nearly as much as any: a new iterate with it.
     fn search(&self, from: &Iterate, step: &[c64]) -> Option<(Iterate, f64)> {
         let slope = dot(&from.residual, step).re;
-        let mut length = 1.0;
-        for _ in 0..MOST_HALVINGS {
+        let place = |length: f64| {
             let mut values = from.solution.values().to_vec();
             axpy(c64::from(length), step, &mut values);
-            let trial = self.at(values);
-            if trial.energy <= from.energy + ARMIJO * length * slope + from.rounding {
+            self.at(values)
+        };
+        let falls = |trial: &Iterate, length: f64| {
+            trial.energy <= from.energy + ARMIJO * length * slope + from.rounding
+        };
+        // What rounding alone may do needs no search.
+        let mut length = 1.0;
+        let mut trial = if -slope > from.rounding {
+            let along = line_search::longest_useful(slope, |length| {
+                let trial = place(length);
+                (dot(&trial.residual, step).re, trial)
+            });
+            length = along.length;
+            along.state
+        } else {
+            place(1.0)
+        };
+        for _ in 0..MOST_HALVINGS {
+            if falls(&trial, length) {
                 return Some((trial, length));
             }
             length *= 0.5;
+            trial = place(length);
         }
         None
     }

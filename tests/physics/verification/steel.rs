@@ -4,7 +4,9 @@ use fluxmorph::build::{Mode, set_up};
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::problem::{Derivatives, Progress, SolverCache, Stage};
 use fluxmorph_solver::linear::LinearSolverCache;
+use fluxmorph_solver::newton::NewtonProgress;
 use fluxmorph_solver::{FieldModel, FieldSolution, Functional, RigidMotion};
 use serde_json::Value;
 
@@ -13,21 +15,24 @@ use crate::references::reference;
 use crate::support::config;
 
 /// The field of a configuration.
-struct Solved {
-    model: FieldModel,
-    mesh: Mesh,
-    solution: FieldSolution,
+pub(super) struct Solved {
+    pub(super) model: FieldModel,
+    pub(super) mesh: Mesh,
+    pub(super) solution: FieldSolution,
 }
 
-fn solved(name: &str, overrides: &[&str]) -> Solved {
+pub(super) fn solved(name: &str, overrides: &[&str]) -> Solved {
     let (config, source) = config(name, overrides);
     let setup = set_up(&config, &source, Mode::Analysis).unwrap_or_else(|e| panic!("{e}"));
     let (model, mesh) = (setup.problem.states()[0].clone(), setup.problem.original().clone());
-    let steps = &mut |p: fluxmorph_solver::newton::NewtonProgress| {
+    let steps = &mut |p: NewtonProgress| {
         println!("  {name}, step {}: residual {:.1e}, length {}", p.steps, p.residual, p.damping);
     };
-    let solution =
-        model.solve_nonlinear(&mesh, (&LinearSolverCache::default(), None), steps).expect("it converges").0;
+    let cache = LinearSolverCache::default();
+    let solution = match model.is_linear() {
+        true => model.solve(&mesh).expect("it converges").0,
+        false => model.solve_nonlinear(&mesh, (&cache, None), steps).expect("it converges").0,
+    };
     Solved { model, mesh, solution }
 }
 
@@ -54,6 +59,7 @@ fn the_force_of_team_20_is_within_5_percent_of_the_measured_one() {
         let error = found / expected - 1.0;
         println!("{current} A: {found:.2} N, measured {expected} N, {:+.1} %, {steps} steps", 100.0 * error);
         assert!(error.abs() < 0.05, "{current} A");
+        assert!(steps <= 8, "{current} A: {steps} steps from zero");
     }
 }
 
@@ -98,4 +104,46 @@ fn mean_flux_densities_of_team_13_are_within_7_percent_of_the_measured_ones() {
         worst = worst.max(error.abs());
     }
     assert!(worst < 0.07, "{worst}");
+}
+
+/// Prints the steps.
+struct Printed;
+
+impl Progress for Printed {
+    fn stage(&mut self, _: Stage) {}
+
+    fn newton(&mut self, progress: NewtonProgress) {
+        println!("  step {}: residual {:.1e}, length {:.2}", progress.steps, progress.residual, progress.damping);
+    }
+}
+
+/// Steps from the field on the reference mesh, as every evaluation of a run after the first takes them.
+#[test]
+#[ignore = "a dozen saturated fields of the actuator, half a minute"]
+fn designs_of_an_actuator_take_few_steps_from_the_reference() {
+    let (config, source) = config("actuator.toml", &[]);
+    let setup = set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}"));
+    let problem = &setup.problem;
+    let shape = problem.shape().expect("a shape");
+    let bounds = config.design.as_ref().map(|design| [design.lower, design.upper]).expect("a design");
+    let mut cache = SolverCache::default();
+    let mut steps = |share: f64, seed: u64| {
+        let mut random = seed;
+        let mut next = || {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (random >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let p: Vec<f64> =
+            shape.initial().iter().map(|p| p + 2.0 * share * next() * (bounds[1] - bounds[0])).collect();
+        let p: Vec<f64> = p.into_iter().map(|p| p.clamp(bounds[0], bounds[1])).collect();
+        let analysis = problem.evaluate(&p, Derivatives::First, &mut cache, &mut Printed);
+        analysis.unwrap_or_else(|e| panic!("{e}")).solutions[0].newton_steps()
+    };
+    println!("the initial design: {} steps from zero", steps(0.0, 1));
+    // A first step goes a tenth of the range.
+    for (share, most) in [(0.01, 4), (0.05, 4), (0.1, 4), (0.2, 5)] {
+        let found: Vec<usize> = (1..=3).map(|seed| steps(share, seed)).collect();
+        println!("variables moved by up to {share} of their range: {found:?} steps from the reference");
+        assert!(found.iter().all(|&steps| steps <= most), "{share}: {found:?}");
+    }
 }
