@@ -91,8 +91,7 @@ fn the_absolute_field_of_second_order_settles() {
     let deviations = |order: &str| {
         ["1.8", "1.4", "1.2"].map(|growth| {
             let growth = format!("mesh.shield.growth={growth}");
-            let overrides =
-                ["analysis.elements=edge", order, "mesh.shield.refinement=0.5", growth.as_str()];
+            let overrides = ["analysis.elements=edge", order, "mesh.shield.refinement=0.5", growth.as_str()];
             rms(uniform(&setup(IMPEDANCE, &overrides), 0.0)) / REFERENCE_RMS - 1.0
         })
     };

@@ -113,7 +113,10 @@ impl Progress for Printed {
     fn stage(&mut self, _: Stage) {}
 
     fn newton(&mut self, progress: NewtonProgress) {
-        println!("  step {}: residual {:.1e}, length {:.2}", progress.steps, progress.residual, progress.damping);
+        println!(
+            "  step {}: residual {:.1e}, length {:.2}",
+            progress.steps, progress.residual, progress.damping
+        );
     }
 }
 
