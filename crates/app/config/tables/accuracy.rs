@@ -1,5 +1,7 @@
 //! `[accuracy]`: what is done to know how exact the objective is.
 
+use serde_json::json;
+
 use crate::config::section::Section;
 use crate::config::table::table;
 
@@ -37,6 +39,9 @@ table! {
         max_refinements: usize = integer(1, MOST_REFINEMENTS) => 8;
     }
     check = Accuracy::check;
+    rules = |rules| rules.add(json!({
+        "if": { "required": ["tolerance"] }, "then": { "properties": { "estimate": { "const": true } } },
+    }));
 }
 
 impl Accuracy {
