@@ -23,11 +23,15 @@ const LARGEST_SHARE: f64 = 0.10;
 
 /// Faults that no schema of single values can see: what they are about, and words of their messages.
 const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
-    ("a name that another table gives", &["there is no material", "which is not analysed"]),
+    (
+        "a name that another table gives",
+        &["there is no material", "there is no load", "which is not analysed"],
+    ),
     (
         "a name twice in several tables",
         &[
             "two coils are named",
+            "two loads are named",
             "two constraints are named",
             "two probes are named",
             "two forces are named",

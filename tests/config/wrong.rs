@@ -20,7 +20,7 @@ macro_rules! groups {
 }
 
 groups! {
-    curves, design, field, keys, looks, many, mesh, mesh_files, motion, names_and_paths, names_and_places, objective, optimizer,
+    curves, design, field, keys, loads, looks, many, mesh, mesh_files, motion, names_and_paths, names_and_places, objective, optimizer,
     overrides, sizes, sources, syntax,
 }
 

@@ -183,6 +183,34 @@ fn a_run_at_two_frequencies_writes_both() {
 }
 
 #[test]
+fn a_run_under_two_loads_writes_both() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let overrides = [
+        format!("output.directory={:?}", folder.path().join("run")),
+        "optimizer.max_evaluations=2".to_owned(),
+    ];
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    let (config, source) = config("shield_two_loads.toml", &overrides);
+    let result: RunResult =
+        run::run(&config, &source, options(&system_disk()), &mut Silent).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(
+        (result.loads.as_slice(), result.frequencies_hz),
+        (&["wide_on".to_owned(), "narrow_on".to_owned()][..], vec![60.0; 2])
+    );
+    let loads: Vec<Option<&str>> = result.states.iter().map(|state| state.load.as_deref()).collect();
+    assert_eq!(loads, [Some("wide_on"), Some("narrow_on")]);
+    assert_eq!((&result.states[0].losses_w, &result.states[0].probes), (&result.losses_w, &result.probes));
+    assert!(result.states[1].losses_w["plate"] > 2.0 * result.losses_w["plate"], "{:?}", result.states);
+    let objective = result.objective.as_ref().expect("an objective");
+    let largest = objective.terms.iter().map(|term| term.value).fold(0.0, f64::max);
+    assert_eq!(objective.best, largest);
+    let contents = RunFolder(folder.path().join("run")).field(0);
+    for name in ["B_re", "loss_density", "B_re_narrow_on", "loss_density_narrow_on"] {
+        assert!(contents.cell_data.contains_key(name), "{name}");
+    }
+}
+
+#[test]
 fn a_field_of_two_frequencies_is_that_of_each_alone() {
     // With a factor of its own each: the same bits.
     let alone = "analysis.linear_solver.reuse=\"never\"";

@@ -63,7 +63,7 @@ fn any_number_of_threads_writes_the_same_bits_of_edge_elements() {
 
 #[test]
 fn any_number_of_threads_writes_the_same_bits_of_the_shields() {
-    for name in ["shield_quick", "shield_two_frequencies"] {
+    for name in ["shield_quick", "shield_two_frequencies", "shield_two_loads"] {
         same_on_all_threads(&shipped(name, &[]).with("output.fields=every"));
     }
     let meshed = shipped("shield_quick", Model::Meshed.arguments()).with("output.fields=every");

@@ -71,6 +71,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("last", kept("first_last")),
         ("none", kept("none")),
         ("shield", shipped("shield_quick.toml")),
+        ("loads", shipped_with("shield_two_loads.toml", 6)),
     ] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.jsonl")]);
@@ -84,9 +85,9 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
     }
 }
 
-/// The quick shield, which keeps the fields of its first and its last evaluation alone.
-fn shipped_with(evaluations: usize) -> (Config, SourceMap) {
-    let (mut config, source) = shipped("shield_quick.toml");
+/// A shield, which keeps the fields of its first and its last evaluation alone.
+fn shipped_with(name: &str, evaluations: usize) -> (Config, SourceMap) {
+    let (mut config, source) = shipped(name);
     config.optimizer.max_evaluations = evaluations;
     (config, source)
 }
@@ -101,7 +102,7 @@ fn the_rounds_of_the_device_are_there_to_be_tested() {
 
 #[test]
 fn a_run_may_be_cut_again_and_again() {
-    for device in [constrained(), with_rounds(), throttled(), shipped_with(8)] {
+    for device in [constrained(), with_rounds(), throttled(), shipped_with("shield_quick.toml", 8)] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.jsonl")]);
         let mut disk = cut_behind(&files, 0);

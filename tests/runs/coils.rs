@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::support::changed;
-use crate::support::folder::read_json;
+use crate::support::folder::{read_json, read_text};
 use crate::support::program::{Finished, fluxmorph, folder};
 
 const COILS: &str = include_str!("../support/coils.toml");
@@ -148,6 +148,39 @@ fn multipoles_are_those_of_a_fit_of_probes() {
     let ball = &result["multipoles"][1];
     assert_eq!(ball["terms"][0]["name"], "c0_0");
     assert_eq!(ball["terms"].as_array().map(Vec::len), Some(16));
+}
+
+/// The two tests of a transformer in one analysis: what its terminals see under each load is what the circuit of its inductances
+/// says, the leakage of a short-circuited secondary and the voltage of an open one.
+#[test]
+fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
+    let loads = "[[loads]]\nname = \"open\"\nampere_turns = { two = 0 }\n[[loads]]\nname = \"short\"\n\
+                 voltage = { two = 0 }\n[boundaries]";
+    // Without conductors the inductances are real.
+    let insulating = ("conductivity = \"2e7 S/m\"", "conductivity = 0");
+    let folder = folder();
+    execute("solve", folder.path(), &[("[boundaries]", loads), insulating]).completed();
+    let result = read_json(&folder.path().join("run/result.json"));
+    fluxmorph(&[&"report", &folder.path().join("run")]).completed();
+    let report = read_text(&folder.path().join("run/report.html"));
+    for fragment in ["under the load open", "under the load short", "the first of 2"] {
+        assert!(report.contains(fragment), "{fragment}");
+    }
+    assert_eq!(result["loads"], serde_json::json!(["open", "short"]));
+    let at = |load: usize, coil: usize, key: &str| phasor(&result["states"][load]["coils"][coil][key]);
+    let l = |j: usize, k: usize| number(&result["inductance_h"][j][k]);
+    let omega = 2.0 * std::f64::consts::PI * 200.0;
+    assert_eq!((at(0, 0, "current_a"), at(0, 1, "current_a")), ([10.0, 0.0], [0.0, 0.0]));
+    let induced = [0.0, omega * l(1, 0) * 10.0];
+    assert!(deviation([at(0, 1, "voltage_v"), induced]) < 1e-9);
+    // I₂ = −jωM I₁/(R₂ + jωL₂).
+    let (r, x, y) = (2e-3, omega * l(1, 1), omega * l(1, 0) * 10.0);
+    let square = r * r + x * x;
+    let current = [-x * y / square, -r * y / square];
+    let found = at(1, 1, "current_a");
+    println!("{found:?} {current:?}");
+    assert!(deviation([found, current]) < 1e-9);
+    assert_eq!(result["coils"], result["states"][0]["coils"]);
 }
 
 #[test]

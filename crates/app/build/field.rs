@@ -13,14 +13,14 @@ use fluxmorph_solver::linear::{
     DistributedMethod, DistributedSettings, LinearSolver, LinearSolverSettings, Method, Reuse,
 };
 use fluxmorph_solver::{
-    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError,
-    SurfaceLaw, UniformField, Winding,
+    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, LoadCase, Material, Order,
+    SolverError, SurfaceLaw, UniformField, Winding,
 };
 
 use super::curves::Curves;
-use super::entries::{material, phasor};
+use super::entries::material;
 use super::locate_error::DiagnosticSink;
-use super::open;
+use super::{loads, open};
 use crate::config::{
     self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
     SolverMethod, SourceMap,
@@ -111,7 +111,7 @@ pub(super) fn contact_faults(
     mesh: &Mesh,
     conductors: &[Conductor],
 ) -> Vec<Diagnostic> {
-    if config.analysis.frequencies().iter().all(|&f| f == 0.0) {
+    if config.frequencies().iter().all(|&f| f == 0.0) {
         return Vec::new();
     }
     let topology = mesh.topology();
@@ -135,7 +135,7 @@ pub(super) fn contact_faults(
     conductors.iter().filter_map(fault).collect()
 }
 
-/// The field models of a configuration on its mesh, one a frequency.
+/// The field models of a configuration on its mesh, one a load case.
 pub(super) fn field_models(
     config: &Config,
     mesh: &Mesh,
@@ -144,13 +144,19 @@ pub(super) fn field_models(
     share: Option<&Ownership>,
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
-    for &frequency in config.analysis.frequencies() {
-        // A model above 0 Hz shares all but its numbers with another.
-        models.push(match models.iter().find(|model| model.angular_frequency() > 0.0) {
-            Some(model) => model.at_frequency(mesh, frequency)?,
+    for case in config.load_cases() {
+        let frequency = case.frequency;
+        let load_case = loads::load_case(config, &case);
+        // Of one frequency two models share their matrix too, above 0 Hz all but their numbers.
+        let known = || models.iter().rev();
+        let is_alike = |model: &&FieldModel| (model.angular_frequency() > 0.0) == (frequency > 0.0);
+        let nearest =
+            known().find(|model| model.setup().frequency == frequency).or_else(|| known().find(is_alike));
+        models.push(match nearest {
+            Some(model) => model.at_load_case(mesh, &load_case)?,
             None => {
                 let sources = (conductors.to_vec(), coils.to_vec());
-                field_model(config, mesh, frequency, (sources, curves), share)?
+                field_model(config, mesh, &load_case, (sources, curves), share)?
             }
         });
     }
@@ -160,7 +166,7 @@ pub(super) fn field_models(
 fn field_model(
     config: &Config,
     mesh: &Mesh,
-    frequency: f64,
+    load_case: &LoadCase,
     ((conductors, coils), curves): ((Vec<Conductor>, Vec<coil::Coil>), &Curves),
     share: Option<&Ownership>,
 ) -> Result<FieldModel, Error> {
@@ -186,7 +192,6 @@ fn field_model(
     boundaries.extend(open::condition(config));
     let linear_solver = linear_solver(&config.analysis.linear_solver);
     let setup = FieldModelSetup {
-        frequency,
         penalty: config.analysis.penalty,
         family: family(config),
         order: order(config),
@@ -200,8 +205,9 @@ fn field_model(
         open: open::region(config, mesh.topology())?,
         linear_solver,
         ownership: share.map(|share| (share.clone(), distributed_settings(&config.analysis.petsc))),
+        ..FieldModelSetup::default()
     };
-    Ok(FieldModel::new(mesh, setup)?)
+    Ok(FieldModel::new(mesh, load_case.applied_to(&setup))?)
 }
 
 /// How the linear systems are solved.
@@ -308,7 +314,8 @@ fn coil(coil: &config::Coil, mesh: &Mesh) -> Result<coil::Coil, Error> {
             }
         }
     };
-    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: phasor(coil), shape })
+    // What feeds it is the load case's.
+    Ok(coil::Coil { name: coil.name.clone(), ampere_turns: c64::default(), shape })
 }
 
 /// The winding of a coil that has turns.
@@ -318,7 +325,7 @@ fn winding(coil: &config::Coil) -> Option<Winding> {
         resistance: coil.resistance.unwrap_or(0.0),
         series_inductance: coil.series_inductance.unwrap_or(0.0),
         series_capacitance: coil.series_capacitance,
-        voltage: coil.voltage.map(|voltage| c64::from_polar(voltage, coil.phase)),
+        voltage: None,
     })
 }
 
@@ -349,35 +356,10 @@ pub(super) fn coils(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<
     Ok(coils)
 }
 
-/// Every region that no coil can be, and every phase that means nothing.
+/// Every region that no coil can be.
 pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
-    let is_static = config.analysis.frequencies().contains(&0.0);
     for (i, coil) in config.coils.iter().enumerate() {
-        if is_static && coil.phase != 0.0 {
-            let fault = source.diagnostic(&format!("coils[{i}].phase"), "a static current has no phase");
-            faults.push(
-                fault.expected("no phase, or frequencies above 0 Hz; a reversed current is a negative one"),
-            );
-        }
-        if coil.voltage.is_some() {
-            let (has_applied, path) =
-                (config.boundaries.uniform_field.is_some(), format!("coils[{i}].voltage"));
-            let message = match (is_static, has_applied) {
-                (_, true) => Some("the voltage that an applied field induces is not known to the circuit"),
-                (true, _) if coil.resistance.unwrap_or(0.0) == 0.0 && !coil.is_solid() => {
-                    Some("at 0 Hz no resistance limits the current")
-                }
-                (true, _) if coil.series_capacitance.is_some() => {
-                    Some("at 0 Hz a capacitance passes no current")
-                }
-                _ => None,
-            };
-            if let Some(message) = message {
-                let fault = source.diagnostic(&path, message);
-                faults.push(fault.expected("a resistance in series, and coils alone as sources"));
-            }
-        }
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
         if config.regions.get(name).is_some_and(|r| r.model != RegionModel::Volume) {
@@ -385,9 +367,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
             faults.push(fault.expected("a region that is meshed"));
         } else if coil.is_solid() {
             faults.extend(solid_fault(config, source, &path, name));
-        } else if config.analysis.frequencies().iter().any(|&f| f > 0.0)
-            && material(config, name).conductivity > 0.0
-        {
+        } else if config.frequencies().iter().any(|&f| f > 0.0) && material(config, name).conductivity > 0.0 {
             let message = format!(
                 "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
             );

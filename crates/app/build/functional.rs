@@ -15,8 +15,8 @@ use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 use super::entries::material;
 use super::references::{functionals, regions};
 use crate::config::{
-    self, BodyKind, Combination, Config, Diagnostic, Limit as Written, ObjectiveKind, RegionModel, SourceMap,
-    ValueBound,
+    self, BodyKind, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, RegionModel,
+    SourceMap, ValueBound,
 };
 use crate::error::Error;
 
@@ -116,6 +116,8 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let known: Vec<&str> = config.coils.iter().map(|coil| coil.name.as_str()).collect();
     for (path, functional) in functionals(config) {
         let kind = functional.kind.name();
+        let given: Vec<LoadCase<'_>> =
+            config.load_cases().into_iter().filter(|case| functional.is_taken_under(case)).collect();
         for (k, name) in functional.coils.iter().flatten().enumerate() {
             let path = format!("{path}.coils[{k}]");
             let Some(index) = known.iter().position(|known| known == name) else {
@@ -127,8 +129,12 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
                 let message = format!("the coil `{name}` has no turns, so there is no {kind} of it");
                 let help = format!("add a line like: turns = 10 to coils[{index}]");
                 faults.push(source.diagnostic(&path, message).help(help));
-            } else if functional.kind == ObjectiveKind::Current && coil.voltage.is_none() {
-                let message = format!("the current of the coil `{name}` is given: no shape changes it");
+            } else if functional.kind == ObjectiveKind::Current
+                && let Some(case) = given.iter().find(|case| !case.feed(coil).by_voltage)
+            {
+                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
+                let message =
+                    format!("the current of the coil `{name}` is given{under}: no shape changes it");
                 faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
             }
         }
@@ -166,17 +172,19 @@ pub(super) fn objective(
         let own = Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? };
         match objective.combine {
             Combination::Sum => terms.push(own),
-            Combination::WorstCase => terms.extend(at_each_frequency(config, &own)),
+            Combination::WorstCase => terms.extend(at_each_state(config, &own)),
         }
     }
     Ok(Some(WeightedSum { goal: objective.goal, combination: objective.combine, terms }))
 }
 
 /// A term on each of its states alone.
-fn at_each_frequency(config: &Config, term: &Term) -> Vec<Term> {
-    let frequencies = config.analysis.frequencies();
+fn at_each_state(config: &Config, term: &Term) -> Vec<Term> {
+    let cases = config.load_cases();
     let at = |&state: &usize| {
-        let label = Label { frequency: frequencies.get(state).copied(), ..term.label.clone() };
+        let case = cases.get(state);
+        let load = case.and_then(LoadCase::name).map(str::to_owned);
+        let label = Label { frequency: case.map(|case| case.frequency), load, ..term.label.clone() };
         Term { states: vec![state], label, ..term.clone() }
     };
     term.states.iter().map(at).collect()
@@ -189,8 +197,8 @@ fn term(
     mesh: &Mesh,
     states: &[FieldModel],
 ) -> Result<Term, Error> {
-    let frequencies = config.analysis.frequencies();
-    let taken = |k: &usize| functional.frequency.is_none_or(|own| own == frequencies[*k]);
+    let cases = config.load_cases();
+    let taken = |k: &usize| functional.is_taken_under(&cases[*k]);
     let weighting = match functional.weighting {
         Some(config::Weighting::Volume) => Weighting::Volume,
         _ => Weighting::Point,
@@ -233,7 +241,12 @@ fn term(
             } else {
                 RigidMotion::Rotation { axis: direction, about: body.about }
             };
-            force(body, mesh, model, motion)?
+            // The layer of the body is free of what any of the loads excites.
+            let measured = states.iter().enumerate().filter(|(k, _)| taken(k));
+            let mut measured = measured.map(|(_, model)| force(body, mesh, model, motion));
+            measured
+                .try_fold(None, |first, own| Ok::<_, Error>(first.or(Some(own?))))?
+                .expect("a state is taken")
         }
         ObjectiveKind::Inductance => Functional::of_inductances(model, &coils, Inductive::Inductance)?,
         ObjectiveKind::MutualInductance => {
@@ -263,6 +276,7 @@ fn term(
             region: functional.region.clone(),
             coils: functional.coils.clone().unwrap_or_default(),
             frequency: functional.frequency,
+            load: functional.load.clone(),
         },
     })
 }
@@ -273,11 +287,15 @@ fn at_terminals(model: &FieldModel, coils: &[&str], of: AtTerminals) -> Result<F
 }
 
 /// The bodies whose forces are reported.
-pub(super) fn bodies(config: &Config, mesh: &Mesh, model: &FieldModel) -> Result<Vec<Body>, Error> {
+pub(super) fn bodies(config: &Config, mesh: &Mesh, states: &[FieldModel]) -> Result<Vec<Body>, Error> {
     let of = |body: &config::ForceBody| {
         let regions = body.regions.iter().map(|name| mesh.topology().region(name));
         let regions = regions.collect::<Result<Vec<_>, _>>()?;
-        Ok(Body::new(model, mesh, &body.name, &regions, body.about)?)
+        let mut first = None;
+        for model in states {
+            first = first.or(Some(Body::new(model, mesh, &body.name, &regions, body.about)?));
+        }
+        Ok(first.expect("a problem has a state"))
     };
     config.forces.iter().map(of).collect()
 }

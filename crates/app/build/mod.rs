@@ -1,7 +1,7 @@
 //! From a configuration to a problem: the one place where names of the configuration meet names of the mesh.
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
-//! keys. `mesh` makes the mesh, `field` the field problems, `functional` objective and constraints, `design` the design
+//! keys. `mesh` makes the mesh, `field` the field problems, `loads` what excites them, `functional` objective and constraints, `design` the design
 //! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod curves;
@@ -11,6 +11,7 @@ mod elastic_body;
 mod entries;
 mod field;
 mod functional;
+mod loads;
 pub(crate) mod locate_error;
 pub(crate) mod memory_limit;
 pub(crate) mod mesh;
@@ -250,7 +251,7 @@ fn problem_on(
     if let (Some(inputs), Some(body)) = (&design, body) {
         let observed = functional::fixed_elements(config, &mesh, &states)?;
         progress.stage(Stage::Elasticity);
-        let built = shape::shape(inputs, config, body, &states[0], &observed)?;
+        let built = shape::shape(inputs, config, body, &states, &observed)?;
         constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &built)?;
         shape = Some(built);
     }
@@ -258,7 +259,7 @@ fn problem_on(
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
     }
-    let bodies = functional::bodies(config, &mesh, &states[0])?;
+    let bodies = functional::bodies(config, &mesh, &states)?;
     let problem =
         Problem::new(mesh, states, objective, constraints, shape).shared_out(share).with_bodies(bodies);
     warnings.extend(skin::bound_warnings(config, &audits, &problem, designed_body.as_deref()));

@@ -3,7 +3,7 @@
 
 use fluxmorph_geometry::{Mesh, RegionId, Topology};
 
-use super::{field, functional, mesh, open, references};
+use super::{field, functional, loads, mesh, open, references};
 use crate::config::{self, Config, ConfigError, Diagnostic, DiagnosticReport, SourceMap};
 use crate::error::Error;
 
@@ -74,6 +74,7 @@ fn report_with_names(report: DiagnosticReport) -> DiagnosticReport {
 pub(super) fn name_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
     let mut faults = names(config, source, topology);
     faults.extend(field::coil_faults(config, source));
+    faults.extend(loads::faults(config, source));
     let open = open::faults(config, source);
     let inner = mesh::inner_faults(config, source, topology).into_iter();
     faults.extend(inner.filter(|fault| open.iter().all(|known| known.span != fault.span)));

@@ -154,7 +154,7 @@ fn nodal_iron<'a>(config: &Config, mesh: &'a Mesh) -> Option<(&'a String, f64, L
 
 /// The region of the highest relative permeability in which no eddy currents flow.
 fn strongest_iron<'a>(config: &Config, mesh: &'a Mesh) -> Option<(&'a String, f64)> {
-    let is_static = config.analysis.frequencies().contains(&0.0);
+    let is_static = config.frequencies().contains(&0.0);
     let names = mesh.topology().region_names().iter();
     let iron = names.map(|name| (name, material(config, name)));
     iron.filter(|(_, m)| is_static || m.conductivity == 0.0)
@@ -235,7 +235,7 @@ fn section(coil: &Coil) -> Vec<(&'static str, f64)> {
 /// A region of iron or of a conductor that the current of a coil flows in, and where.
 fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(RegionId, Point)> {
     let topology = mesh.topology();
-    let changes = config.analysis.frequencies().iter().any(|&f| f > 0.0);
+    let changes = config.frequencies().iter().any(|&f| f > 0.0);
     let is_matter = |name: &String| {
         let own = material(config, name);
         let replaced = config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);

@@ -97,14 +97,14 @@ pub(super) fn shape(
     inputs: &Inputs<'_>,
     config: &Config,
     body: Body,
-    model: &FieldModel,
+    models: &[FieldModel],
     observed: &[(String, Vec<ElementId>)],
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let Body { full_surface, surface, motion } = body;
-    let mut faults = overlap_faults(inputs, config, motion.moving(), model, observed);
+    let mut faults = overlap_faults(inputs, config, motion.moving(), models, observed);
     if faults.is_empty() {
-        faults.extend(held_node_fault(inputs, &surface, motion.map(), model));
+        faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
     }
     let thickness = thickened_region(full_mesh, &full_surface, config)
         .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface))
@@ -205,7 +205,7 @@ fn overlap_faults(
     inputs: &Inputs<'_>,
     config: &Config,
     moving: &[ElementId],
-    model: &FieldModel,
+    models: &[FieldModel],
     observed: &[(String, Vec<ElementId>)],
 ) -> Vec<Diagnostic> {
     let Inputs { source, mesh, .. } = *inputs;
@@ -219,13 +219,14 @@ fn overlap_faults(
                 .help("take the region out of remesh.region, or shrink remesh.box"),
         );
     }
-    if let Some(e) = model.open_elements().find(moves) {
+    if let Some(e) = models[0].open_elements().find(moves) {
         let at = millimetres(centroid(mesh.vertices(e)));
         let message = format!("the shell of open space reaches into the remesh region, at {at}");
         let fault = source.diagnostic("open", message);
         faults.push(fault.expected("a remesh region inside the shell, which does not move"));
     }
-    faults.extend(model.source_elements().find(moves).map(|e| source_fault(inputs, config, e)));
+    let source = models.iter().flat_map(FieldModel::source_elements).find(moves);
+    faults.extend(source.map(|e| source_fault(inputs, config, e)));
     faults
 }
 

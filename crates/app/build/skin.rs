@@ -51,7 +51,7 @@ pub(super) fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
             let audit = skin_audit(mesh, id, &material, frequency, field::order(config))?;
             Some(Audited { audit, model: region.model })
         };
-        Some(config.analysis.frequencies().iter().filter_map(at).collect::<Vec<_>>())
+        Some(config.frequencies().iter().filter_map(at).collect::<Vec<_>>())
     };
     let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()

@@ -144,8 +144,12 @@ fn read_cases(
         // What is wrong without the case has been said.
         diagnostics.extend(own.into_iter().filter(|diagnostic| known.insert(diagnostic.clone())));
         sources.push(bare.of_tree(&tree));
-        let slot = config.as_mut().and_then(|config| config.morph.as_mut()?.cases.get_mut(index));
-        if let (Some(slot), Some(case)) = (slot, case) {
+        let Some((config, mut case)) = config.as_mut().zip(case) else { continue };
+        // What goes out is the whole motion's, and not what follows from the design of one case.
+        if !overlay.contains_key("output") {
+            case.output = config.output.clone();
+        }
+        if let Some(slot) = config.morph.as_mut().and_then(|morph| morph.cases.get_mut(index)) {
             slot.complete(overlay, case);
         }
     }

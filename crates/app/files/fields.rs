@@ -84,7 +84,7 @@ pub fn deviation(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
 /// The VTU file of an analysed design: the moved mesh, potentials, displacement and sensitivity at its nodes; fields,
 /// loss, region and quality in its elements.
 ///
-/// Fields of the first frequency have plain names, those of the others a suffix: `B_re_200Hz`.
+/// Fields of the first state have plain names, those of the others a suffix, their load or frequency: `B_re_200Hz`.
 ///
 /// # Errors
 /// [`MeshError::NotFiniteArray`] names an array that is not finite: nothing of it is written.
@@ -219,7 +219,7 @@ impl StateArrays {
         let b_abs = b[0].par_iter().zip(&b[1]).map(magnitude).collect();
         let suffix = match index {
             0 => String::new(),
-            _ => suffix(model.angular_frequency()),
+            _ => suffix(model),
         };
         Self {
             node_names: NODE_ARRAYS.map(|name| format!("{name}{suffix}")),
@@ -258,8 +258,16 @@ impl StateArrays {
     }
 }
 
-/// `_200Hz`; to a microhertz, and without a point, which ParaView's calculator takes for an operator.
-fn suffix(angular_frequency: f64) -> String {
+/// `_short_circuit` of a load, else that of the frequency; without what ParaView's calculator takes for an operator.
+fn suffix(model: &FieldModel) -> String {
+    match &model.setup().load_case {
+        Some(name) => format!("_{}", name.replace('-', "_")),
+        None => suffix_of_frequency(model.angular_frequency()),
+    }
+}
+
+/// `_200Hz`; to a microhertz, and without a point.
+fn suffix_of_frequency(angular_frequency: f64) -> String {
     let hertz = (angular_frequency / (2.0 * std::f64::consts::PI) * 1e6).round() / 1e6;
     format!("_{hertz}Hz").replace('.', "_")
 }
@@ -271,11 +279,11 @@ fn parts(values: &[[c64; 3]]) -> [Vec<Point>; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::suffix;
+    use super::suffix_of_frequency;
 
     #[test]
     fn the_suffix_of_a_frequency_can_stand_in_a_name() {
-        let of = |hertz: f64| suffix(2.0 * std::f64::consts::PI * hertz);
+        let of = |hertz: f64| suffix_of_frequency(2.0 * std::f64::consts::PI * hertz);
         assert_eq!(
             (of(200.0), of(0.5), of(16.7)),
             ("_200Hz".to_owned(), "_0_5Hz".to_owned(), "_16_7Hz".to_owned())

@@ -43,10 +43,13 @@ pub struct RunResult {
     /// Rounds and fallbacks of the mesh motion, in their order; empty where one reference mesh was enough.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rounds: Vec<RoundEvent>,
-    /// The frequencies [Hz] in the order of the configuration.
+    /// The frequencies [Hz] of the field problems, in the order of the configuration.
     #[serde(default)]
     pub frequencies_hz: Vec<f64>,
-    /// The field at the probes, at the first frequency.
+    /// The loads of the field problems, where there are some.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loads: Vec<String>,
+    /// The field at the probes, at the first frequency or under the first load, as all that follows where nothing else is said.
     pub probes: Vec<ProbeResult>,
     /// Eddy-current loss by region, of the meshed part, at the first frequency [W].
     pub losses_w: BTreeMap<String, f64>,
@@ -56,10 +59,10 @@ pub struct RunResult {
     /// Newton's method and saturation, where there is a B–H curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
-    /// Losses and probes at every frequency; only where there are several.
+    /// What depends on the frequency and on the load, for each; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateResult>,
-    /// Losses and probes of the initial design at every frequency, of a run.
+    /// Losses and probes of the initial design at every frequency and under every load, of a run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub initial: Vec<StateResult>,
     /// Open space, where the mesh has a shell that stands for it.
@@ -210,6 +213,9 @@ pub struct TermResult {
     pub coils: Vec<String>,
     /// Its frequency [Hz]; `null` for the sum over all.
     pub frequency: Option<f64>,
+    /// Its load; left out for the sum over all, and where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load: Option<String>,
     /// Its factor in the objective.
     pub weight: f64,
     /// Its value without the factor, in SI.
@@ -257,15 +263,30 @@ pub struct SaturatedRegion {
     pub volume_share_beyond_knee: f64,
 }
 
-/// What depends on the frequency.
+/// What depends on the frequency and on the load.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StateResult {
+    /// The load, where there are some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load: Option<String>,
     /// The frequency [Hz].
     pub frequency_hz: f64,
     /// Eddy-current loss by region, of the meshed part [W].
     pub losses_w: BTreeMap<String, f64>,
     /// The field at the probes.
     pub probes: Vec<ProbeResult>,
+    /// Force and torque on every body.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<BodyForce>,
+    /// Newton's method and saturation, where there is a B–H curve.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub saturation: Option<SaturationResult>,
+    /// What the terminals of the coils with `turns` see.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coils: Vec<CoilResult>,
+    /// The field expanded in circles and balls.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub multipoles: Vec<MultipoleResult>,
 }
 
 /// The best design.
@@ -373,6 +394,7 @@ pub(crate) mod tests {
                     region: Some("plate".to_owned()),
                     coils: Vec::new(),
                     frequency: None,
+                    load: None,
                     weight: 1.0,
                     value: 1.0,
                 }],
@@ -417,6 +439,7 @@ pub(crate) mod tests {
                 worst_quality_final: 0.1,
             },
             frequencies_hz: vec![60.0],
+            loads: Vec::new(),
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
             forces: Vec::new(),

@@ -44,14 +44,18 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
 }
 
 fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<String> {
-    let states = problem.states().iter().zip(&analysis.solutions).zip(config.analysis.frequencies());
+    let states = problem.states().iter().zip(&analysis.solutions);
     states
-        .flat_map(|((model, solution), frequency)| {
+        .flat_map(|(model, solution)| {
+            let frequency = model.setup().frequency;
+            let load = model.setup().load_case.as_ref();
+            let under = load.map_or(String::new(), |load| format!(" under the load `{load}`"));
             let beyond = saturated(config, model, solution, analysis);
             beyond.into_iter().map(move |(region, found)| {
+                let under = &under;
                 let (highest, place) = found.highest;
                 format!(
-                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz, at {}, and {:.1} % of it \
+                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz{under}, at {}, and {:.1} % of it \
                      are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
                      that of a material that does not exist. Give the material its curve (bh), lower the ampere-turns, or \
                      give the iron more section",

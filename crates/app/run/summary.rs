@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{
@@ -40,12 +41,16 @@ impl Session<'_> {
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
         let mesh = &analysis.mesh;
-        let states = self.state_results(analysis, observer);
-        let StateResult { probes, losses_w, .. } = states[0].clone();
+        let terminals = all_terminals(problem, analysis)?;
+        let mut states = self.state_results(analysis, observer);
+        for (index, (state, terminals)) in states.iter_mut().zip(&terminals).enumerate() {
+            self.complete(index, analysis, terminals, state)?;
+        }
+        let StateResult { probes, losses_w, forces, saturation, coils, multipoles, .. } = states[0].clone();
         let design =
             problem.shape().zip(design).map(|(shape, (values, rounds))| design_result(shape, values, rounds));
         let topology = mesh.topology();
-        let terminals = circuit::terminals(&problem.states()[0], mesh, &analysis.solutions[0])?;
+        let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
         let warnings = reservations(self.config, &self.setup, analysis);
         warnings.iter().for_each(|warning| observer.warning(warning));
         Ok(RunResult {
@@ -67,18 +72,19 @@ impl Session<'_> {
                 worst_quality_initial: initial_quality,
                 worst_quality_final: analysis.quality.worst,
             },
-            frequencies_hz: self.config.analysis.frequencies().to_vec(),
+            frequencies_hz: self.config.load_cases().iter().map(|case| case.frequency).collect(),
+            loads: self.config.loads.iter().map(|load| load.name.clone()).collect(),
             probes,
             losses_w,
-            forces: analysis.forces.clone(),
-            saturation: saturation(problem, analysis),
+            forces,
+            saturation,
             states: if states.len() > 1 { states } else { Vec::new() },
             initial: Vec::new(),
             open: open(problem, analysis)?,
-            coils: coils(&terminals, problem.states()[0].angular_frequency()),
-            coupling: coupling(&terminals.inductance),
-            inductance_h: terminals.inductance,
-            multipoles: self.multipoles(analysis)?,
+            coils,
+            coupling: coupling(&inductance_h),
+            inductance_h,
+            multipoles,
             linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
             timings_s: self.timings_result(timings),
             warnings,
@@ -86,12 +92,35 @@ impl Session<'_> {
         })
     }
 
+    /// Adds to losses and probes of a state what else depends on it.
+    fn complete(
+        &self,
+        index: usize,
+        analysis: &Analysis,
+        terminals: &Terminals,
+        state: &mut StateResult,
+    ) -> Result<(), Error> {
+        let problem = &self.setup.problem;
+        let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
+        let force = |body: &Body| body.force(model, &analysis.mesh, solution);
+        state.forces = problem.bodies().iter().map(force).collect();
+        state.saturation = saturation(model, analysis, solution);
+        state.coils = coils(terminals, model.angular_frequency());
+        state.multipoles = self.multipoles(model, analysis, solution)?;
+        Ok(())
+    }
+
     /// The terms of every expansion.
-    fn multipoles(&self, analysis: &Analysis) -> Result<Vec<MultipoleResult>, Error> {
-        let (model, mesh) = (&self.setup.problem.states()[0], &analysis.mesh);
+    fn multipoles(
+        &self,
+        model: &FieldModel,
+        analysis: &Analysis,
+        solution: &FieldSolution,
+    ) -> Result<Vec<MultipoleResult>, Error> {
+        let mesh = &analysis.mesh;
         let of = |set: &config::MultipoleSet| {
             let multipoles = multipole::multipoles(self.config, set, mesh, model)?;
-            let coefficients = multipoles.coefficients(model, mesh, &analysis.solutions[0]);
+            let coefficients = multipoles.coefficients(model, mesh, solution);
             let main = multipole::main_terms(set);
             let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
             let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();
@@ -123,7 +152,7 @@ impl Session<'_> {
         )
     }
 
-    /// Losses and probes of the initial design at every frequency; nothing where a run was interrupted, or has neither.
+    /// Losses and probes of the initial design in every state; nothing where a run was interrupted, or has neither.
     pub(super) fn initial_states(
         &self,
         initial: Moved,
@@ -140,7 +169,7 @@ impl Session<'_> {
         Ok(self.state_results(&analysis, observer))
     }
 
-    /// Losses and probes of a design at every frequency.
+    /// Losses and probes of a design in every state.
     pub(super) fn state_results(
         &self,
         analysis: &Analysis,
@@ -191,16 +220,20 @@ impl Session<'_> {
             })
             .collect();
         StateResult {
-            frequency_hz: self.config.analysis.frequencies()[index],
+            load: model.setup().load_case.clone(),
+            frequency_hz: model.setup().frequency,
             losses_w: solution.losses(model, mesh).into_iter().collect(),
             probes,
+            forces: Vec::new(),
+            saturation: None,
+            coils: Vec::new(),
+            multipoles: Vec::new(),
         }
     }
 }
 
 /// How far every region goes into its B–H curve; `None` where all is linear.
-fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult> {
-    let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
+fn saturation(model: &FieldModel, analysis: &Analysis, solution: &FieldSolution) -> Option<SaturationResult> {
     let of = |found: saturation::Saturation| SaturatedRegion {
         region: found.region,
         highest_b_t: found.highest,
@@ -213,6 +246,23 @@ fn saturation(problem: &Problem, analysis: &Analysis) -> Option<SaturationResult
         newton_steps: solution.newton_steps(),
         regions: saturation::by_region(model, &analysis.mesh, solution).into_iter().map(of).collect(),
     })
+}
+
+/// What the terminals of coils see of every state; states of one matrix have the responses to 1 A in common.
+fn all_terminals(problem: &Problem, analysis: &Analysis) -> Result<Vec<Terminals>, SolverError> {
+    let (models, mesh) = (problem.states(), &analysis.mesh);
+    let mut responded: Vec<FieldSolution> = Vec::new();
+    let mut all = Vec::new();
+    for (model, solution) in models.iter().zip(&analysis.solutions) {
+        let mut state = solution.clone();
+        match (0..responded.len()).find(|&k| model.shares_matrix_with(&models[k])) {
+            Some(k) => state = state.with_responses_of(&responded[k]),
+            None => model.respond_to_all(mesh, &mut state)?,
+        }
+        all.push(circuit::terminals(model, mesh, &state)?);
+        responded.push(state);
+    }
+    Ok(all)
 }
 
 /// A value in statics, a peak phasor in harmonics.
@@ -277,6 +327,7 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
         region: term.label.region.clone(),
         coils: term.label.coils.clone(),
         frequency: term.label.frequency,
+        load: term.label.load.clone(),
         weight: term.weight,
         value,
     };

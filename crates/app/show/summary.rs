@@ -7,7 +7,7 @@ use super::{Started, probes};
 use crate::config::{Goal, Objective};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, ObjectiveResult, RunResult, RunStatus, SAFETY,
-    SaturatedRegion, Verdict,
+    SaturatedRegion, StateResult, Verdict,
 };
 use crate::printable::printable;
 
@@ -52,8 +52,7 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let is_run = result.command != "solve";
     let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
     rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, styles)));
-    for (frequency, losses) in states(result) {
-        let at = if result.states.len() > 1 { format!(" at {frequency} Hz") } else { String::new() };
+    for (at, losses) in states(result) {
         rows.extend(
             losses
                 .iter()
@@ -67,8 +66,13 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.extend(saturation.regions.iter().map(saturated));
         rows.push(("Newton steps", saturation.newton_steps.to_string()));
     }
-    for coil in &result.coils {
-        rows.push(("coil", coil_text(coil)));
+    if result.loads.is_empty() {
+        rows.extend(result.coils.iter().map(|coil| ("coil", coil_text(coil))));
+    }
+    for state in result.states.iter().filter(|_| !result.loads.is_empty()) {
+        let under = state.load.as_deref().map(|load| format!(" under {}", printable(load)));
+        let row = |coil| ("coil", format!("{}{}", coil_text(coil), under.as_deref().unwrap_or_default()));
+        rows.extend(state.coils.iter().map(row));
     }
     if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
         rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
@@ -175,8 +179,12 @@ fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
 
 /// The frequencies of an analysis, and what was measured.
 fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
-    let frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
+    let mut frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
+    frequencies.dedup();
     let mut rows = vec![("analysed at", frequencies.join(", "))];
+    if !result.loads.is_empty() {
+        rows.push(("loads", printable(&result.loads.join(", ")).into_owned()));
+    }
     if let Some(objective) = &result.objective {
         let value = styled(styles.strong, &format!("{:.6e}{}", objective.best, named.unit));
         // Of an analysis it is a measured quantity: there is no goal.
@@ -196,13 +204,16 @@ fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
     ("constraint", format!("{}: {value:.6e}, bound {bound:.6e}, {verdict}", printable(name)))
 }
 
-/// Losses by frequency [Hz].
-fn states(result: &RunResult) -> Vec<(f64, &std::collections::BTreeMap<String, f64>)> {
+/// Losses by state, with the words that tell it from others.
+fn states(result: &RunResult) -> Vec<(String, &std::collections::BTreeMap<String, f64>)> {
     if result.states.is_empty() {
-        let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
-        return vec![(frequency, &result.losses_w)];
+        return vec![(String::new(), &result.losses_w)];
     }
-    result.states.iter().map(|state| (state.frequency_hz, &state.losses_w)).collect()
+    let of = |state: &StateResult| match &state.load {
+        Some(load) => format!(" under {}", printable(load)),
+        None => format!(" at {} Hz", state.frequency_hz),
+    };
+    result.states.iter().map(|state| (of(state), &state.losses_w)).collect()
 }
 
 /// The whole time, and the parts that took a tenth of it or more.

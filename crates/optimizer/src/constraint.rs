@@ -130,7 +130,8 @@ mod tests {
         let mesh = block(&BlockParameters::default()).expect("defaults are valid");
         let observed = Observed::Component { direction: [0.0, 0.0, 1.0] };
         let functional = Functional::observation(&mesh, RegionId::new(0), observed).expect("it has elements");
-        let label = Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None };
+        let label =
+            Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None, load: None };
         let term = Term { functional, states: vec![0], weight: 1.0, label };
         Constraint { name: "field".to_owned(), quantity: Quantity::Field(term), limit }
     }

@@ -75,7 +75,7 @@ impl Sizes {
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
-        for state in problem.states() {
+        for state in problem.matrices().iter().map(|states| &problem.states()[states[0]]) {
             let Some(solver) = state.linear_solver() else { continue };
             // Newton's method holds the matrix of the linear parts beside that of the tangent.
             let matrices = if state.is_linear() { 1 } else { 2 };

@@ -36,6 +36,8 @@ pub struct Label {
     pub coils: Vec<String>,
     /// The one frequency [Hz]; `None` for the sum over all.
     pub frequency: Option<f64>,
+    /// The one load case; `None` for the sum over all, and where there are none.
+    pub load: Option<String>,
 }
 
 /// What the terms make together.

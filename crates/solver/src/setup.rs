@@ -20,6 +20,8 @@ use crate::surface::{Conductor, SurfaceLaw};
 /// Everything that defines a field problem beside the mesh.
 #[derive(Clone, Debug)]
 pub struct FieldModelSetup {
+    /// Name of the load case, for messages and arrays; `None` where it has none.
+    pub load_case: Option<String>,
     /// Frequency [Hz]; zero for magnetostatics.
     pub frequency: f64,
     /// Penalty factor `p = ν_p/ν` [1]. Default 1: the components of `A` then decouple inside a material.
@@ -55,6 +57,7 @@ impl Default for FieldModelSetup {
     /// A static problem without anything in it.
     fn default() -> Self {
         Self {
+            load_case: None,
             frequency: 0.0,
             penalty: 1.0,
             family: ElementFamily::default(),
@@ -70,6 +73,14 @@ impl Default for FieldModelSetup {
             linear_solver: LinearSolverSettings::default(),
             ownership: None,
         }
+    }
+}
+
+impl FieldModelSetup {
+    /// `ν B_r` [A/m] of every region, by `RegionId`; shorter where the rest has none.
+    pub(crate) fn magnetisation(&self) -> Vec<Point> {
+        let of = |(b, m): (&Point, &Material)| b.map(|b| m.reluctivity() * b);
+        self.remanence.iter().zip(&self.materials).map(of).collect()
     }
 }
 

@@ -82,6 +82,12 @@ impl FieldSolution {
         self.responses.insert(winding, Arc::new(response));
     }
 
+    /// The same with the responses of another state on the same mesh whose problem has the same matrix.
+    #[must_use]
+    pub fn with_responses_of(self, other: &Self) -> Self {
+        Self { responses: other.responses.clone(), ..self }
+    }
+
     /// The same, found in some steps of Newton's method.
     pub(crate) fn after_newton(self, steps: usize) -> Self {
         Self { newton_steps: steps, ..self }

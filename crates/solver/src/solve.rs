@@ -61,6 +61,20 @@ impl FieldModel {
         Ok(FieldSolution::state(values, report).with_currents(currents))
     }
 
+    /// Solves for 1 A in every winding whose response the state does not hold yet, where all is linear.
+    ///
+    /// # Errors
+    /// As [`FieldModel::prepare`] and [`PreparedSystem::solve_field`].
+    pub fn respond_to_all(&self, mesh: &Mesh, state: &mut FieldSolution) -> Result<(), SolverError> {
+        let missing: Vec<usize> =
+            (0..self.windings().count()).filter(|&k| state.response(k).is_none()).collect();
+        if missing.is_empty() || !self.is_linear() {
+            return Ok(());
+        }
+        let mut system = self.prepare(self.assembled(mesh))?;
+        missing.into_iter().try_for_each(|winding| self.respond(&mut system, winding, state))
+    }
+
     /// Solves for 1 A in a winding by its place, which the state then holds as its response; again only where it does not yet.
     ///
     /// # Errors

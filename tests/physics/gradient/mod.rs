@@ -13,6 +13,7 @@ use crate::support::{changed, setup, setup_of};
 
 mod circuits;
 mod functionals;
+mod loads;
 mod saturation;
 mod sources;
 

@@ -71,6 +71,12 @@ fn so_are_those_of_conductors_at_two_frequencies() {
 }
 
 #[test]
+fn so_are_those_of_loads_on_one_matrix() {
+    let overrides = ["mesh.shield.refinement=0.35", "analysis.linear_solver.method=\"direct\""];
+    ranks_agree("shield_two_loads.toml", &overrides, &[3]);
+}
+
+#[test]
 fn so_are_those_of_quadratic_elements() {
     let overrides =
         ["mesh.shield.refinement=0.3", "analysis.order=2", "analysis.linear_solver.method=\"direct\""];

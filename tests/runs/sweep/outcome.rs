@@ -6,7 +6,7 @@ use super::home::Home;
 use crate::support::markup::{Element, elements};
 
 /// The cells of a line, quotes resolved.
-fn cells(line: &str) -> Vec<String> {
+pub(super) fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut is_quoted) = (Vec::new(), String::new(), false);
     for c in line.chars() {
         match c {

@@ -15,7 +15,7 @@ use super::estimate::EstimateSummary;
 use super::truncation::Truncation;
 use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched, stiffness_policy};
 use crate::config::{
-    self, Boundaries, Coil, Config, Constraint, Design, MeshConfig, Objective, Open, Optimizer, Probe,
+    self, Boundaries, Coil, Config, Constraint, Design, Load, MeshConfig, Objective, Open, Optimizer, Probe,
     RegionModel, Remesh, SourceMap,
 };
 use crate::error::Error;
@@ -33,7 +33,8 @@ pub(super) struct Summary<'a> {
     pub(super) mesh_file: Option<MeshFileSummary>,
     /// What the file asks for.
     pub(super) field_problem: FieldProblem,
-    pub(super) frequencies_hz: &'a [f64],
+    pub(super) frequencies_hz: Vec<f64>,
+    pub(super) loads: &'a [Load],
     /// Polynomial degree of the elements.
     pub(super) order: u8,
     pub(super) nodes: usize,
@@ -204,7 +205,8 @@ pub(super) fn summary<'a>(
         mesh_origin: origin(&config.mesh),
         mesh_file: MeshFileSummary::of(&config.mesh),
         field_problem: field_problem(config),
-        frequencies_hz: config.analysis.frequencies(),
+        frequencies_hz: config.frequencies(),
+        loads: &config.loads,
         order: config.analysis.order.into(),
         nodes: reference.node_count(),
         tets: reference.tets().len(),

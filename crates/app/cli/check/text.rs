@@ -81,6 +81,9 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     let frequencies: Vec<String> = summary.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
     let rest = if summary.frequencies_hz == [0.0] { " (magnetostatic)" } else { "" };
     row("frequency", format!("{}{rest}", frequencies.join(", ")));
+    if !summary.loads.is_empty() {
+        row("loads", summary.loads.iter().map(|load| load.name.as_str()).collect::<Vec<_>>().join(", "));
+    }
     row("unknowns", format!("{} of the field, elements of order {}", summary.unknowns, summary.order));
     let conditions = summary.boundaries;
     for (name, surfaces) in
@@ -130,7 +133,10 @@ fn objective(summary: &Summary<'_>) -> String {
     let term = |term: &crate::config::Term| {
         let weight = if term.weight == 1.0 { String::new() } else { format!("{} x ", term.weight) };
         let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
-        let at = term.functional.frequency.map(|f| format!(" at {f} Hz")).unwrap_or_default();
+        let at = match (term.functional.frequency, &term.functional.load) {
+            (_, Some(load)) => format!(" under {load}"),
+            (frequency, None) => frequency.map(|f| format!(" at {f} Hz")).unwrap_or_default(),
+        };
         format!("{weight}{}{}{at}", term.functional.kind.name(), region.unwrap_or_default())
     };
     let terms: Vec<String> = objective.terms().iter().map(term).collect();

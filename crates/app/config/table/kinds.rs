@@ -1,6 +1,6 @@
 //! The vocabulary of `table!`: what a key may hold, its unit and its range.
 
-use super::nested::{InlineTable, Keys, NamedTables, SubTable, Tables};
+use super::nested::{ByName, InlineTable, Keys, SubTable, Tables};
 use super::unread::{OneOf, SomeQuantity};
 pub(in crate::config) use super::unread::{overlay, unread};
 use crate::config::text::dimension::Dimension;
@@ -29,7 +29,7 @@ pub(in crate::config) const INLINE: InlineTable = InlineTable;
 /// Tables `[[key]]`.
 pub(in crate::config) const TABLES: Tables = Tables;
 /// Tables `[key.NAME]`.
-pub(in crate::config) const NAMED: NamedTables = NamedTables;
+pub(in crate::config) const NAMED: ByName<SubTable> = ByName(SubTable);
 /// Keys of this very table that belong together.
 pub(in crate::config) const KEYS: Keys = Keys;
 /// One of the forms of a `one_of!`.
@@ -62,6 +62,11 @@ pub(in crate::config) const fn length(range: Range) -> Number {
 /// A whole number from `least` to `most`.
 pub(in crate::config) const fn integer(least: usize, most: usize) -> Whole {
     Whole { least, most }
+}
+
+/// Values by names of the user's.
+pub(in crate::config) const fn by_name<K>(kind: K) -> ByName<K> {
+    ByName(kind)
 }
 
 /// Three lengths, or one that holds along all three axes.

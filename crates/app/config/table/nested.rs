@@ -6,6 +6,7 @@ use super::declaration::{Table, describe};
 use super::description::Description;
 use super::field::Field;
 use crate::config::section::Section;
+use crate::config::text::dimension::Dimension;
 use crate::config::text::message::shown;
 use crate::config::text::tree::{Content, join};
 use crate::config::value::definitions::{Definitions, Keywords, list_of};
@@ -94,16 +95,33 @@ impl<T: Group> Value<Tables> for Vec<T> {
     }
 }
 
-/// Tables `[key.NAME]`, each with a name of the user's.
+/// Values by names of the user's: tables `[key.NAME]`, or `key = { NAME = value }`.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::config) struct NamedTables;
+pub(in crate::config) struct ByName<K>(pub(in crate::config) K);
 
-impl Kind for NamedTables {}
+impl<K: Kind> Kind for ByName<K> {
+    fn dimension(&self) -> Option<Dimension> {
+        self.0.dimension()
+    }
+}
 
-impl<T: Group> Value<NamedTables> for BTreeMap<String, T> {
-    fn read(_: &NamedTables, entry: &Entry<'_>) -> Option<Self> {
-        entry.section()?;
-        let Content::Table(tables) = &entry.node.content else { return None };
+impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
+    fn read(ByName(kind): &ByName<K>, entry: &Entry<'_>) -> Option<Self> {
+        let Content::Table(tables) = &entry.node.content else {
+            match kind.dimension() {
+                Some(dimension) => {
+                    let message =
+                        format!("`{}` is {}, not a table", entry.path, entry.node.content.describe());
+                    entry.wrong(
+                        message,
+                        &format!("names with values: {{ NAME = \"{}\" }}", dimension.example()),
+                        None,
+                    );
+                }
+                None => _ = entry.section(),
+            }
+            return None;
+        };
         let named = |(name, node): (&String, _)| {
             let item = Entry { node, path: join(&entry.path, name), context: entry.context };
             if name.trim().is_empty() || name.chars().any(char::is_control) {
@@ -111,16 +129,16 @@ impl<T: Group> Value<NamedTables> for BTreeMap<String, T> {
                 item.wrong(message, "a name without control characters", None);
                 return None;
             }
-            Some((name.clone(), T::read(&SubTable, &item)?))
+            Some((name.clone(), T::read(kind, &item)?))
         };
         Some(tables.iter().filter_map(named).collect())
     }
 
-    fn schema(_: &NamedTables, definitions: &mut Definitions) -> Keywords {
-        let table = <T as Value<SubTable>>::schema(&SubTable, definitions);
+    fn schema(ByName(kind): &ByName<K>, definitions: &mut Definitions) -> Keywords {
+        let value = T::schema(kind, definitions);
         let keywords = [
             ("type", "object".into()),
-            ("additionalProperties", table.into()),
+            ("additionalProperties", value.into()),
             ("propertyNames", definitions.text().into()),
         ];
         keywords.map(|(keyword, value)| (keyword.to_owned(), value)).into_iter().collect()

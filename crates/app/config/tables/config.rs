@@ -11,6 +11,7 @@ use super::coil::Coil;
 use super::constraint::{Constraint, Limit};
 use super::design::Design;
 use super::force::ForceBody;
+use super::load::Load;
 use super::material::{self, Material, Region};
 use super::mesh::MeshConfig;
 use super::morph::Morph;
@@ -26,8 +27,9 @@ use crate::config::table::table;
 use crate::config::text::source::SourceMap;
 
 /// The tables that only mean something to a field problem.
-const OF_THE_FIELD: [&str; 9] = [
+const OF_THE_FIELD: [&str; 10] = [
     "coils",
+    "loads",
     "forces",
     "multipoles",
     "objective",
@@ -53,6 +55,8 @@ table! {
         regions: BTreeMap<String, Region> = NAMED => BTreeMap::new();
         /// The sources.
         coils: Vec<Coil> = TABLES => Vec::new();
+        /// Load cases.
+        loads: Vec<Load> = TABLES => Vec::new();
         /// The boundary conditions.
         boundaries: Boundaries = TABLE => Boundaries::default();
         /// Bodies on which the force is reported.
@@ -86,10 +90,16 @@ table! {
 
 /// What moves needs a body to move in, and what belongs to a field needs the field.
 fn tables_together(rules: Rules) -> Rules {
-    rules.needs("design", &["remesh"]).needs("morph", &["remesh"]).add(json!({
-        "if": { "required": ["morph"], "not": { "anyOf": present(&OF_THE_FIELD) } },
-        "else": { "required": ["analysis"] },
-    }))
+    let several = json!({ "required": ["frequencies"] });
+    let with_loads = json!({ "required": ["loads", "analysis"], "properties": {
+        "loads": { "minItems": 1 }, "analysis": several,
+    } });
+    rules.needs("design", &["remesh"]).needs("morph", &["remesh"]).add(json!({ "not": with_loads })).add(
+        json!({
+            "if": { "required": ["morph"], "not": { "anyOf": present(&OF_THE_FIELD) } },
+            "else": { "required": ["analysis"] },
+        }),
+    )
 }
 
 impl Config {
@@ -97,7 +107,8 @@ impl Config {
     fn check(&mut self, root: &Section<'_>) {
         self.check_analysis(root);
         // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
-        let frequencies = self.analysis.frequencies().to_vec();
+        self.check_loads(root);
+        let frequencies = self.frequencies();
         let is_known = root.has("analysis") && frequencies.iter().all(|frequency| !frequency.is_nan());
         let frequencies = if is_known { &frequencies[..] } else { &[] };
         material::check_regions(root, &self.regions, &self.materials, frequencies);
@@ -107,7 +118,7 @@ impl Config {
         root.named_twice("forces", forces, "forces", "a different name for each body");
         let multipoles = self.multipoles.iter().map(|set| &set.name);
         root.named_twice("multipoles", multipoles, "multipoles", "a different name for each expansion");
-        self.check_functionals(root, frequencies);
+        self.check_functionals(root, is_known);
         let constraints = self.constraints.iter().map(|constraint| &constraint.name);
         root.named_twice("constraints", constraints, "constraints", "a different `name` for each constraint");
         // One of an unknown kind has no name.
@@ -153,11 +164,12 @@ impl Config {
         }
     }
 
-    fn check_functionals(&self, root: &Section<'_>, frequencies: &[f64]) {
+    fn check_functionals(&self, root: &Section<'_>, is_known: bool) {
+        let cases = if is_known { self.load_cases() } else { Vec::new() };
         if let Some(objective) = &self.objective {
             for (index, term) in objective.terms().iter().enumerate() {
                 if let Some(section) = root.inner(&objective.path(index)) {
-                    term.functional.check_frequencies(&section, frequencies);
+                    term.functional.check_load(&section, &cases);
                 }
             }
         }
@@ -165,7 +177,7 @@ impl Config {
             if let Limit::Field { functional, .. } = &constraint.limit
                 && let Some(section) = root.inner(&format!("constraints[{index}]"))
             {
-                functional.check_frequencies(&section, frequencies);
+                functional.check_load(&section, &cases);
             }
         }
     }

@@ -73,6 +73,8 @@ table! {
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// As in `[objective]`.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
+        /// As in `[objective]`.
+        load: Option<String> = TEXT;
         /// The greatest value, in the unit of the kind: `"20 W"`, `"2.5 kg"`. One of this, `upper_ratio`, `lower` and
         /// `lower_ratio`.
         upper: Option<Unread> = SOME_QUANTITY;
@@ -92,14 +94,14 @@ table! {
 }
 
 /// The keys of a functional of the field.
-const OF_A_FIELD: [&str; 7] =
-    ["coils", "harmonics", "weighting", "target", "compare", "direction", "frequency"];
+const OF_A_FIELD: [&str; 8] =
+    ["coils", "harmonics", "weighting", "target", "compare", "direction", "frequency", "load"];
 /// The keys of a bound on a value.
 const BOUNDS: [&str; 4] = ["upper", "upper_ratio", "lower", "lower_ratio"];
 /// The keys of a bound on a thickness.
 const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
 /// The keys that a thickness does not have.
-const NOT_OF_A_THICKNESS: [&str; 12] = [
+const NOT_OF_A_THICKNESS: [&str; 13] = [
     "region",
     "coils",
     "harmonics",
@@ -108,6 +110,7 @@ const NOT_OF_A_THICKNESS: [&str; 12] = [
     "compare",
     "direction",
     "frequency",
+    "load",
     "upper",
     "upper_ratio",
     "lower",
@@ -292,10 +295,30 @@ impl Group for Limit {
 impl Limit {
     fn field(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
         let ratios = written.ratios();
-        let LimitKeys { region, coils, harmonics, weighting, target, compare, direction, frequency, .. } =
-            written;
-        let mut functional =
-            Functional { kind, region, coils, harmonics, weighting, target, compare, direction, frequency };
+        let LimitKeys {
+            region,
+            coils,
+            harmonics,
+            weighting,
+            target,
+            compare,
+            direction,
+            frequency,
+            load,
+            ..
+        } = written;
+        let mut functional = Functional {
+            kind,
+            region,
+            coils,
+            harmonics,
+            weighting,
+            target,
+            compare,
+            direction,
+            frequency,
+            load,
+        };
         functional.check(section);
         let range = if kind.may_be_negative() { Range::FINITE } else { Range::POSITIVE };
         let bound = ValueBound::of(ratios, section, functional.dimension(), range);

@@ -3,10 +3,12 @@
 use serde_json::{Value, json};
 
 use super::design::{COMPONENTS, unit_vector};
+use super::load::LoadCase;
 use crate::config::section::Section;
 use crate::config::table::rules::{Rules, Then, is};
 use crate::config::table::table;
 use crate::config::text::dimension::Dimension;
+use crate::config::text::message::shown;
 use crate::config::value::choice::choice;
 
 table! {
@@ -34,8 +36,11 @@ table! {
         /// does not matter.
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
-        /// The one frequency it is taken at [Hz], one of `[analysis]`. Default: the values at all frequencies are added.
+        /// The one frequency it is taken at [Hz], one of `[analysis]` or of `[[loads]]`. Default: the values at all frequencies are
+        /// added.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
+        /// The one load of `[[loads]]` it is taken under. Default: the values under all loads are added.
+        load: Option<String> = TEXT;
     }
 }
 
@@ -73,6 +78,7 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
     let of_two = json!({ "minItems": 2, "maxItems": 2 });
     let count = |kinds: &[&str], items: &Value| json!({ "if": is("kind", kinds), "then": { "properties": { "coils": items } } });
     rules
+        .not_both(["frequency", "load"])
         .unless("kind", &[&["energy"], &of_coils[..]].concat(), Then { required: &["region"], refused: &[] })
         .when("kind", &of_coils, Then { required: &["coils"], refused: &["region"] })
         .unless("kind", &of_coils, Then { required: &[], refused: &["coils"] })
@@ -294,19 +300,41 @@ impl Functional {
         }
     }
 
-    /// Checks that its frequency is analysed, and that a loss is not sought where nothing is induced; `analysed` [Hz] is
-    /// empty where it is unknown.
-    pub(super) fn check_frequencies(&self, section: &Section<'_>, analysed: &[f64]) {
-        if let Some(own) = self.frequency.filter(|own| !analysed.is_empty() && !analysed.contains(own)) {
-            let known: Vec<String> = analysed.iter().map(|f| format!("{f} Hz")).collect();
+    /// Whether it is taken under a load case.
+    pub fn is_taken_under(&self, case: &LoadCase<'_>) -> bool {
+        self.frequency.is_none_or(|own| own == case.frequency)
+            && self.load.as_deref().is_none_or(|own| case.name() == Some(own))
+    }
+
+    /// Checks that its frequency and its load are analysed, and that a loss is not sought where nothing is induced; `cases` are
+    /// empty where they are unknown.
+    pub(super) fn check_load(&self, section: &Section<'_>, cases: &[LoadCase<'_>]) {
+        if let Some(own) =
+            self.frequency.filter(|own| !cases.is_empty() && cases.iter().all(|case| case.frequency != *own))
+        {
+            let mut known: Vec<String> = cases.iter().map(|case| format!("{} Hz", case.frequency)).collect();
+            known.dedup();
             let message = format!("`{}.frequency` is {own} Hz, which is not analysed", section.path());
             section.wrong("frequency", message, format!("a frequency of [analysis]: {}", known.join(", ")));
         }
-        let still = |f: f64| f == 0.0;
-        let nothing =
-            self.frequency.map_or(!analysed.is_empty() && analysed.iter().all(|&f| still(f)), still);
-        let anything_static = self.frequency.is_none() && analysed.iter().any(|&f| still(f));
-        let is_void = if self.kind == ObjectiveKind::Loss { nothing } else { nothing || anything_static };
+        if self.frequency.is_some() && self.load.is_some() {
+            let message =
+                format!("`{}` has both `frequency` and `load`, which has one frequency", section.path());
+            section.clash(["frequency", "load"], message, "one of them");
+        } else if let Some(own) = self.load.as_deref().filter(|_| !cases.is_empty()) {
+            let known: Vec<&str> = cases.iter().filter_map(LoadCase::name).collect();
+            if !known.contains(&own) {
+                let message = format!("there is no load `{}`", shown(own));
+                section.unknown_name("load", message, own, &known);
+            }
+        }
+        let taken: Vec<f64> =
+            cases.iter().filter(|case| self.is_taken_under(case)).map(|case| case.frequency).collect();
+        let is_void = if self.kind == ObjectiveKind::Loss {
+            !taken.is_empty() && taken.iter().all(|&f| f == 0.0)
+        } else {
+            taken.contains(&0.0)
+        };
         if let Some(why) = self.kind.why_not_static().filter(|_| is_void) {
             section.wrong("kind", format!("`{}` is {why}", section.path()), "a frequency above 0 Hz");
         }

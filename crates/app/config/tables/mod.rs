@@ -13,6 +13,7 @@ mod force;
 mod functional;
 mod initial;
 mod linear_solver;
+mod load;
 mod material;
 mod mesh;
 mod morph;
@@ -40,6 +41,7 @@ pub use force::ForceBody;
 pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
+pub use load::{Feed, Load, LoadCase};
 pub use material::{KneeWord, Material, Region, RegionModel, Steel, WrittenCurve};
 pub use mesh::{
     BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,

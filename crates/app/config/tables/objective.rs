@@ -10,7 +10,7 @@ use crate::config::table::{Group, table};
 use crate::config::value::choice::choice;
 
 /// The keys that belong to a term.
-const OF_A_TERM: [&str; 10] = [
+const OF_A_TERM: [&str; 11] = [
     "kind",
     "region",
     "coils",
@@ -20,6 +20,7 @@ const OF_A_TERM: [&str; 10] = [
     "compare",
     "direction",
     "frequency",
+    "load",
     "weight",
 ];
 
@@ -39,7 +40,8 @@ table! {
     pub struct Objective {
         /// Which way is better. Most objectives are errors, fields or losses.
         goal: Goal = WORD => Goal::Minimise;
-        /// What the terms make together. In a worst case a term without `frequency` is one at each frequency; with the algorithms `mma`,
+        /// What the terms make together. In a worst case a term without `frequency` and `load` is one under each load, at each
+        /// frequency; with the algorithms `mma`,
         /// `ccsaq` and `slsqp`.
         combine: Combination = WORD => Combination::Sum;
         /// What is combined.

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::{Layout, Planned, Sweep, page, state};
+use super::{Criterion, Layout, Planned, Sweep, front, page, state};
 use crate::config::Goal;
 use crate::error::Error;
 use crate::files::{Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, csv_text};
@@ -20,6 +20,10 @@ pub struct Comparison {
     pub keys: Vec<String>,
     /// The row of the best objective relative to its start; `None` where nothing can be compared.
     pub best: Option<usize>,
+    /// The two quantities that the runs trade for each other; empty where they trade none.
+    pub criteria: Vec<Criterion>,
+    /// The rows that keep their constraints and that no other one beats in both criteria, from the best one in the first on.
+    pub front: Vec<usize>,
     /// The rows.
     pub combinations: Vec<Row>,
 }
@@ -43,6 +47,8 @@ pub struct Row {
     pub ratio: Option<f64>,
     /// The same on a freshly generated mesh.
     pub verified_ratio: Option<f64>,
+    /// The criteria at the best design, in SI; empty where there are none, or no result.
+    pub criteria: Vec<f64>,
     /// Worst quality (Eq. 4) of the mesh of the best design.
     pub worst_quality: Option<f64>,
     /// Wall time [s].
@@ -76,9 +82,11 @@ impl Comparison {
             directory: layout.path().display().to_string(),
             keys: sweep.swept().map(|setting| setting.key.clone()).collect(),
             best: None,
+            criteria: criteria(&sweep.combinations),
+            front: Vec::new(),
             combinations: rows.collect::<Result<_, _>>()?,
         };
-        comparison.best = comparison.find_best();
+        comparison.compare();
         Ok(comparison)
     }
 
@@ -88,8 +96,25 @@ impl Comparison {
     /// As [`Comparison::read`].
     pub fn update(&mut self, sweep: &Sweep, layout: &Layout, index: usize) -> Result<(), Error> {
         self.combinations[index] = Row::read(sweep, layout, &sweep.combinations[index])?;
-        self.best = self.find_best();
+        self.compare();
         Ok(())
+    }
+
+    /// Finds what only all rows together say.
+    fn compare(&mut self) {
+        self.best = self.find_best();
+        let points: Vec<(usize, [f64; 2])> =
+            self.points().filter(|(row, _)| self.combinations[*row].is_feasible).collect();
+        let sign = |k: usize| if self.criteria[k].smaller_is_better { 1.0 } else { -1.0 };
+        self.front =
+            if points.is_empty() { Vec::new() } else { front::non_dominated(&points, [sign(0), sign(1)]) };
+    }
+
+    /// The rows that have both criteria, with these.
+    pub(super) fn points(&self) -> impl Iterator<Item = (usize, [f64; 2])> + '_ {
+        let of =
+            |(index, row): (usize, &Row)| Some((index, <[f64; 2]>::try_from(row.criteria.as_slice()).ok()?));
+        self.combinations.iter().enumerate().filter_map(of).filter(|_| self.criteria.len() == 2)
     }
 
     /// Writes `sweep.csv` and `sweep.html`.
@@ -104,8 +129,10 @@ impl Comparison {
     /// The content of `sweep.csv`: shortest digits that read back as the same number; empty for what is not there.
     pub fn csv(&self) -> String {
         let columns = self.keys.iter().map(|key| csv_text(key)).chain(COLUMNS.map(str::to_owned));
-        let mut table = columns.collect::<Vec<_>>().join(",") + "\n";
-        for row in &self.combinations {
+        let traded = self.criteria.iter().map(|criterion| csv_text(&criterion.title()));
+        let on_front = (!self.criteria.is_empty()).then(|| "on_front".to_owned());
+        let mut table = columns.chain(traded).chain(on_front).collect::<Vec<_>>().join(",") + "\n";
+        for (index, row) in self.combinations.iter().enumerate() {
             let value = serde_json::to_value(row).expect("numbers and text have a JSON form");
             let cell = |column: &str| match &value[column] {
                 Value::Null if column == "status" => "not_begun".to_owned(),
@@ -114,7 +141,10 @@ impl Comparison {
                 other => other.to_string(),
             };
             let cells = row.values.iter().map(|value| csv_text(value)).chain(COLUMNS.map(cell));
-            table += &(cells.collect::<Vec<_>>().join(",") + "\n");
+            let traded = (0..self.criteria.len())
+                .map(|k| row.criteria.get(k).map_or(String::new(), |value| Value::from(*value).to_string()));
+            let on_front = (!self.criteria.is_empty()).then(|| self.front.contains(&index).to_string());
+            table += &(cells.chain(traded).chain(on_front).collect::<Vec<_>>().join(",") + "\n");
         }
         table
     }
@@ -182,6 +212,7 @@ impl Row {
             objective_best: objective.map(|objective| objective.best),
             ratio: objective.map(|objective| objective.ratio),
             verified_ratio: objective.and_then(|objective| objective.verified_ratio),
+            criteria: result.as_ref().and_then(|result| values(planned, result)).unwrap_or_default(),
             worst_quality: of_result(|result| Some(result.mesh.worst_quality_final)),
             seconds: of_result(|result| result.timings_s.get("total").copied()),
             peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
@@ -202,6 +233,7 @@ impl Row {
             objective_best: None,
             ratio: None,
             verified_ratio: None,
+            criteria: Vec::new(),
             worst_quality: None,
             seconds: None,
             peak_memory_bytes: None,
@@ -212,6 +244,19 @@ impl Row {
             is_reported: false,
         }
     }
+}
+
+/// The criteria of a sweep: those of all its combinations, if these are the same.
+fn criteria(combinations: &[Planned]) -> Vec<Criterion> {
+    let first = combinations.first().and_then(|planned| planned.criteria.as_ref());
+    let same =
+        first.filter(|first| combinations.iter().all(|planned| planned.criteria.as_ref() == Some(first)));
+    same.map_or(Vec::new(), |pair| pair.to_vec())
+}
+
+/// The criteria of a combination in its result.
+fn values(planned: &Planned, result: &RunResult) -> Option<Vec<f64>> {
+    planned.criteria.as_ref()?.iter().map(|criterion| criterion.value(result)).collect()
 }
 
 fn is_file(layout: &Layout, path: &Path) -> bool {

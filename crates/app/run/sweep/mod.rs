@@ -3,7 +3,8 @@
 //! `setting` takes a `--set key=v1,v2` apart, `combinations` makes their product and `names` the names of the directories;
 //! `plan` reads the configuration of every combination before anything runs. `layout` owns the directory of the sweep and
 //! `sweep.json`, `state` says what a run directory still needs, `work` lets child processes do that, `script` writes it
-//! down for a scheduler. `comparison` gathers the results into `sweep.csv`, `page` into `sweep.html`.
+//! down for a scheduler. `comparison` gathers the results into `sweep.csv`, `page` into `sweep.html`; `front` says what is traded
+//! between them.
 //!
 //! Does not live here: anything that solves or optimises. A combination is a `fluxmorph run` or `resume` like any other, in
 //! a process of its own: one that runs out of memory takes no other with it.
@@ -11,6 +12,7 @@
 mod combinations;
 mod comparison;
 mod error;
+mod front;
 mod layout;
 mod names;
 mod page;
@@ -24,6 +26,7 @@ mod work;
 pub use combinations::{Combination, MOST_COMBINATIONS, combinations};
 pub use comparison::{Comparison, Row};
 pub use error::SweepError;
+pub use front::Criterion;
 pub use layout::{Layout, Task};
 pub use plan::{Outside, Planned, Request, Sweep};
 pub use script::{ScriptFile, script};

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::comparison::{Comparison, Row};
-use super::{Sweep, plots};
+use super::{Criterion, Sweep, plots};
 use crate::files::{RunStatus, StopReason};
 use crate::show::report::markup::{Card, address, document, footer, header, note, section, table};
 use crate::show::report::ticks::{duration, number};
@@ -34,6 +34,9 @@ pub(super) fn page(sweep: &Sweep, comparison: &Comparison) -> String {
     let content = html! {
         (head(sweep, comparison))
         (section("comparison", "Comparison", &rows(comparison)))
+        @if let Some((title, figure)) = plots::front(comparison) {
+            (section("front", &title, &html! { (figure) (front(comparison)) }))
+        }
         @if let Some((title, figure)) = plots::over_value(comparison) { (section("over-value", &title, &figure)) }
         (section("convergence", "Convergence", &plots::convergence(comparison)))
         (section("files", "Files", &files))
@@ -140,6 +143,19 @@ fn rows(comparison: &Comparison) -> Markup {
             (note("Marked: the best F / F₀ of the runs that keep their constraints."))
         }
     }
+}
+
+/// The runs on the front.
+fn front(comparison: &Comparison) -> Markup {
+    let titles: Vec<String> = comparison.criteria.iter().map(Criterion::title).collect();
+    let titles = titles.iter().map(String::as_str);
+    let head: Vec<&str> = comparison.keys.iter().map(String::as_str).chain(titles).collect();
+    let row = |&index: &usize| -> Vec<String> {
+        let row = &comparison.combinations[index];
+        row.values.iter().cloned().chain(row.criteria.iter().map(|value| number(*value, 5))).collect()
+    };
+    let rows: Vec<Vec<String>> = comparison.front.iter().take(MOST_ROWS).map(row).collect();
+    table(&head, &rows, None)
 }
 
 fn cells(row: &Row) -> Vec<Markup> {

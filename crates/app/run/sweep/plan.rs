@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::state::{fingerprint, mesh_file};
-use super::{Combination, Setting, SweepError, combinations};
+use super::{Combination, Criterion, Setting, SweepError, combinations};
 use crate::build::{memory_limit, with_names};
 use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
 use crate::error::Error;
@@ -74,6 +74,8 @@ pub struct Planned {
     pub limits: LimitsInForce,
     /// Which way its objective is better.
     pub goal: Goal,
+    /// What its result is compared by with those of the others; `None` where nothing is traded.
+    pub criteria: Option<[Criterion; 2]>,
 }
 
 impl Sweep {
@@ -113,6 +115,7 @@ impl Sweep {
                     max_time_s: request.limits.max_time.or(configured.max_time_s),
                 },
                 goal: config.objective.as_ref().map_or(Goal::Minimise, |objective| objective.goal),
+                criteria: Criterion::pair(&config, &settings),
             });
             first.get_or_insert((config, source));
         }

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::Criterion;
 use super::comparison::{Comparison, Row};
 use crate::show::report::markup::missing;
 use crate::show::report::plot::{BOTTOM, LEFT, RIGHT, Scale, TOP, WIDTH, axes, dot, grid, polyline, svg};
@@ -50,6 +51,47 @@ pub(super) fn over_value(comparison: &Comparison) -> Option<(String, Markup)> {
         }
     };
     Some((format!("F / F₀ over {key}"), figure))
+}
+
+/// Title and figure of two quantities that the runs trade for each other; those on the front are joined, and marked.
+pub(super) fn front(comparison: &Comparison) -> Option<(String, Markup)> {
+    let [first, second] = &comparison.criteria[..] else { return None };
+    let points: Vec<(usize, [f64; 2])> = comparison.points().collect();
+    if points.is_empty() {
+        return None;
+    }
+    let better = |criterion: &Criterion| if criterion.smaller_is_better { "smaller" } else { "larger" };
+    let caption = format!(
+        "{} over {}: {} of {} runs are on the front (joined), where no other run is better in both; better is the {} {} and the \
+         {} {}. A run that violates a constraint is not on it.",
+        second.name,
+        first.name,
+        comparison.front.len(),
+        points.len(),
+        better(first),
+        first.name,
+        better(second),
+        second.name
+    );
+    let x = Scale::around(points.iter().map(|(_, p)| p[0]), [LEFT + 10.0, WIDTH - RIGHT - 6.0]);
+    let y = Scale::around(points.iter().map(|(_, p)| p[1]), [TOP + HEIGHT, TOP]);
+    let at = |p: &[f64; 2]| [x.at(p[0]), y.at(p[1])];
+    let of_row = |row: &usize| points.iter().find(|(index, _)| index == row).map(|(_, p)| at(p));
+    let joined: Vec<[f64; 2]> = comparison.front.iter().filter_map(of_row).collect();
+    let content = html! {
+        (grid(&x, &y, 5))
+        (axes(&x, &y, [&first.title(), &second.title()], [6, 5]))
+        (polyline("curve", &joined))
+        @for (_, p) in &points { (dot("point", at(p), 2.6)) }
+        @for p in &joined { (dot("best", *p, 4.0)) }
+    };
+    let figure = html! {
+        figure class="chart narrow" data-chart="front" {
+            (svg(TOP + HEIGHT + BOTTOM, &caption, &content))
+            figcaption { (caption) }
+        }
+    };
+    Some(("Pareto front".to_owned(), figure))
 }
 
 /// F / F₀ of every evaluation of every run.

@@ -2,33 +2,52 @@
 
 use maud::{Markup, html};
 
+use super::iron::under;
 use super::tables::{MOST_ROWS, titled_table};
 use super::ticks::number;
-use crate::files::{Amplitude, RunResult};
+use crate::files::{Amplitude, CoilResult, MultipoleResult, RunResult};
 
-/// Terminals, inductances and coupling of coils; terms of expansions.
+/// Terminals, inductances and coupling of coils; terms of expansions. Under several loads all but the inductances for each.
 pub(super) fn circuits(result: &RunResult) -> Markup {
-    let rows: Vec<Vec<String>> = result
-        .coils
-        .iter()
-        .map(|coil| {
-            vec![
-                coil.name.clone(),
-                amplitude(coil.current_a, "A"),
-                amplitude(coil.flux_linkage_wb, "Wb"),
-                format!("{} Ω", number(coil.resistance_ohm, 5)),
-                amplitude(coil.voltage_v, "V"),
-            ]
-        })
-        .collect();
-    let head = ["coil", "current", "flux linkage", "resistance", "voltage"];
+    let states = &result.states;
     html! {
-        (titled_table("Coils of the meshed part", &head, &rows, MOST_ROWS))
+        @if result.loads.len() > 1 {
+            @for state in states { (terminals(&state.coils, state.load.as_deref())) }
+        } @else {
+            (terminals(&result.coils, None))
+        }
         (matrix("Inductances [H]", &result.inductance_h, result))
         @if result.coils.len() > 1 { (matrix("Coupling", &result.coupling, result)) }
-        @for set in &result.multipoles {
+        @if result.loads.len() > 1 {
+            @for state in states { (expansions(&state.multipoles, state.load.as_deref())) }
+        } @else {
+            (expansions(&result.multipoles, None))
+        }
+    }
+}
+
+/// What the terminals of coils see.
+fn terminals(coils: &[CoilResult], load: Option<&str>) -> Markup {
+    let row = |coil: &CoilResult| {
+        vec![
+            coil.name.clone(),
+            amplitude(coil.current_a, "A"),
+            amplitude(coil.flux_linkage_wb, "Wb"),
+            format!("{} Ω", number(coil.resistance_ohm, 5)),
+            amplitude(coil.voltage_v, "V"),
+        ]
+    };
+    let rows: Vec<Vec<String>> = coils.iter().map(row).collect();
+    let head = ["coil", "current", "flux linkage", "resistance", "voltage"];
+    titled_table(&format!("Coils of the meshed part{}", under(load)), &head, &rows, MOST_ROWS)
+}
+
+/// The terms of expansions.
+fn expansions(sets: &[MultipoleResult], load: Option<&str>) -> Markup {
+    html! {
+        @for set in sets {
             (titled_table(
-                &format!("Expansion {}, at {} mm", set.name, number(1e3 * set.radius_m, 4)),
+                &format!("Expansion {}, at {} mm{}", set.name, number(1e3 * set.radius_m, 4), under(load)),
                 &["term", "value", "units of 1e-4"],
                 &set.terms.iter().map(|term| {
                     let units = term.units.map_or(String::new(), |units| number(units, 5));

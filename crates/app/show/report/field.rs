@@ -144,13 +144,18 @@ fn caption(
     cuts: &[FieldCut<'_>],
     scale: &Scale,
 ) -> String {
-    let frequencies = data.config.analysis.frequencies();
+    let cases = data.config.load_cases();
     let mut text = format!("Magnitude of the flux density in {}", window.describe("mm"));
-    if !matches!(frequencies, [0.0]) {
+    if cases.iter().any(|case| case.frequency != 0.0) {
         text += " (peak value)";
     }
-    if let [first, _, ..] = frequencies {
-        text += &format!(" at {} Hz, the first of {} frequencies", trim_zeros(*first, 6), frequencies.len());
+    if let [first, _, ..] = cases.as_slice() {
+        text += &match first.name() {
+            Some(load) => format!(" under the load {load}, the first of {}", cases.len()),
+            None => {
+                format!(" at {} Hz, the first of {} frequencies", trim_zeros(first.frequency, 6), cases.len())
+            }
+        };
     }
     text += &format!(
         ", {} scale from {} to {} mT, the same for all; lines: boundaries of regions. What lies beyond has the colour of \

@@ -47,7 +47,7 @@ pub(super) fn cards(data: &RunData) -> Vec<Card> {
 }
 
 /// Forces and torques on every body; nothing where there are none.
-pub(super) fn forces(forces: &[BodyForce]) -> Markup {
+pub(super) fn forces(forces: &[BodyForce], load: Option<&str>) -> Markup {
     let row = |body: &BodyForce| {
         let numbers = body.force_n.iter().chain(&body.torque_nm).map(|v| number(*v, 5));
         [body.name.clone()].into_iter().chain(numbers).collect()
@@ -56,14 +56,19 @@ pub(super) fn forces(forces: &[BodyForce]) -> Markup {
     let head = ["body", "Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"];
     html! {
         @if !rows.is_empty() {
-            h3 { "Forces and torques on the part that is modelled" }
+            h3 { "Forces and torques on the part that is modelled" (under(load)) }
             (table(&head, &rows, None))
         }
     }
 }
 
+/// What stands behind the title of a table of one load.
+pub(super) fn under(load: Option<&str>) -> String {
+    load.map_or(String::new(), |load| format!(", under the load {load}"))
+}
+
 /// How far every region goes into its curve; nothing where all is linear.
-pub(super) fn saturation(saturation: Option<&SaturationResult>) -> Markup {
+pub(super) fn saturation(saturation: Option<&SaturationResult>, load: Option<&str>) -> Markup {
     let row = |region: &SaturatedRegion| {
         let tesla = |b: Option<f64>| b.map_or("–".to_owned(), |b| number(b, 4));
         vec![
@@ -85,7 +90,7 @@ pub(super) fn saturation(saturation: Option<&SaturationResult>) -> Markup {
     ];
     html! {
         @if let Some(saturation) = saturation {
-            h3 { "Saturation" }
+            h3 { "Saturation" (under(load)) }
             (table(&head, &saturation.regions.iter().map(row).collect::<Vec<_>>(), None))
             (note(&format!(
                 "Newton's method took {} steps. Beyond the knee the differential permeability is below a tenth of its largest.",

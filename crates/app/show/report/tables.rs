@@ -109,29 +109,69 @@ pub(super) fn evaluations(data: &RunData) -> Markup {
     }
 }
 
-/// Losses and probes of a field, at its frequency [Hz].
-type State<'a> = (f64, &'a BTreeMap<String, f64>, &'a [ProbeResult]);
+/// What depends on the state, and the words that tell the state from others: its load, else its frequency.
+struct State<'a> {
+    words: String,
+    frequency: f64,
+    load: Option<&'a str>,
+    losses: &'a BTreeMap<String, f64>,
+    probes: &'a [ProbeResult],
+}
 
-/// What the result says of a frequency of the initial design; `None` for an analysis.
-fn initial_of(result: &RunResult, frequency: f64) -> Option<&StateResult> {
-    result.initial.iter().find(|state| state.frequency_hz == frequency)
+impl<'a> State<'a> {
+    /// The states of a result, at least one.
+    fn all(result: &'a RunResult) -> Vec<Self> {
+        if result.states.is_empty() {
+            let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
+            let load = result.loads.first().map(String::as_str);
+            let (losses, probes) = (&result.losses_w, result.probes.as_slice());
+            return vec![Self { words: words_of(load, frequency), frequency, load, losses, probes }];
+        }
+        let of = |state: &'a StateResult| Self {
+            words: words_of(state.load.as_deref(), state.frequency_hz),
+            frequency: state.frequency_hz,
+            load: state.load.as_deref(),
+            losses: &state.losses_w,
+            probes: &state.probes,
+        };
+        result.states.iter().map(of).collect()
+    }
+
+    /// The same state of the initial design; `None` for an analysis.
+    fn initial<'r>(&self, result: &'r RunResult) -> Option<&'r StateResult> {
+        let is_same =
+            |other: &&StateResult| other.frequency_hz == self.frequency && other.load.as_deref() == self.load;
+        result.initial.iter().find(is_same)
+    }
+}
+
+/// A load, or a frequency.
+pub(super) fn words_of(load: Option<&str>, frequency: f64) -> String {
+    load.map_or_else(|| hertz(frequency), str::to_owned)
+}
+
+/// What the column of a state is headed with.
+fn head_of_state(result: &RunResult) -> &'static str {
+    if result.loads.is_empty() { "frequency" } else { "load" }
 }
 
 /// What the result says beside the objective: constraints and terms of the objective, losses and probes.
 pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
-    let states: Vec<State<'_>> = if result.states.is_empty() {
-        let frequency = result.frequencies_hz.first().copied().unwrap_or(data.config.analysis.frequency());
-        vec![(frequency, &result.losses_w, &result.probes)]
-    } else {
-        result.states.iter().map(|s| (s.frequency_hz, &s.losses_w, s.probes.as_slice())).collect()
-    };
+    let states = State::all(result);
     html! {
         (constraints(&result.constraints, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (circuits(result))
         (losses(result, &states))
-        (iron::forces(&result.forces))
-        (iron::saturation(result.saturation.as_ref()))
+        @if result.loads.len() > 1 {
+            @for state in &result.states {
+                (iron::forces(&state.forces, state.load.as_deref()))
+                (iron::saturation(state.saturation.as_ref(), state.load.as_deref()))
+            }
+        } @else {
+            (iron::forces(&result.forces, None))
+            (iron::saturation(result.saturation.as_ref(), None))
+        }
         (probes(result, &states))
     }
 }
@@ -177,41 +217,45 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
                 (None, []) => "whole mesh".to_owned(),
                 (None, coils) => coils.join(", "),
             },
-            t.frequency.map_or("all".to_owned(), hertz),
+            match (&t.load, t.frequency) {
+                (Some(load), _) => load.clone(),
+                (None, frequency) => frequency.map_or("all".to_owned(), hertz),
+            },
             trim_zeros(t.weight, 6),
             format!("{} {}", number(t.value, 6), unit(&t.kind)),
             number(t.weight * t.value, 6),
         ]
     };
     let rows: Vec<Vec<String>> = terms.iter().map(row).collect();
-    let head = ["term", "region", "frequency", "weight", "value", "weighted"];
+    let has_loads = terms.iter().any(|term| term.load.is_some());
+    let state = if has_loads { "load" } else { "frequency" };
+    let head = ["term", "region", state, "weight", "value", "weighted"];
     titled_table("Terms of the objective at the best design", &head, &rows, MOST_ROWS)
 }
 
 fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
-    let row = |frequency: f64, (region, loss): (&String, &f64)| {
-        let before = initial_of(result, frequency).and_then(|state| state.losses_w.get(region));
+    let row = |state: &State<'_>, (region, loss): (&String, &f64)| {
+        let before = state.initial(result).and_then(|initial| initial.losses_w.get(region));
         let before = before.map_or(String::new(), |before| number(*before, 5));
-        vec![region.clone(), hertz(frequency), before, number(*loss, 5)]
+        vec![region.clone(), state.words.clone(), before, number(*loss, 5)]
     };
     let rows: Vec<Vec<String>> =
-        states.iter().flat_map(|(f, losses, _)| losses.iter().map(|entry| row(*f, entry))).collect();
-    let head = ["region", "frequency", "initial [W]", "loss [W]"];
+        states.iter().flat_map(|state| state.losses.iter().map(|entry| row(state, entry))).collect();
+    let head = ["region", head_of_state(result), "initial [W]", "loss [W]"];
     titled_table("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
 }
 
 fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
-    let before = |frequency: f64, probe: &ProbeResult| {
-        initial_of(result, frequency)?.probes.iter().find(|initial| initial.name == probe.name)
+    let of = |state: &State<'_>| {
+        let initial = state.initial(result);
+        let before = |probe: &ProbeResult| initial?.probes.iter().find(|initial| initial.name == probe.name);
+        state.probes.iter().flat_map(|probe| rows_of(state, probe, before(probe))).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<String>> = states
-        .iter()
-        .flat_map(|(f, _, probes)| probes.iter().flat_map(|probe| rows_of(*f, probe, before(*f, probe))))
-        .collect();
+    let rows: Vec<Vec<String>> = states.iter().flat_map(of).collect();
     let head = [
         "probe",
         "x, y, z [mm]",
-        "frequency",
+        head_of_state(result),
         "initial |B| [mT]",
         "|B| [mT]",
         "Bx [mT]",
@@ -232,17 +276,17 @@ fn magnitude(probe: &ProbeResult, k: usize) -> Option<f64> {
 }
 
 /// The rows of one probe, with its field at the initial design.
-fn rows_of(frequency: f64, probe: &ProbeResult, initial: Option<&ProbeResult>) -> Vec<Vec<String>> {
+fn rows_of(state: &State<'_>, probe: &ProbeResult, initial: Option<&ProbeResult>) -> Vec<Vec<String>> {
     // A file may be cut short.
     let count = probe.points_m.len().min(probe.b_re_t.len()).min(probe.b_im_t.len());
     let component = |re: f64, im: f64| {
         let real = number(1e3 * re, 3);
         let sign = if im < 0.0 { "−" } else { "+" };
-        if frequency == 0.0 { real } else { format!("{real} {sign} {} j", number(1e3 * im.abs(), 3)) }
+        if state.frequency == 0.0 { real } else { format!("{real} {sign} {} j", number(1e3 * im.abs(), 3)) }
     };
     let row = |k: usize| {
         let place = probe.points_m[k].map(|c| trim_zeros(1e3 * c, 2)).join(", ");
-        let mut cells = vec![probe.name.clone(), place, hertz(frequency)];
+        let mut cells = vec![probe.name.clone(), place, state.words.clone()];
         let millitesla = |size: Option<f64>| size.map_or(String::new(), |size| number(1e3 * size, 4));
         cells.push(millitesla(initial.and_then(|initial| magnitude(initial, k))));
         if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {

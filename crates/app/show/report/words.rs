@@ -25,7 +25,11 @@ pub(super) fn objective(config: &Config) -> Option<String> {
         (Combination::Sum, _) => format!("{goal} {}", terms.join(", plus ")),
         (Combination::WorstCase, goal_word) => {
             let worst = if goal_word == Goal::Minimise { "largest" } else { "least" };
-            let where_from = if config.analysis.frequencies().len() > 1 { " and frequency" } else { "" };
+            let where_from = match config.load_cases().len() {
+                1 => "",
+                _ if config.loads.is_empty() => " and frequency",
+                _ => " and load",
+            };
             format!("{goal} the {worst}, by term{where_from}, of {}", terms.join(", and "))
         }
     })
@@ -63,9 +67,10 @@ pub(super) fn functional(functional: &Functional) -> String {
         }
         kind => format!("the {} of {}", kind.name().replace('_', " "), coils(functional)),
     };
-    match functional.frequency {
-        Some(frequency) => format!("{what} at {} Hz", trim_zeros(frequency, 6)),
-        None => what,
+    match (functional.frequency, &functional.load) {
+        (_, Some(load)) => format!("{what} under the load {load}"),
+        (Some(frequency), None) => format!("{what} at {} Hz", trim_zeros(frequency, 6)),
+        (None, None) => what,
     }
 }
 
@@ -84,12 +89,17 @@ fn along(functional: &Functional) -> String {
     functional.direction.unwrap_or_default().map(|c| trim_zeros(c, 3)).join(", ")
 }
 
-/// The frequencies.
+/// The frequencies and loads.
 pub(super) fn frequencies(config: &Config) -> String {
-    match config.analysis.frequencies() {
+    let text = match config.frequencies().as_slice() {
         [0.0] => "in a static field".to_owned(),
         all => format!("at {} Hz", all.iter().map(|f| trim_zeros(*f, 6)).collect::<Vec<_>>().join(", ")),
+    };
+    if config.loads.is_empty() {
+        return text;
     }
+    let loads: Vec<&str> = config.loads.iter().map(|load| load.name.as_str()).collect();
+    format!("{text} under the loads {}", loads.join(", "))
 }
 
 /// What moves, which way and how far, with so many variables.

@@ -25,7 +25,7 @@ pub struct Record {
     pub members: Vec<(f64, Vec<f64>)>,
     /// [`reference_hash`] of the round's reference mesh.
     pub reference: String,
-    /// The method of the linear solver that worked last, by state; `None` where it is the first one.
+    /// The method of the linear solver that worked last, by matrix; `None` where it is the first one.
     #[serde(with = "method_names")]
     pub methods: Vec<Option<Method>>,
     /// Largest relative residual of its linear solves.

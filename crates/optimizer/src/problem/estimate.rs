@@ -65,15 +65,14 @@ impl Problem {
             by_element: vec![0.0; analysis.mesh.topology().tets().len()],
             iterations: 0,
         };
-        let mut harmonic: Option<FieldModel> = None;
+        // One in statics, one above 0 Hz: the others share what is large of these.
+        let mut known: [Option<FieldModel>; 2] = [None, None];
         for (index, coarse) in self.states().iter().enumerate() {
-            let fine = match &harmonic {
-                Some(model) => model.at_frequency(&analysis.mesh, coarse.setup().frequency)?,
-                None => coarse.enriched(&analysis.mesh, effort)?,
+            let known = &mut known[usize::from(coarse.angular_frequency() > 0.0)];
+            let fine = match known {
+                Some(model) => model.at_load_case(&analysis.mesh, &coarse.load_case())?,
+                None => known.insert(coarse.enriched(&analysis.mesh, effort)?).clone(),
             };
-            if fine.angular_frequency() > 0.0 {
-                harmonic = Some(fine.clone());
-            }
             let mut state = State {
                 coarse,
                 enriched: Enrichment::new(coarse, fine, &analysis.mesh, &analysis.solutions[index])?,

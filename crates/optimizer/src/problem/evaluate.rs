@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::linear::{LinearSolverCache, SolverEvent};
+use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
@@ -194,24 +194,74 @@ impl Problem {
             objective: groups.iter().map(|group| AdjointAccumulator::new(group.len(), nodes)).collect(),
             constrained: fields.iter().map(|_| AdjointAccumulator::new(1, nodes)).collect(),
             fields,
-            solutions: Vec::with_capacity(self.states.len()),
+            solutions: Vec::new(),
             events: Vec::new(),
         };
-        for (index, model) in self.states.iter().enumerate() {
-            let mut solved = solve_state(index, model, work, cache)?;
-            for (sum, group) in sums.objective.iter_mut().zip(&groups) {
-                sum.add("the objective", work, &mut solved, group, shape)?;
+        let mut solutions: Vec<Option<FieldSolution>> = self.states.iter().map(|_| None).collect();
+        for (matrix, members) in self.matrices().iter().enumerate() {
+            let mut earlier: Option<(PreparedSystem, usize)> = None;
+            for &index in members {
+                let shared = earlier.take().and_then(|(system, k)| Some((system, solutions[k].as_ref()?)));
+                let mut solved = self.solve_state(index, matrix, shared, work, cache)?;
+                for (sum, group) in sums.objective.iter_mut().zip(&groups) {
+                    sum.add("the objective", work, &mut solved, group, shape)?;
+                }
+                for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
+                    let name = format!("the constraint `{}`", self.constraints[*k].name);
+                    sum.add(&name, work, &mut solved, &[(0, *term)], shape)?;
+                }
+                let Solved { system, state, .. } = solved;
+                solutions[index] = Some(state);
+                earlier = Some((system, index));
             }
-            for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
-                let name = format!("the constraint `{}`", self.constraints[*k].name);
-                sum.add(&name, work, &mut solved, &[(0, *term)], shape)?;
-            }
-            let Solved { system, state, .. } = solved;
+            let (system, _) = earlier.expect("a matrix has a state");
             sums.events.extend_from_slice(system.events());
-            cache.keep(index, system);
-            sums.solutions.push(state);
+            cache.keep(matrix, system);
         }
+        sums.solutions = solutions.into_iter().flatten().collect();
         Ok(sums)
+    }
+
+    /// Solves a state: with the system of another one of the same matrix, which is `shared` with that state, or with one of its
+    /// own. The cache is that of the matrix.
+    fn solve_state<'a>(
+        &'a self,
+        index: usize,
+        matrix: usize,
+        shared: Option<(PreparedSystem, &FieldSolution)>,
+        work: &mut Work<'_>,
+        cache: &mut SolverCache,
+    ) -> Result<Solved<'a>, Error> {
+        let model = &self.states[index];
+        let (system, state) = match shared {
+            None if model.is_linear() => solve_linear(model, cache.of_matrix(matrix), work)?,
+            None => {
+                let method = cache.of_matrix(matrix).method();
+                solve_nonlinear(model, (method, cache.start(index)), work)?
+            }
+            Some((system, other)) => {
+                let mut clock = Stopwatch::start();
+                let system = model.take_over(system).map_err(finite::of_field("the state", model))?;
+                work.timings.factor += clock.lap();
+                let (system, state) = solve_right_side(model, system, work)?;
+                (system, state.with_responses_of(other))
+            }
+        };
+        finite::state(model, work.mesh, &state)?;
+        work.report.include(&state);
+        Ok(Solved { index, model, system, state })
+    }
+
+    /// The states by their matrices: lists of those that share one, each ascending, in the order of their first.
+    pub(crate) fn matrices(&self) -> Vec<Vec<usize>> {
+        let mut matrices: Vec<Vec<usize>> = Vec::new();
+        for (index, model) in self.states.iter().enumerate() {
+            match matrices.iter_mut().find(|states| self.states[states[0]].shares_matrix_with(model)) {
+                Some(states) => states.push(index),
+                None => matrices.push(vec![index]),
+            }
+        }
+        matrices
     }
 
     /// Whether the objective is the worst of its terms.
@@ -277,50 +327,52 @@ impl Problem {
     }
 }
 
-/// Assembles, factors and solves a state.
-fn solve_state<'a>(
-    index: usize,
-    model: &'a FieldModel,
+/// Assembles, factors and solves a linear state.
+fn solve_linear(
+    model: &FieldModel,
+    cache: &mut LinearSolverCache,
     work: &mut Work<'_>,
-    cache: &mut SolverCache,
-) -> Result<Solved<'a>, Error> {
-    if !model.is_linear() {
-        return solve_nonlinear_state(index, model, work, cache);
-    }
+) -> Result<(PreparedSystem, FieldSolution), Error> {
     let mut clock = Stopwatch::start();
     work.progress.stage(Stage::Assembling);
-    let (matrix, load) = (model.assembled(work.mesh), model.load(work.mesh));
+    let matrix = model.assembled(work.mesh);
     work.timings.assembly += clock.lap();
-    let named = || finite::of_field("the state", model);
     work.progress.stage(Stage::Factoring);
-    let mut system = model.prepare_with(matrix, cache.of_state(index)).map_err(named())?;
+    let system = model.prepare_with(matrix, cache).map_err(finite::of_field("the state", model))?;
     work.timings.factor += clock.lap();
+    solve_right_side(model, system, work)
+}
+
+/// Solves a linear state with its system.
+fn solve_right_side(
+    model: &FieldModel,
+    mut system: PreparedSystem,
+    work: &mut Work<'_>,
+) -> Result<(PreparedSystem, FieldSolution), Error> {
+    let mut clock = Stopwatch::start();
+    let load = model.load(work.mesh);
+    work.timings.assembly += clock.lap();
     work.progress.stage(Stage::State);
-    let state = model.solve_prepared(&mut system, &load).map_err(named())?;
-    finite::state(model, work.mesh, &state)?;
-    work.report.include(&state);
+    let solved = model.solve_prepared(&mut system, &load);
+    let state = solved.map_err(finite::of_field("the state", model))?;
     work.timings.state += clock.lap();
-    Ok(Solved { index, model, system, state })
+    Ok((system, state))
 }
 
 /// Solves a state with B–H laws; its factors count as part of the state.
-fn solve_nonlinear_state<'a>(
-    index: usize,
-    model: &'a FieldModel,
+fn solve_nonlinear(
+    model: &FieldModel,
+    (method, start): (Option<Method>, Option<&[c64]>),
     work: &mut Work<'_>,
-    cache: &mut SolverCache,
-) -> Result<Solved<'a>, Error> {
+) -> Result<(PreparedSystem, FieldSolution), Error> {
     let mut clock = Stopwatch::start();
     work.progress.stage(Stage::State);
     let progress = &mut *work.progress;
-    let method = LinearSolverCache::with_method(cache.of_state(index).method());
-    let begin = (&method, cache.start(index));
+    let begin = (&LinearSolverCache::with_method(method), start);
     let solved = model.solve_nonlinear(work.mesh, begin, &mut |newton| progress.newton(newton));
     let (state, system) = solved.map_err(finite::of_field("the state", model))?;
-    finite::state(model, work.mesh, &state)?;
-    work.report.include(&state);
     work.timings.state += clock.lap();
-    Ok(Solved { index, model, system, state })
+    Ok((system, state))
 }
 
 /// dF/dx with the components zeroed that cannot move.

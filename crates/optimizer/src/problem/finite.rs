@@ -23,9 +23,13 @@ const SUM: &str = "expected a finite number; check weights, currents and units";
 
 /// `the state at 60 Hz`, or another problem there.
 pub(crate) fn problem_name(what: &str, model: &FieldModel) -> String {
-    match model.setup().frequency {
+    let problem = match model.setup().frequency {
         0.0 => format!("{what} of the static field"),
         frequency => format!("{what} at {frequency} Hz"),
+    };
+    match &model.setup().load_case {
+        Some(name) => format!("{problem} under the load `{name}`"),
+        None => problem,
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. Within a round the
 //! reference mesh and the elastic factor are fixed, so `F(p)` is one function and not a path; [`Shape::motion`] holds the
-//! round. A problem owns one state a frequency; the objective costs one adjoint solve a state whatever the number of its
+//! round. A problem owns one state a load case; the objective costs one adjoint solve a state whatever the number of its
 //! terms, each constraint of the field another.
 //!
 //! Here: what is moved and solved (`mod`, `shape`), one evaluation (`evaluate`) with its sums (`adjoint_accumulator`) and
@@ -56,7 +56,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A field problem on the undeformed mesh `original`, with one state a frequency; without a shape nothing moves, and
+    /// A field problem on the undeformed mesh `original`, with one state a load case; without a shape nothing moves, and
     /// no constraint has a meaning.
     ///
     /// # Panics
@@ -111,7 +111,7 @@ impl Problem {
         &self.original
     }
 
-    /// One field problem per state, in the order of the analysis' frequencies; at least one.
+    /// One field problem per state, in the order of the load cases; at least one.
     pub fn states(&self) -> &[FieldModel] {
         &self.states
     }

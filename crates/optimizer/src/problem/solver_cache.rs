@@ -5,12 +5,12 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem};
 
-/// Factors and solutions of the design before, by state.
+/// Factors and solutions of the design before, by matrix: states that share one share them.
 ///
 /// What an evaluation computes depends on its cache only within the tolerance of the linear solver.
 #[derive(Debug, Default)]
 pub struct SolverCache {
-    states: Vec<LinearSolverCache>,
+    matrices: Vec<LinearSolverCache>,
     anchor: Option<Anchor>,
 }
 
@@ -23,21 +23,21 @@ struct Anchor {
 }
 
 impl SolverCache {
-    /// The cache of a state; of one without any, what another frequency of the same design offers.
-    pub(super) fn of_state(&mut self, index: usize) -> &mut LinearSolverCache {
-        while self.states.len() <= index {
-            let other = self.states.last().map(LinearSolverCache::without_initial_guess);
-            self.states.push(other.unwrap_or_default());
+    /// The cache of a matrix; of one without any, what another frequency of the same design offers.
+    pub(super) fn of_matrix(&mut self, index: usize) -> &mut LinearSolverCache {
+        while self.matrices.len() <= index {
+            let other = self.matrices.last().map(LinearSolverCache::without_initial_guess);
+            self.matrices.push(other.unwrap_or_default());
         }
-        &mut self.states[index]
+        &mut self.matrices[index]
     }
 
     /// What may serve other designs as well: the factors, without solutions to start from.
     ///
     /// With it an evaluation is a smooth function of the design, as differences need.
     pub fn without_initial_guess(&self) -> Self {
-        let states = self.states.iter().map(LinearSolverCache::without_initial_guess).collect();
-        Self { states, anchor: self.anchor.clone() }
+        let matrices = self.matrices.iter().map(LinearSolverCache::without_initial_guess).collect();
+        Self { matrices, anchor: self.anchor.clone() }
     }
 
     /// Whether the states on this mesh are those that others begin with.
@@ -60,19 +60,19 @@ impl SolverCache {
         self.anchor.as_ref()?.states.get(index)?.as_deref()
     }
 
-    /// The methods that worked last, by state; `None` where it is the first one tried.
+    /// The methods that worked last, by matrix; `None` where it is the first one tried.
     pub fn methods(&self) -> Vec<Option<Method>> {
-        self.states.iter().map(LinearSolverCache::method).collect()
+        self.matrices.iter().map(LinearSolverCache::method).collect()
     }
 
-    /// A cache of nothing but methods, by state.
+    /// A cache of nothing but methods, by matrix.
     pub fn with_methods(methods: &[Option<Method>]) -> Self {
-        let states = methods.iter().map(|&method| LinearSolverCache::with_method(method)).collect();
-        Self { states, anchor: None }
+        let matrices = methods.iter().map(|&method| LinearSolverCache::with_method(method)).collect();
+        Self { matrices, anchor: None }
     }
 
     /// Keeps what a solved system leaves.
     pub(super) fn keep(&mut self, index: usize, system: PreparedSystem) {
-        *self.of_state(index) = system.into_cache();
+        *self.of_matrix(index) = system.into_cache();
     }
 }

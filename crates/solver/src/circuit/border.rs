@@ -3,6 +3,7 @@
 //! With `F = −c` of a solid conductor and `y` for `U` and `I` the system is `K u − F y = f`, `Fᵀu + D y = r`: see the modules
 //! above for its entries. `W = K⁻¹F`, and `(FᵀW + D) y = r − FᵀK⁻¹f`.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
@@ -28,7 +29,8 @@ pub(crate) struct Border {
 }
 
 impl Border {
-    /// Solves for 1 Wb and 1 A in each; `None` where there is neither solid conductor nor driven current.
+    /// Solves for 1 Wb and 1 A in each, but for those that `earlier`, of the same matrix, has; `None` where there is neither solid
+    /// conductor nor driven current.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
@@ -36,19 +38,25 @@ impl Border {
         windings: &Arc<Windings>,
         solids: SolidRows,
         angular_frequency: f64,
+        earlier: Option<Self>,
         solve: &mut Solve<'_>,
     ) -> Result<Option<Self>, SolverError> {
         let is_driven = windings.with_source().next().is_some();
         if angular_frequency == 0.0 || solids.count() == 0 && !is_driven {
             return Ok(None);
         }
-        let mut respond = |load: &[c64]| Ok(solve(load)?.0);
-        let mut responses: Vec<Vec<c64>> =
-            solids.loads.iter().map(|load| respond(load)).collect::<Result<_, SolverError>>()?;
+        let (mut of_solids, mut of_coils) = earlier.map(Self::into_responses).unwrap_or_default();
+        let mut respond = |load: &[c64]| Ok::<_, SolverError>(solve(load)?.0);
+        of_solids.truncate(solids.count());
+        for load in solids.loads.iter().skip(of_solids.len()) {
+            of_solids.push(respond(load)?);
+        }
+        let mut responses = of_solids;
         for (driven, _) in windings.with_source() {
-            responses.push(match &driven.solid {
-                Some(_) => Vec::new(),
-                None => respond(&driven.load)?,
+            responses.push(match (&driven.solid, of_coils.remove(&driven.coil)) {
+                (Some(_), _) => Vec::new(),
+                (None, Some(response)) => response,
+                (None, None) => respond(&driven.load)?,
             });
         }
         let border =
@@ -75,6 +83,13 @@ impl Border {
             }
         }
         schur
+    }
+
+    /// The responses of solid conductors, and those of coils by their places.
+    fn into_responses(self) -> (Vec<Vec<c64>>, BTreeMap<usize, Vec<c64>>) {
+        let Self { windings, solids, responses: mut of_solids, .. } = self;
+        let of_coils = of_solids.split_off(solids.count());
+        (of_solids, windings.with_source().map(|(driven, _)| driven.coil).zip(of_coils).collect())
     }
 
     /// `F` of every unknown, as far as it is in the field's equations.

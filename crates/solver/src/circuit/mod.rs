@@ -18,6 +18,7 @@ pub(crate) mod solids;
 mod terminals;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh};
@@ -60,22 +61,22 @@ impl Winding {
 }
 
 /// The loads of 1 A in each coil that has a winding.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Windings {
     coils: Vec<Driven>,
 }
 
 /// A winding with its load.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Driven {
     /// Place of its coil in the model.
     coil: usize,
     winding: Winding,
     /// Of a solid conductor above 0 Hz, its segments by their numbers: it is in the field, and no source.
     solid: Option<Range<usize>>,
-    sources: Sources,
+    sources: Arc<Sources>,
     /// `F` [m per unit of a test function]; of a solid conductor 1 in its own rows behind those of the field.
-    load: Vec<c64>,
+    load: Arc<Vec<c64>>,
 }
 
 impl Driven {
@@ -108,11 +109,20 @@ impl Windings {
                     load.resize(load.len() + segments.start, c64::default());
                     load.resize(load.len() + segments.len(), c64::from(1.0));
                 }
-                Driven { coil, winding, solid, sources, load }
+                Driven { coil, winding, solid, sources: Arc::new(sources), load: Arc::new(load) }
             }))
         };
         let coils = windings.iter().enumerate().filter_map(of).collect::<Result<_, _>>()?;
         Ok(Self { coils })
+    }
+
+    /// The same with other voltages, by the place of the coil; the loads are shared.
+    pub(crate) fn driven_as(&self, windings: &[Option<Winding>]) -> Self {
+        let of = |driven: &Driven| {
+            let winding = windings.get(driven.coil).copied().flatten().unwrap_or(driven.winding);
+            Driven { winding, ..driven.clone() }
+        };
+        Self { coils: self.coils.iter().map(of).collect() }
     }
 
     /// Elements that a coil with a winding meets: these must not move.
@@ -123,6 +133,11 @@ impl Windings {
     /// Whether a voltage or the current of a solid conductor excites a field.
     pub(crate) fn is_driven(&self, coils: &[Coil]) -> bool {
         self.with_source().next().is_some() || self.solid_currents(coils).any(|i| i != c64::default())
+    }
+
+    /// How many coils have a winding.
+    pub(crate) fn count(&self) -> usize {
+        self.coils.len()
     }
 
     /// The winding at a place.
@@ -149,7 +164,7 @@ impl Windings {
     /// Adds the loads of currents [A] in the voltage-driven coils to one of the field.
     pub(crate) fn add_driven_load(&self, currents: &[c64], load: &mut [c64]) {
         for ((driven, _), current) in self.with_source().zip(currents) {
-            load.iter_mut().zip(&driven.load).for_each(|(sum, own)| *sum += current * own);
+            load.iter_mut().zip(driven.load.iter()).for_each(|(sum, own)| *sum += current * own);
         }
     }
 

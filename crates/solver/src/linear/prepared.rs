@@ -1,5 +1,7 @@
 //! A system ready to be solved with, wherever its matrix is.
 
+use std::sync::Arc;
+
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use super::cache::LinearSolverCache;
@@ -7,7 +9,7 @@ use super::distributed::DistributedSystem;
 use super::method::Method;
 use super::report::LinearSolverReport;
 use super::system::{LocalSystem, SolverEvent};
-use crate::circuit::{Border, Excitation};
+use crate::circuit::{Border, Excitation, Windings};
 use crate::error::SolverError;
 
 /// The field's matrix ready to be solved with, wherever it is.
@@ -59,6 +61,20 @@ impl PreparedSystem {
     /// The same with a derivative that the matrix is nearest to.
     pub(crate) fn with_tangent(self, tangent: impl RealLinear + 'static) -> Self {
         Self { tangent: Some(Box::new(tangent)), ..self }
+    }
+
+    /// The same with the circuits of another problem with this matrix, which has no derivative of its own.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub(crate) fn bordered_anew(
+        self,
+        windings: &Arc<Windings>,
+        angular_frequency: f64,
+    ) -> Result<Self, SolverError> {
+        let Self { field, border, .. } = self;
+        let solids = border.as_ref().map(|border| border.solids().clone()).unwrap_or_default();
+        Self::new(field, |solve| Border::new(windings, solids, angular_frequency, border, solve))
     }
 
     /// The field's matrix alone.

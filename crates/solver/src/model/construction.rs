@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::tet4::Point;
 
 use super::{FieldModel, SharedParts};
 use crate::circuit::{self, Solids, Windings, solids};
@@ -13,6 +12,7 @@ use crate::distributed::{Distributed, Follower};
 use crate::error::SolverError;
 use crate::linear::{FieldKind, SystemAnalysis, SystemPattern};
 use crate::load::Sources;
+use crate::load_case::LoadCase;
 use crate::setup::{self, FieldModelSetup};
 use crate::weak_form::WeakForm;
 
@@ -37,19 +37,12 @@ impl FieldModel {
             None => Some(SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?),
             Some(_) => None,
         };
-        let magnetisation: Vec<Point> = setup
-            .remanence
-            .iter()
-            .zip(&setup.materials)
-            .map(|(b, m)| b.map(|b| m.reluctivity() * b))
-            .collect();
         let of_coils =
             circuit::windings(mesh, &setup.coils, &setup.windings, &setup.materials, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
-        let sources = Sources::new(mesh, &given, &magnetisation)?;
+        let sources = Sources::new(mesh, &given, &setup.magnetisation())?;
         let solids = Solids::new(&setup.coils, &fine.space, angular_frequency);
         let windings = Windings::new(mesh, &setup.coils, &of_coils, (&fine.space, &fine.unknowns, &solids))?;
-        let windings = Arc::new(windings);
         setup::check_coils(mesh, &setup)?;
         let conductors = weak_form.conductors();
         solids::check(mesh, &setup.coils, &conductors, &setup.boundaries)?;
@@ -61,39 +54,61 @@ impl FieldModel {
         if let Some(shell) = weak_form.shell() {
             setup::check_open(shell, mesh, &setup, sources.fixed_elements())?;
         }
-        let shared =
-            Arc::new(SharedParts { fine, sources, solids, windings, analysis: analysis.map(Arc::new) });
-        Ok(Self::whole(setup, (angular_frequency, weak_form), shared))
+        let shared = Arc::new(SharedParts { fine, solids, analysis: analysis.map(Arc::new) });
+        let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
+        let (sources, windings) = (Arc::new(sources), Arc::new(windings));
+        let model =
+            Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed: None };
+        Ok(model.distributed_over_ranks())
     }
 
-    /// The model, distributed where it has ranks.
-    fn whole(
-        setup: FieldModelSetup,
-        (angular_frequency, weak_form): (f64, WeakForm),
-        shared: Arc<SharedParts>,
-    ) -> Self {
-        let setup = Arc::new(setup);
-        let weak_form = Arc::new(weak_form);
-        let mut model = Self { setup, angular_frequency, weak_form, shared, distributed: None };
-        if let Some((ownership, settings)) = &model.setup.ownership {
-            let follower = Follower::new(model.clone(), ownership.clone(), settings);
-            model.distributed = Some(Arc::new(Distributed::new(&ownership.group, Box::new(follower))));
+    /// The same, distributed where it has ranks and is not yet.
+    fn distributed_over_ranks(mut self) -> Self {
+        if let (Some((ownership, settings)), None) = (&self.setup.ownership, &self.distributed) {
+            let follower = Follower::new(self.clone(), ownership.clone(), settings);
+            self.distributed = Some(Arc::new(Distributed::new(&ownership.group, Box::new(follower))));
         }
-        model
+        self
     }
 
-    /// The same problem at another frequency [Hz]; between frequencies above zero, equation numbers, pattern, symbolic
-    /// factor and coil integrals are shared.
+    /// The same problem under another load case. Equation numbers, pattern, symbolic factor and the loads of 1 A are shared
+    /// between frequencies above zero and between load cases in statics; the matrix too between those of one frequency.
     ///
     /// # Errors
     /// As [`FieldModel::new`].
-    pub fn at_frequency(&self, mesh: &Mesh, frequency: f64) -> Result<Self, SolverError> {
-        let setup = FieldModelSetup { frequency, ..(*self.setup).clone() };
-        if frequency == 0.0 || self.angular_frequency == 0.0 {
+    pub fn at_load_case(&self, mesh: &Mesh, load_case: &LoadCase) -> Result<Self, SolverError> {
+        let setup = load_case.applied_to(&self.setup);
+        if (setup.frequency == 0.0) != (self.angular_frequency == 0.0) {
             return Self::new(mesh, setup);
         }
-        let weak_form = Self::form_of(mesh, &setup)?;
-        Ok(Self::whole(setup, weak_form, Arc::clone(&self.shared)))
+        let has_same_matrix = setup.frequency == self.setup.frequency;
+        let (angular_frequency, weak_form) = if has_same_matrix {
+            setup::check(mesh, &setup)?;
+            (self.angular_frequency, Arc::clone(&self.weak_form))
+        } else {
+            let (angular_frequency, weak_form) = Self::form_of(mesh, &setup)?;
+            (angular_frequency, Arc::new(weak_form))
+        };
+        let of_coils = |setup: &FieldModelSetup, angular_frequency: f64| {
+            circuit::windings(mesh, &setup.coils, &setup.windings, &setup.materials, angular_frequency)
+        };
+        let own = of_coils(&self.setup, self.angular_frequency)?;
+        let own = circuit::given_currents(&self.setup.coils, &own, self.angular_frequency);
+        let of_coils = of_coils(&setup, angular_frequency)?;
+        let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
+        let sources = if given == own {
+            Arc::clone(&self.sources)
+        } else {
+            Arc::new(Sources::new(mesh, &given, &setup.magnetisation())?)
+        };
+        if let Some(shell) = weak_form.shell() {
+            setup::check_open(shell, mesh, &setup, sources.fixed_elements())?;
+        }
+        let windings = Arc::new(self.windings.driven_as(&of_coils));
+        let distributed = self.distributed.clone().filter(|_| has_same_matrix);
+        let (setup, shared) = (Arc::new(setup), Arc::clone(&self.shared));
+        let model = Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed };
+        Ok(model.distributed_over_ranks())
     }
 
     /// Checks a set-up; `ω` [rad/s] and the weak form.

@@ -40,17 +40,17 @@ pub struct FieldModel {
     angular_frequency: f64,
     weak_form: Arc<WeakForm>,
     shared: Arc<SharedParts>,
+    sources: Arc<Sources>,
+    windings: Arc<Windings>,
     /// Where the problem is distributed over ranks.
     distributed: Option<Arc<Distributed>>,
 }
 
-/// What all frequencies above zero have in common.
+/// What all frequencies above zero have in common, and all load cases.
 #[derive(Debug)]
 struct SharedParts {
     fine: Discretisation,
-    sources: Sources,
     solids: Solids,
-    windings: Arc<Windings>,
     /// Of one process.
     analysis: Option<Arc<SystemAnalysis>>,
 }
@@ -106,11 +106,11 @@ impl FieldModel {
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown, then the net current [A] of each
     /// solid conductor, zero where a voltage drives it.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
-        let SharedParts { fine, sources, windings, .. } = &*self.shared;
+        let fine = &self.shared.fine;
         let mut load = vec![c64::default(); fine.unknowns.dofs.count()];
-        sources.add_load(&fine.space, &fine.unknowns, mesh, &mut load);
+        self.sources.add_load(&fine.space, &fine.unknowns, mesh, &mut load);
         fine.lift(&self.weak_form, mesh, &mut load);
-        load.extend(windings.solid_currents(self.coils()));
+        load.extend(self.windings.solid_currents(self.coils()));
         load
     }
 
@@ -148,7 +148,7 @@ impl FieldModel {
             _ => panic!("a matrix belongs where its model is"),
         };
         let (windings, angular_frequency) = (self.windings(), self.angular_frequency);
-        PreparedSystem::new(field, |solve| Border::new(windings, solids, angular_frequency, solve))
+        PreparedSystem::new(field, |solve| Border::new(windings, solids, angular_frequency, None, solve))
     }
 
     /// What defines the problem.
@@ -225,18 +225,18 @@ impl FieldModel {
 
     /// Elements that a coil meets: these must not move.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.shared.sources.fixed_elements().chain(self.windings().fixed_elements())
+        self.sources.fixed_elements().chain(self.windings().fixed_elements())
     }
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
     pub fn is_unexcited(&self) -> bool {
-        self.shared.sources.is_empty()
+        self.sources.is_empty()
             && !self.windings().is_driven(self.coils())
             && self.unknowns().prescribed_carriers().next().is_none()
     }
 
     pub(crate) fn windings(&self) -> &Arc<Windings> {
-        &self.shared.windings
+        &self.windings
     }
 
     pub(crate) fn solids(&self) -> &Solids {
@@ -276,7 +276,7 @@ impl FieldModel {
         self.weak_form.coefficients_of(e)
     }
 
-    pub(crate) fn form(&self) -> &WeakForm {
+    pub(crate) fn form(&self) -> &Arc<WeakForm> {
         &self.weak_form
     }
 
@@ -285,6 +285,6 @@ impl FieldModel {
     }
 
     pub(crate) fn sources(&self) -> &Sources {
-        &self.shared.sources
+        &self.sources
     }
 }

@@ -7,6 +7,7 @@ use super::grading::{GROWTHS, REFINEMENTS};
 use crate::config::section::Section;
 use crate::config::table::table;
 use crate::config::tables::order::check_layers;
+use crate::config::value::LONGEST_LENGTH;
 
 table! {
     /// A solid or hollow sphere in a larger ball: the octant x, y, z ≥ 0, whose symmetry planes are the coordinate planes. All
@@ -31,7 +32,7 @@ table! {
         /// Radius of the cavity of a hollow sphere [m], less than `radius`. Default: the sphere is solid.
         inner_radius: Option<f64> = length(POSITIVE);
         /// Radius of the whole mesh [m], more than `radius`. Default: five times `radius`.
-        outer_radius: f64 = length(POSITIVE), else 5.0 * radius;
+        outer_radius: f64 = length(POSITIVE), else (5.0 * radius).min(LONGEST_LENGTH);
         /// Cells along an eighth of a great circle, and along the radius inside the layers.
         divisions: usize = integer(1, 1000) => SphereParameters::default().divisions;
         /// Depths of layers under the surface, or under both surfaces of a hollow sphere [m]: growing, less than the radius, or
