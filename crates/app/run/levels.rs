@@ -51,6 +51,29 @@ pub(super) struct Searched {
 }
 
 impl Levels {
+    /// An error bar beside the tolerance, in words.
+    fn compared(&self, design: &str, bar: f64) -> String {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        let (bar, tolerance) = (percent(bar), percent(self.tolerance));
+        format!("the error bar of the {design} design is {bar}, accuracy.tolerance {tolerance}")
+    }
+
+    /// Whether the mesh stays as it is with an error bar, which is reported with what was `said` of it.
+    fn is_over(&self, bar: f64, said: &str, observer: &mut dyn RunObserver) -> bool {
+        if bar <= self.tolerance {
+            observer.note(&format!("{said}: the mesh is fine enough"));
+            return true;
+        }
+        if self.made >= self.most {
+            observer.warning(&format!(
+                "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
+                 begin with a finer mesh",
+                self.most
+            ));
+        }
+        self.made >= self.most
+    }
+
     /// Those of a run that is begun or resumed; `None` without a tolerance.
     fn of(session: &Session<'_>) -> Result<Option<Self>, Error> {
         let accuracy = &session.config.accuracy;
@@ -209,22 +232,8 @@ impl Session<'_> {
             ));
             return Ok(false);
         };
-        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
-        let said = format!(
-            "the error bar of the {what} design is {}, accuracy.tolerance {}",
-            percent(bar),
-            percent(levels.tolerance)
-        );
-        if bar <= levels.tolerance {
-            observer.note(&format!("{said}: the mesh is fine enough"));
-            return Ok(false);
-        }
-        if levels.made >= levels.most {
-            observer.warning(&format!(
-                "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
-                 begin with a finer mesh",
-                levels.most
-            ));
+        let said = levels.compared(what, bar);
+        if levels.is_over(bar, &said, observer) {
             return Ok(false);
         }
         observer.phase("refining the mesh");
