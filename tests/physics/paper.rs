@@ -7,7 +7,8 @@
 use fluxmorph::build::Setup;
 use fluxmorph::config::Optimizer;
 use fluxmorph::files::{ObjectiveResult, StopReason};
-use fluxmorph::run::mesh_independence::{FreshMesh, MeshIndependence, ShapePair};
+use fluxmorph::run::mesh_independence::{FreshMesh, MeshIndependence};
+use fluxmorph::run::shape_pair::ShapePair;
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::memory_estimate::Sizes;

@@ -178,21 +178,8 @@ fn problem_on(
     group: Option<&RankGroup>,
     progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
-    // Regions without common nodes have no interface that a name could stand for: first things first.
-    source.check(soundness::contact_faults(config, source, &full_mesh))?;
-    check_names(config, source, &full_mesh, &warnings)?;
-    warnings.extend_from_slice(source.notices());
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
-    let mut open_patches = Vec::new();
-    if !motion_alone {
-        let outside =
-            soundness::outside(config, source, &full_mesh).map_err(|faults| source.error(faults))?;
-        warnings.extend(outside.warnings);
-        warnings.extend(soundness::unit_warning(config, &full_mesh));
-        warnings.extend(soundness::swap_warning(config, &full_mesh));
-        open_patches = outside.open;
-    }
-    warnings.extend(soundness::layer_warnings(config, &full_mesh));
+    let open_patches = look_at_mesh(config, source, &full_mesh, motion_alone, &mut warnings)?;
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
@@ -247,14 +234,16 @@ fn problem_on(
     }
     let objective = functional::objective(config, &mesh, &states)?;
     let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
-    let (mut shape, mut constraints) = (None, Vec::new());
-    if let (Some(inputs), Some(body)) = (&design, body) {
-        let observed = functional::fixed_elements(config, &mesh, &states)?;
-        progress.stage(Stage::Elasticity);
-        let built = shape::shape(inputs, config, body, &states, &observed)?;
-        constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &built)?;
-        shape = Some(built);
-    }
+    let (shape, constraints) = match (&design, body) {
+        (Some(inputs), Some(body)) => {
+            progress.stage(Stage::Elasticity);
+            let observed = functional::fixed_elements(config, &mesh, &states)?;
+            let shape = shape::shape(inputs, config, body, &states, &observed)?;
+            let constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &shape)?;
+            (Some(shape), constraints)
+        }
+        _ => (None, Vec::new()),
+    };
     progress.stage(Stage::Other);
     if shape.is_none() && !config.constraints.is_empty() {
         warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
@@ -265,6 +254,31 @@ fn problem_on(
     warnings.extend(skin::bound_warnings(config, &audits, &problem, designed_body.as_deref()));
     let tables = curves.into_files();
     Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body, tables })
+}
+
+/// Refuses a mesh that is broken, or lacks what the configuration names, with warnings of what is rarely meant; outer faces
+/// without a condition, unless only the mesh is to move.
+fn look_at_mesh(
+    config: &Config,
+    source: &SourceMap,
+    mesh: &Mesh,
+    motion_alone: bool,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<OpenPatch>, Error> {
+    // Regions without common nodes have no interface that a name could stand for: first things first.
+    source.check(soundness::contact_faults(config, source, mesh))?;
+    check_names(config, source, mesh, warnings)?;
+    warnings.extend_from_slice(source.notices());
+    let mut open = Vec::new();
+    if !motion_alone {
+        let outside = soundness::outside(config, source, mesh).map_err(|faults| source.error(faults))?;
+        warnings.extend(outside.warnings);
+        warnings.extend(soundness::unit_warning(config, mesh));
+        warnings.extend(soundness::swap_warning(config, mesh));
+        open = outside.open;
+    }
+    warnings.extend(soundness::layer_warnings(config, mesh));
+    Ok(open)
 }
 
 /// Refuses a field problem whose potential no surface fixes.

@@ -4,7 +4,7 @@
 //! gains from that error shrinks where the cells do. So the run's mesh is generated anew with every cell that moves or is
 //! observed divided (`DividedMesh`), brought to both shapes, and the ratio of the two values is the *verified ratio*; the
 //! constraints are measured there too. Variables of a control grid mean the same on any mesh; where the nodes are the
-//! variables, the displacement of the old surface is interpolated on the fresh one ([`Triangulation::transfer`]). A check
+//! variables, the displacement of the old surface is interpolated on the fresh one ([`ShapePair`]). A check
 //! that cannot be done is reported, and costs a run nothing else. A mesh that cannot be generated anew has all its elements
 //! cut instead, at both shapes ([`FinerProblem`]).
 //!
@@ -16,15 +16,15 @@
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Bound;
-use fluxmorph_optimizer::design::Triangulation;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 use super::confirmation::ShapeMeshes;
 use super::finer::{Cut, FinerMesh, FinerProblem};
+use super::shape_pair::ShapePair;
 use super::summary;
-use crate::build::{DividedMesh, Setup, design_triangulation, memory_limit, set_up_on};
+use crate::build::{DividedMesh, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
@@ -33,62 +33,6 @@ use crate::show::Observer;
 /// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
 /// alone counts, and not the way to it.
 const LEAST_ROUNDS: usize = 20;
-
-/// Initial and best shape of a run, in a form that another mesh can take.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ShapePair {
-    /// The initial shape is the best.
-    Unchanged,
-    /// Variables of a control grid [m].
-    Variables([Vec<f64>; 2]),
-    /// Displacements of a surface's nodes [m], each of shape `(n_nodes, 3)`.
-    Displacements {
-        /// The undeformed surface.
-        surface: Box<Triangulation>,
-        /// One displacement per node.
-        pair: [Vec<Point>; 2],
-    },
-}
-
-impl ShapePair {
-    /// The initial shape of a run that has been set up, and its best one.
-    ///
-    /// # Errors
-    /// When the design surface is not one of the mesh's.
-    ///
-    /// # Panics
-    /// If `best` has another length than there are variables.
-    pub fn of(config: &Config, setup: &Setup, best: &[f64]) -> Result<Self, Error> {
-        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
-            return Ok(Self::Unchanged);
-        };
-        if best == shape.initial() {
-            return Ok(Self::Unchanged);
-        }
-        if design.grid.is_some() {
-            return Ok(Self::Variables([shape.initial().to_vec(), best.to_vec()]));
-        }
-        let surface = Box::new(design_triangulation(design, &setup.full_mesh)?);
-        Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
-    }
-
-    /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
-    fn displacements(&self, config: &Config, setup: &Setup) -> Result<[Vec<Point>; 2], Error> {
-        let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
-            return Ok(Default::default());
-        };
-        match self {
-            Self::Unchanged => Ok([shape.initial(), shape.initial()].map(|p| shape.displacement(p))),
-            Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
-            Self::Displacements { surface, pair: [initial, best] } => {
-                let fresh = design_triangulation(design, &setup.full_mesh)?;
-                let transferred = [initial, best].map(|values| surface.transfer(values, &fresh));
-                let [initial, best] = transferred.map(|values| values.map_err(OptimizerError::from));
-                Ok([initial?, best?])
-            }
-        }
-    }
-}
 
 /// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -338,6 +282,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::build::Setup;
     use crate::build::{Mode, set_up};
 
     /// The coarse shield; without its control grid and a filter every node is a variable.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::json;
 
-use super::constraint_kind::Kind;
+use super::constraint_kind::{BodyKind, Kind, ThicknessKind};
 use super::design::COMPONENTS;
 use super::functional::{Compared, Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
@@ -12,7 +12,6 @@ use crate::config::table::rules::{Rules, Then, is, present};
 use crate::config::table::{Group, Unread, table};
 use crate::config::text::dimension::Dimension;
 use crate::config::value::Column;
-use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
 
 table! {
@@ -220,24 +219,6 @@ pub enum Limit {
         /// Greatest thickness [m].
         maximum: Option<f64>,
     },
-}
-
-choice! {
-    /// Kinds of constraints on a body.
-    pub enum BodyKind {
-        /// Volume of a region [m³], meshed or replaced by its impedance surface.
-        Volume = "volume",
-        /// Mass of a region [kg], by the `density` of its material.
-        Mass = "mass",
-    }
-}
-
-choice! {
-    /// The kind of a constraint on the thickness.
-    pub enum ThicknessKind {
-        /// Thickness of the designed body along the direction of the design [m].
-        Thickness = "thickness",
-    }
 }
 
 /// A bound on a value.

@@ -2,9 +2,26 @@
 
 use serde::Serialize;
 
-use super::constraint::{BodyKind, ThicknessKind};
 use super::functional::ObjectiveKind;
-use crate::config::value::choice::Choice;
+use crate::config::value::choice::{Choice, choice};
+
+choice! {
+    /// Kinds of constraints on a body.
+    pub enum BodyKind {
+        /// Volume of a region [m³], meshed or replaced by its impedance surface.
+        Volume = "volume",
+        /// Mass of a region [kg], by the `density` of its material.
+        Mass = "mass",
+    }
+}
+
+choice! {
+    /// The kind of a constraint on the thickness.
+    pub enum ThicknessKind {
+        /// Thickness of the designed body along the direction of the design [m].
+        Thickness = "thickness",
+    }
+}
 
 /// What a constraint bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::coil::Coil;
-use super::config::Config;
 use crate::config::section::Section;
 use crate::config::table::table;
 
@@ -122,44 +121,6 @@ impl LoadCase<'_> {
         match self.load.filter(|(_, load)| of(load)) {
             Some((k, _)) => format!("loads[{k}].{key}.{}", coil.name),
             None => format!("coils[{index}].{key}"),
-        }
-    }
-}
-
-impl Config {
-    /// The field problems in their order, at least one.
-    pub fn load_cases(&self) -> Vec<LoadCase<'_>> {
-        if self.loads.is_empty() {
-            let of = |&frequency: &f64| LoadCase { load: None, frequency };
-            return self.analysis.frequencies().iter().map(of).collect();
-        }
-        let usual = self.analysis.frequency();
-        let of = |entry| LoadCase { load: Some(entry), frequency: entry.1.frequency.unwrap_or(usual) };
-        self.loads.iter().enumerate().map(of).collect()
-    }
-
-    /// The frequencies of the field problems [Hz], each once, in their order.
-    pub fn frequencies(&self) -> Vec<f64> {
-        let mut frequencies: Vec<f64> = Vec::new();
-        for case in self.load_cases() {
-            if !frequencies.contains(&case.frequency) {
-                frequencies.push(case.frequency);
-            }
-        }
-        frequencies
-    }
-
-    /// What the loads ask of each other and of the analysis.
-    pub(super) fn check_loads(&self, root: &Section<'_>) {
-        // Of `a-b` and `a_b` the arrays of fields have one name.
-        let names: Vec<String> = self.loads.iter().map(|load| load.name.replace('-', "_")).collect();
-        root.named_twice("loads", &names, "loads", "a different name for each load");
-        if !self.loads.is_empty() && root.has("analysis.frequencies") {
-            root.clash(
-                ["analysis.frequencies", "loads"],
-                "there are both `analysis.frequencies` and [[loads]], which have frequencies of their own",
-                "one `frequency` in [analysis], and `frequency` in the loads that have another one",
-            );
         }
     }
 }

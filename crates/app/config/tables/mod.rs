@@ -14,6 +14,7 @@ mod functional;
 mod initial;
 mod linear_solver;
 mod load;
+mod load_cases;
 mod material;
 mod mesh;
 mod morph;
@@ -35,7 +36,8 @@ pub use coil::{
     RegionCoil, ShapeWord,
 };
 pub use config::Config;
-pub use constraint::{BodyKind, Constraint, Limit, ThicknessKind, ValueBound};
+pub use constraint::{Constraint, Limit, ValueBound};
+pub use constraint_kind::{BodyKind, ThicknessKind};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
 pub use functional::{Compared, Functional, ObjectiveKind, Weighting};

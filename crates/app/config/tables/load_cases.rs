@@ -1,0 +1,43 @@
+//! The field problems of a configuration: its load cases, or its frequencies.
+
+use super::config::Config;
+use super::load::LoadCase;
+use crate::config::section::Section;
+
+impl Config {
+    /// The field problems in their order, at least one.
+    pub fn load_cases(&self) -> Vec<LoadCase<'_>> {
+        if self.loads.is_empty() {
+            let of = |&frequency: &f64| LoadCase { load: None, frequency };
+            return self.analysis.frequencies().iter().map(of).collect();
+        }
+        let usual = self.analysis.frequency();
+        let of = |entry| LoadCase { load: Some(entry), frequency: entry.1.frequency.unwrap_or(usual) };
+        self.loads.iter().enumerate().map(of).collect()
+    }
+
+    /// The frequencies of the field problems [Hz], each once, in their order.
+    pub fn frequencies(&self) -> Vec<f64> {
+        let mut frequencies: Vec<f64> = Vec::new();
+        for case in self.load_cases() {
+            if !frequencies.contains(&case.frequency) {
+                frequencies.push(case.frequency);
+            }
+        }
+        frequencies
+    }
+
+    /// What the loads ask of each other and of the analysis.
+    pub(super) fn check_loads(&self, root: &Section<'_>) {
+        // Of `a-b` and `a_b` the arrays of fields have one name.
+        let names: Vec<String> = self.loads.iter().map(|load| load.name.replace('-', "_")).collect();
+        root.named_twice("loads", &names, "loads", "a different name for each load");
+        if !self.loads.is_empty() && root.has("analysis.frequencies") {
+            root.clash(
+                ["analysis.frequencies", "loads"],
+                "there are both `analysis.frequencies` and [[loads]], which have frequencies of their own",
+                "one `frequency` in [analysis], and `frequency` in the loads that have another one",
+            );
+        }
+    }
+}
