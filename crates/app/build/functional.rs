@@ -198,40 +198,45 @@ fn term(
     states: &[FieldModel],
 ) -> Result<Term, Error> {
     let cases = config.load_cases();
-    let taken = |k: &usize| functional.is_taken_under(&cases[*k]);
-    let weighting = match functional.weighting {
-        Some(config::Weighting::Volume) => Weighting::Volume,
-        _ => Weighting::Point,
-    };
+    let taken: Vec<usize> = (0..states.len()).filter(|&k| functional.is_taken_under(&cases[k])).collect();
+    Ok(Term {
+        functional: measured(config, functional, mesh, (states, &taken))?,
+        states: taken,
+        weight: 1.0,
+        label: Label {
+            kind: functional.kind.name(),
+            region: functional.region.clone(),
+            coils: functional.coils.clone().unwrap_or_default(),
+            frequency: functional.frequency,
+            load: functional.load.clone(),
+        },
+    })
+}
+
+/// What a functional measures, on the states that are taken.
+fn measured(
+    config: &Config,
+    functional: &config::Functional,
+    mesh: &Mesh,
+    (states, taken): (&[FieldModel], &[usize]),
+) -> Result<Functional, Error> {
     let name = functional.region.as_deref().unwrap_or_default();
     let region = || mesh.topology().region(name);
     // All states have the regions, conductors, windings and node numbers of the first that takes part.
-    let model = (0..states.len()).find(taken).map_or(&states[0], |k| &states[k]);
+    let model = &states[taken.first().copied().unwrap_or_default()];
     let coils: Vec<&str> = functional.coils.iter().flatten().map(String::as_str).collect();
-    let measured = match functional.kind {
-        ObjectiveKind::FluxDensitySquared => {
-            Functional::observation(mesh, region()?, Observed::Deviation { target: [0.0; 3], weighting })?
+    let of_inductances = |of| Ok(Functional::of_inductances(model, &coils, of)?);
+    let at_terminals = |of| at_terminals(model, &coils, of);
+    match functional.kind {
+        ObjectiveKind::FluxDensitySquared
+        | ObjectiveKind::TargetField
+        | ObjectiveKind::Homogeneity
+        | ObjectiveKind::FieldComponent => {
+            Ok(Functional::observation(mesh, region()?, observed(functional))?)
         }
-        ObjectiveKind::TargetField => {
-            let target = functional.target.unwrap_or_default();
-            Functional::observation(mesh, region()?, Observed::Deviation { target, weighting })?
-        }
-        ObjectiveKind::Homogeneity => {
-            let direction = functional.direction.unwrap_or_default();
-            let of = match functional.compare {
-                Some(config::Compared::Component) => functional::Compared::Component(direction),
-                Some(config::Compared::Modulus) => functional::Compared::Modulus,
-                _ => functional::Compared::Vector,
-            };
-            Functional::observation(mesh, region()?, Observed::Homogeneity { of, weighting })?
-        }
-        ObjectiveKind::FieldComponent => {
-            let direction = functional.direction.unwrap_or_default();
-            Functional::observation(mesh, region()?, Observed::Component { direction })?
-        }
-        ObjectiveKind::Loss => Functional::loss(model, name)?,
+        ObjectiveKind::Loss => Ok(Functional::loss(model, name)?),
         ObjectiveKind::Energy => {
-            Functional::energy(model, functional.region.is_some().then(region).transpose()?)?
+            Ok(Functional::energy(model, functional.region.is_some().then(region).transpose()?)?)
         }
         ObjectiveKind::Force | ObjectiveKind::Torque => {
             let body = config.forces.iter().find(|body| body.name == name).expect("checked with the names");
@@ -242,43 +247,47 @@ fn term(
                 RigidMotion::Rotation { axis: direction, about: body.about }
             };
             // The layer of the body is free of what any of the loads excites.
-            let measured = states.iter().enumerate().filter(|(k, _)| taken(k));
-            let mut measured = measured.map(|(_, model)| force(body, mesh, model, motion));
-            measured
-                .try_fold(None, |first, own| Ok::<_, Error>(first.or(Some(own?))))?
-                .expect("a state is taken")
-        }
-        ObjectiveKind::Inductance => Functional::of_inductances(model, &coils, Inductive::Inductance)?,
-        ObjectiveKind::MutualInductance => {
-            Functional::of_inductances(model, &coils, Inductive::MutualInductance)?
-        }
-        ObjectiveKind::Coupling => Functional::of_inductances(model, &coils, Inductive::Coupling)?,
-        ObjectiveKind::Resistance => Functional::of_inductances(model, &coils, Inductive::Resistance)?,
-        ObjectiveKind::QualityFactor => Functional::of_inductances(model, &coils, Inductive::QualityFactor)?,
-        ObjectiveKind::LinkEfficiency => {
-            Functional::of_inductances(model, &coils, Inductive::LinkEfficiency)?
+            let mut forces = taken.iter().map(|&k| force(body, mesh, &states[k], motion));
+            let first = forces.try_fold(None, |first, own| Ok::<_, Error>(first.or(Some(own?))))?;
+            Ok(first.expect("a state is taken"))
         }
         ObjectiveKind::Multipole | ObjectiveKind::MultipoleContent => {
-            super::multipole::functional(config, functional, mesh, model)?
+            super::multipole::functional(config, functional, mesh, model)
         }
-        ObjectiveKind::FluxLinkage => at_terminals(model, &coils, AtTerminals::FluxLinkage)?,
-        ObjectiveKind::Current => at_terminals(model, &coils, AtTerminals::Current)?,
-        ObjectiveKind::Voltage => at_terminals(model, &coils, AtTerminals::Voltage)?,
-        ObjectiveKind::Power => at_terminals(model, &coils, AtTerminals::Power)?,
-        ObjectiveKind::PowerFactor => at_terminals(model, &coils, AtTerminals::PowerFactor)?,
+        ObjectiveKind::Inductance => of_inductances(Inductive::Inductance),
+        ObjectiveKind::MutualInductance => of_inductances(Inductive::MutualInductance),
+        ObjectiveKind::Coupling => of_inductances(Inductive::Coupling),
+        ObjectiveKind::Resistance => of_inductances(Inductive::Resistance),
+        ObjectiveKind::QualityFactor => of_inductances(Inductive::QualityFactor),
+        ObjectiveKind::LinkEfficiency => of_inductances(Inductive::LinkEfficiency),
+        ObjectiveKind::FluxLinkage => at_terminals(AtTerminals::FluxLinkage),
+        ObjectiveKind::Current => at_terminals(AtTerminals::Current),
+        ObjectiveKind::Voltage => at_terminals(AtTerminals::Voltage),
+        ObjectiveKind::Power => at_terminals(AtTerminals::Power),
+        ObjectiveKind::PowerFactor => at_terminals(AtTerminals::PowerFactor),
+    }
+}
+
+/// What is observed of B in a region.
+fn observed(functional: &config::Functional) -> Observed {
+    let direction = functional.direction.unwrap_or_default();
+    let weighting = match functional.weighting {
+        Some(config::Weighting::Volume) => Weighting::Volume,
+        _ => Weighting::Point,
     };
-    Ok(Term {
-        functional: measured,
-        states: (0..states.len()).filter(taken).collect(),
-        weight: 1.0,
-        label: Label {
-            kind: functional.kind.name(),
-            region: functional.region.clone(),
-            coils: functional.coils.clone().unwrap_or_default(),
-            frequency: functional.frequency,
-            load: functional.load.clone(),
-        },
-    })
+    match functional.kind {
+        ObjectiveKind::FieldComponent => Observed::Component { direction },
+        ObjectiveKind::Homogeneity => {
+            let of = match functional.compare {
+                Some(config::Compared::Component) => functional::Compared::Component(direction),
+                Some(config::Compared::Modulus) => functional::Compared::Modulus,
+                _ => functional::Compared::Vector,
+            };
+            Observed::Homogeneity { of, weighting }
+        }
+        // The target of |B|² is zero.
+        _ => Observed::Deviation { target: functional.target.unwrap_or_default(), weighting },
+    }
 }
 
 /// A quantity of the one coil that is named.
