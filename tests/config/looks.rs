@@ -16,7 +16,7 @@ fn three_faults() -> String {
     repository_text("configs/shield_quick.toml")
         .replace("\"60 Hz\"", "\"60 mm\"")
         .replace("axis = \"z\"", "axis = \"w\"")
-        .replace("poisson = 0.3", "poisson = 0.5")
+        .replace("stiffness = \"inverse_size\"", "stiffness = \"inverse_sighs\"")
 }
 
 pub(crate) fn report(text: &str) -> DiagnosticReport {

@@ -10,6 +10,7 @@ mod convergence;
 mod gallery;
 mod gradient;
 mod meshes;
+mod motion;
 mod optimiser;
 mod orders;
 mod paper;

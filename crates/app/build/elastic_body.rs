@@ -172,6 +172,28 @@ pub(super) fn motion_law(
     Err(source.error(vec![fault]).into())
 }
 
+/// Keys of `[remesh]` that only the linear law knows.
+const LINEAR_ONLY: [&str; 4] = ["poisson", "motion", "rounds", "inversion_share"];
+
+/// What is said where keys are written that the law has no use for.
+pub(super) fn unused_keys(source: &SourceMap, remesh: &Remesh, law: MotionLaw) -> Option<String> {
+    let name = match law {
+        MotionLaw::Linear => return None,
+        MotionLaw::Rails(_) => config::MotionLaw::Rails.name(),
+        MotionLaw::Hyperelastic => config::MotionLaw::Hyperelastic.name(),
+    };
+    let own = LINEAR_ONLY.iter().map(|key| format!("remesh.{key}"));
+    let of_parts = (0..remesh.subregions.len()).map(|i| format!("remesh.subregions[{i}].poisson"));
+    let written: Vec<String> = own.chain(of_parts).filter(|path| source.is_written(path)).collect();
+    (!written.is_empty()).then(|| {
+        let verb = if written.len() == 1 { "has" } else { "have" };
+        format!(
+            "{} {verb} no effect: the mesh moves by the law `{name}`; take the key out, or write remesh.law = \"linear\"",
+            written.join(", ")
+        )
+    })
+}
+
 /// How the mesh of a design moves, and why so where the configuration leaves it open.
 pub(crate) fn motion_in_words(remesh: &Remesh, motion: &Motion) -> String {
     let why = |reason: &str| if remesh.law.is_none() { format!(", as {reason}") } else { String::new() };

@@ -9,7 +9,7 @@ use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::RemeshSetup;
 
-use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
 use super::names::name_faults;
 use super::{field, mesh, soundness};
 use crate::config::{
@@ -86,6 +86,7 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
     // What turns leaves its axis on the way, where it does not at the end.
     let on_the_way = [path.at(0.37), path.at(1.0)].concat();
     let law = motion_law(source, remesh, common_axis(&on_the_way), Mover::Morph)?;
+    warnings.extend(unused_keys(source, remesh, law));
     let setup = remesh_setup(source, remesh, &mesh, path.nodes(), (law, guidance), &mut warnings)?;
     if path.at(1.0).iter().all(|u| *u == [0.0; 3]) {
         warnings.push(

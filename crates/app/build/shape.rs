@@ -11,7 +11,7 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits};
 use fluxmorph_solver::FieldModel;
 
-use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup, unused_keys};
 use super::outline::same_nodes;
 use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
@@ -86,6 +86,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     }
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
+    warnings.extend(unused_keys(source, inputs.remesh, law));
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), (law, guidance), warnings)?;
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;

@@ -99,6 +99,11 @@ impl SourceMap {
         Span { document: 0, range: 0..0 }
     }
 
+    /// Whether a key is written, in the file or in an override.
+    pub fn is_written(&self, path: &str) -> bool {
+        self.spans.contains_key(path)
+    }
+
     /// A fault at a key path; add what was expected and what to do with the methods of [`Diagnostic`].
     pub fn diagnostic(&self, path: &str, message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(path, self.span(path), message)

@@ -21,7 +21,7 @@ use super::search::LEAST_GAIN;
 use super::stop::{Refusal, Stop};
 use crate::error::Error;
 use crate::nlopt::Sample;
-use crate::problem::between;
+use crate::problem::{Stage, between};
 
 /// Room over the least one within which the constraint is felt.
 const NEAR: f64 = 0.03;
@@ -75,7 +75,11 @@ pub(super) struct Standing {
 impl Run<'_> {
     /// The mesh of a design, or of the one that is evaluated in its place; `None` where it moves in rounds.
     pub(super) fn carry(&mut self, p: &[f64]) -> Result<Option<Carriage>, Stop> {
+        if !self.shape().motion().is_one_function() {
+            return Ok(None);
+        }
         let clock = Instant::now();
+        self.observer.stage(Stage::Moving);
         // Before a first design, from no displacement at all.
         let from = self.best.as_ref().map_or_else(|| vec![0.0; p.len()], |best| best.values.clone());
         let shape = self.shape();

@@ -20,6 +20,10 @@ impl Run<'_> {
     /// ±F/|F0| and the constraints of a design, with their gradients; where the mesh does not carry it, what the method is to
     /// know of it (`carry`).
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
+        // Before the motion, and not behind it: what a signal finds begun is finished.
+        if self.known(p).is_none() && !self.is_replaying() {
+            self.check_limits()?;
+        }
         let Some(carried) = self.carry(p)? else { return self.sample_of(p, None) };
         let before =
             Standing { best: self.best_evaluation(), values: (self.evaluations, self.incumbent_values()) };
@@ -32,12 +36,8 @@ impl Run<'_> {
     /// What is known of the best design in this round is not computed again, nor what was computed before the run was
     /// interrupted.
     fn sample_of(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
-        let round = self.shape().motion().round();
-        if let Some(best) = &self.best
-            && best.round == round
-            && best.values == p
-        {
-            return Ok(best.sample.clone());
+        if let Some(sample) = self.known(p) {
+            return Ok(sample.clone());
         }
         if self.is_replaying() && (self.interrupted)() {
             return Err(Stop::Limit(StopReason::Interrupted));
@@ -57,14 +57,21 @@ impl Run<'_> {
         }
     }
 
+    /// What is known of the best design, in this round.
+    fn known(&self, p: &[f64]) -> Option<&Sample> {
+        let round = self.shape().motion().round();
+        self.best.as_ref().filter(|best| best.round == round && best.values == p).map(|best| &best.sample)
+    }
+
     /// Computes a design, on its mesh where that is known, and the seconds that it took.
     fn compute(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
-        self.check_limits()?;
         let clock = Instant::now();
-        self.observer.stage(Stage::Moving);
         let (moved, before) = match moved {
             Some((moved, seconds)) => (moved.clone(), seconds),
-            None => (self.mesh(p)?, 0.0),
+            None => {
+                self.observer.stage(Stage::Moving);
+                (self.mesh(p)?, 0.0)
+            }
         };
         let remesh = before + clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;

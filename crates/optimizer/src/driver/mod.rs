@@ -17,7 +17,7 @@
 //!   the same designs to the last bit, in the same rounds on the same meshes, they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
 //! * On a finer mesh a search goes on from the best design of the one before (`start`).
-//! * Limits of evaluations and time are checked before each evaluation but the first, and before each fallback: what was
+//! * Limits of evaluations and time are checked before the mesh of each evaluation but the first, and before each fallback: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
 

@@ -200,7 +200,7 @@ fn a_panic_in_any_evaluation_of_any_algorithm_comes_out_on_this_side() {
 
 #[test]
 fn a_mesh_that_inverts_under_a_bound_ends_at_the_mesh_limit_with_numbers_alone() {
-    for law in ["linear", "rails"] {
+    for law in ["linear", "rails", "hyperelastic"] {
         let law = format!("remesh.law=\"{law}\"");
         let (mut problem, settings) = quick(&["remesh.rounds=0", &law]);
         let shape = problem.shape_mut().unwrap();
