@@ -10,13 +10,14 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
-use fluxmorph_solver::circuit::{Terminals, terminals};
+use fluxmorph_solver::circuit::{CoilTerminals, Terminals, terminals};
 use fluxmorph_solver::coil::{Coil, Connection, Frame, Path, RegionCurrent, SolidConductor};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::functional::{AtTerminals, Inductive};
 use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{
-    BhCurve, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, Winding, adjoint,
+    BhCurve, Drive, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order,
+    Winding, adjoint,
 };
 
 use super::{OUTSIDE, flux_parallel, terminal};
@@ -427,5 +428,32 @@ fn parts_of_a_conductor_are_in_series_or_in_parallel() {
         let currents = solve(apart(), Some(parallel.voltage), frequency);
         let current: c64 = currents.iter().map(|coil| coil.current).sum();
         assert!((current - 10.0).norm() < 1e-8, "{frequency}: {current}");
+    }
+}
+
+/// A load case that shares the matrix of another has the state of a model made for it: with the current of the bar given and not,
+/// with harmonics and at rest.
+#[test]
+fn load_cases_of_a_bar_are_those_of_models_of_their_own() {
+    let mesh = bar_in_a_box();
+    let volt = c64::new(0.02, 0.0);
+    let driven = Winding { voltage: Some(volt), ..NO_CIRCUIT };
+    let seen = |model: &FieldModel, state: &FieldSolution| {
+        let of = |coil: CoilTerminals| [coil.current, coil.voltage];
+        terminals(model, &mesh, state).expect("terminals").coils.into_iter().flat_map(of).collect::<Vec<_>>()
+    };
+    for frequency in [0.0, 300.0] {
+        let first = with_a_bar(&mesh, FAMILIES[0], frequency, (100.0, NO_CIRCUIT));
+        let mut case = first.load_case();
+        case.drives[0] = Drive::Voltage(volt);
+        let second = first.at_load_case(&mesh, &case).expect("a model");
+        let (_, system) = first.solve(&mesh).expect("a field");
+        let mut system = second.take_over(system).expect("the responses of the case");
+        let state = second.solve_prepared(&mut system, &second.load(&mesh)).expect("a field");
+        let own = with_a_bar(&mesh, FAMILIES[0], frequency, (0.0, driven));
+        let (expected, _) = own.solve(&mesh).expect("a field");
+        for (a, b) in seen(&second, &state).iter().zip(&seen(&own, &expected)) {
+            assert!((a - b).norm() <= 1e-9 * b.norm(), "{frequency}: {a} {b}");
+        }
     }
 }
