@@ -81,15 +81,27 @@ pub(crate) enum Curvature {
 
 /// `w ∂²ψ/∂u_a ∂u_b` of the displacements of the four nodes, evaluated block by block.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tangent {
-    /// `u_k`, the columns of `U`.
-    left: [Point; 3],
-    /// `Vᵀ ∇N_a`.
-    gradients: [Point; 4],
-    /// `w A`.
-    stretches: Tensor,
-    /// Diagonal and off-diagonal entry of `w [1, β; β, 1]` for the pair without `k`.
-    shears: [[f64; 2]; 3],
+pub(crate) enum Tangent {
+    /// `w [(∇N_a·∇N_b) 1 + b'' c_a ⊗ c_b + b' [F (∇N_a × ∇N_b)]_×]` with `c_a = cof F ∇N_a`.
+    Exact {
+        gradients: [Point; 4],
+        /// `c_a`.
+        cofactors: [Point; 4],
+        deformation: Tensor,
+        /// `w`, `w b'` and `w b''`.
+        weights: [f64; 3],
+    },
+    /// By its eigenvalues, in the frame of the singular values.
+    Convex {
+        /// `u_k`, the columns of `U`.
+        left: [Point; 3],
+        /// `Vᵀ ∇N_a`.
+        gradients: [Point; 4],
+        /// `w |A|`.
+        stretches: Tensor,
+        /// Diagonal and off-diagonal entry of `w |[1, β; β, 1]|` for the pair without `k`.
+        shears: [[f64; 2]; 3],
+    },
 }
 
 impl Tangent {
@@ -99,20 +111,24 @@ impl Tangent {
         weight: f64,
         curvature: Curvature,
     ) -> Self {
-        let SingularValues { left, values: s, right } = SingularValues::of(&deformation.gradient);
         let Density { slope, curvature: bend, .. } = deformation.barrier;
+        if curvature == Curvature::Exact {
+            return Self::Exact {
+                gradients: *gradients,
+                cofactors: gradients.map(|g| deformation.cofactor.map(|row| dot(row, g))),
+                deformation: deformation.gradient,
+                weights: [weight, weight * slope, weight * bend],
+            };
+        }
+        let SingularValues { left, values: s, right } = SingularValues::of(&deformation.gradient);
         let c = [s[1] * s[2], s[2] * s[0], s[0] * s[1]];
         let entry = |i: usize, j: usize| bend * c[i] * c[j] + if i == j { 1.0 } else { slope * s[3 - i - j] };
-        let mut stretches: Tensor = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-        let mut shears = s.map(|s| [1.0, -slope * s]);
-        if curvature == Curvature::Convex {
-            stretches = absolute(stretches);
-            shears = shears.map(|[own, other]| {
-                let [even, odd] = [own + other, own - other].map(f64::abs);
-                [0.5 * (even + odd), 0.5 * (even - odd)]
-            });
-        }
-        Self {
+        let stretches = absolute(std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))));
+        let shears = s.map(|s| {
+            let [even, odd] = [1.0 - slope * s, 1.0 + slope * s].map(f64::abs);
+            [0.5 * (even + odd), 0.5 * (even - odd)]
+        });
+        Self::Convex {
             left,
             gradients: gradients.map(|g| right.map(|v| dot(v, g))),
             stretches: stretches.map(|row| row.map(|x| weight * x)),
@@ -131,23 +147,44 @@ fn absolute(matrix: Tensor) -> Tensor {
 impl LocalMatrix<f64, 4, 3> for Tangent {
     #[inline]
     fn block(&self, a: usize, b: usize) -> [[f64; 3]; 3] {
-        let (ga, gb) = (self.gradients[a], self.gradients[b]);
-        let along = |i: usize| {
-            let [j, k] = [(i + 1) % 3, (i + 2) % 3];
-            self.stretches[i][i] * ga[i] * gb[i]
-                + self.shears[k][0] * ga[j] * gb[j]
-                + self.shears[j][0] * ga[k] * gb[k]
-        };
-        let across = |i: usize, j: usize| {
-            self.stretches[i][j] * ga[i] * gb[j] + self.shears[3 - i - j][1] * ga[j] * gb[i]
-        };
-        let own: Tensor =
-            std::array::from_fn(|i| std::array::from_fn(|j| if i == j { along(i) } else { across(i, j) }));
-        // U own Uᵀ.
-        let half: Tensor =
-            own.map(|row| std::array::from_fn(|d| (0..3).map(|j| row[j] * self.left[j][d]).sum()));
-        std::array::from_fn(|c| std::array::from_fn(|d| (0..3).map(|i| self.left[i][c] * half[i][d]).sum()))
+        match self {
+            Self::Exact { gradients, cofactors, deformation, weights: [one, slope, bend] } => {
+                let [x, y, z] = {
+                    let normal = cross(gradients[a], gradients[b]);
+                    deformation.map(|row| slope * dot(row, normal))
+                };
+                let turn = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]];
+                let own = one * dot(gradients[a], gradients[b]);
+                let (ca, cb) = (cofactors[a], cofactors[b]);
+                std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        bend * ca[i] * cb[j] + turn[i][j] + if i == j { own } else { 0.0 }
+                    })
+                })
+            }
+            Self::Convex { left, gradients, stretches, shears } => {
+                convex_block((gradients[a], gradients[b]), stretches, shears, left)
+            }
+        }
     }
+}
+
+fn convex_block(
+    (ga, gb): (Point, Point),
+    stretches: &Tensor,
+    shears: &[[f64; 2]; 3],
+    left: &[Point; 3],
+) -> [[f64; 3]; 3] {
+    let along = |i: usize| {
+        let [j, k] = [(i + 1) % 3, (i + 2) % 3];
+        stretches[i][i] * ga[i] * gb[i] + shears[k][0] * ga[j] * gb[j] + shears[j][0] * ga[k] * gb[k]
+    };
+    let across = |i: usize, j: usize| stretches[i][j] * ga[i] * gb[j] + shears[3 - i - j][1] * ga[j] * gb[i];
+    let own: Tensor =
+        std::array::from_fn(|i| std::array::from_fn(|j| if i == j { along(i) } else { across(i, j) }));
+    // U own Uᵀ.
+    let half: Tensor = own.map(|row| std::array::from_fn(|d| (0..3).map(|j| row[j] * left[j][d]).sum()));
+    std::array::from_fn(|c| std::array::from_fn(|d| (0..3).map(|i| left[i][c] * half[i][d]).sum()))
 }
 
 #[cfg(test)]
