@@ -7,6 +7,7 @@
 
 mod constraints;
 mod convergence;
+mod effectivity;
 mod gallery;
 mod gradient;
 mod meshes;

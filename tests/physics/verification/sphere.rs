@@ -198,13 +198,14 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
     ]
 }
 
-/// A sphere with the remanence `B_r` and the permeability of vacuum: `B = 2/3 B_r` inside, a dipole outside.
-pub(crate) fn magnet(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
+/// A sphere with the remanence `B_r` and a straight recoil line of the permeability `μ_rec`, `B = μ0 μ_rec H + B_r`: the field of a
+/// sphere demagnetises it with `H = −B/(2 μ0)`, so that `B = 2 B_r/(2 + μ_rec)` inside, a dipole outside.
+pub(crate) fn magnet(order: Order, refinement: f64, recoil: f64, bar: f64) -> Vec<Row> {
     let radius = 0.01;
     let mesh = sphere(&coarse(radius, refinement)).expect("a sound sphere");
     let remanence = 1.2;
     let of = |name: &String| if name == "sphere" { [0.0, 0.0, remanence] } else { [0.0; 3] };
-    let mut setup = setup(&mesh, 0.0, Material::AIR, order);
+    let mut setup = setup(&mesh, 0.0, Material { relative_permeability: recoil, ..Material::AIR }, order);
     setup.remanence = mesh.topology().region_names().iter().map(of).collect();
     // Nothing is applied: the outer sphere is a flux surface, far away.
     setup.boundaries.retain(|(name, _)| name != "outer");
@@ -214,12 +215,16 @@ pub(crate) fn magnet(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
     let at = |point: Point| {
         probe(&solution, &model, &mesh, "magnet", &[point]).expect("a point of the mesh")[0][2]
     };
-    let case = Case::new(format!("magnetised sphere, {order:?}"), &mesh, &model);
-    let far = 2.0 * radius;
-    // Bz = 2/3 B_r (R/z)³ on the axis.
+    let name = match recoil {
+        1.0 => format!("magnetised sphere, {order:?}"),
+        _ => format!("magnetised sphere, recoil permeability {recoil}, {order:?}"),
+    };
+    let case = Case::new(name, &mesh, &model);
+    let (far, inside) = (2.0 * radius, 2.0 * remanence / (2.0 + recoil));
+    // The dipole's Bz = B (R/z)³ on the axis.
     vec![
-        case.row("B at the centre [T]", at([0.0; 3]), (2.0 / 3.0 * remanence).into(), bar),
-        case.row("B outside, axis [T]", at([0.0, 0.0, far]), (2.0 / 3.0 * remanence / 8.0).into(), bar),
+        case.row("B at the centre [T]", at([0.0; 3]), inside.into(), bar),
+        case.row("B outside, axis [T]", at([0.0, 0.0, far]), (inside / 8.0).into(), bar),
     ]
 }
 
@@ -236,7 +241,9 @@ fn quick_rows() -> Vec<Row> {
     let mut rows = solid("aluminium-like, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]);
     rows.extend(solid("permeable, 50 mm", Order::Quadratic, 1.0, [0.02, 0.03, 0.03]));
     rows.extend(hollow(Order::Quadratic, 1.0, 0.02));
-    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 0.02));
+    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 1.0, 0.02));
+    // As of AlNiCo, whose recoil line is the steepest.
+    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 3.6, 0.02));
     rows
 }
 
