@@ -69,27 +69,37 @@ impl Device {
 const STATIC: (&str, &str) = ("frequency = \"50 Hz\"", "frequency = 0");
 
 /// Eight times the elements of the block, which is one or two cells of everything.
-const CELLS: [(&str, &str); 3] =
-    [("cells = [1, 1, 1]", "cells = [2, 2, 2]"), ("cells = [2, 2, 1]", "cells = [4, 4, 2]"), ("cells = [2, 2, 1]", "cells = [4, 4, 2]")];
+const CELLS: [(&str, &str); 3] = [
+    ("cells = [1, 1, 1]", "cells = [2, 2, 2]"),
+    ("cells = [2, 2, 1]", "cells = [4, 4, 2]"),
+    ("cells = [2, 2, 1]", "cells = [4, 4, 2]"),
+];
 
 fn blocks() -> Vec<(&'static str, Device)> {
     let block = |changes: &[(&str, &str)]| Device::block(&[&CELLS[..], changes].concat());
     let saturated: Vec<_> = SATURATED.iter().filter(|change| !change.1.contains("forces")).copied().collect();
     vec![
         ("iron block, static, μr 100", block(&[STATIC])),
-        ("the same, μr 1000", block(&[STATIC, ("relative_permeability = 100\n", "relative_permeability = 1000\n")])),
+        (
+            "the same, μr 1000",
+            block(&[STATIC, ("relative_permeability = 100\n", "relative_permeability = 1000\n")]),
+        ),
         ("conducting iron block, 50 Hz", block(&[])),
-        ("aluminium block, 200 Hz", block(&[
-            ("frequency = \"50 Hz\"", "frequency = \"200 Hz\""),
-            ("relative_permeability = 100\n", ""),
-            ("1e6 S/m", "3.5e7 S/m"),
-        ])),
+        (
+            "aluminium block, 200 Hz",
+            block(&[
+                ("frequency = \"50 Hz\"", "frequency = \"200 Hz\""),
+                ("relative_permeability = 100\n", ""),
+                ("1e6 S/m", "3.5e7 S/m"),
+            ]),
+        ),
         ("block of steel with a B–H curve, static", block(&saturated)),
     ]
 }
 
 fn devices() -> Vec<(&'static str, Device)> {
-    let of_region = |kind: &str, region: &str| format!("objective={{ kind = \"{kind}\", region = \"{region}\" }}");
+    let of_region =
+        |kind: &str, region: &str| format!("objective={{ kind = \"{kind}\", region = \"{region}\" }}");
     let (loss, energy) = (of_region("loss", "sphere"), of_region("energy", "sphere"));
     let sphere = ["mesh.sphere.divisions=4", "mesh.sphere.skin=[\"3 mm\", \"8 mm\", \"18 mm\"]"];
     let plate = of_region("loss", "plate");
@@ -145,7 +155,8 @@ fn the_error_of_second_order_is_about_four_thirds_of_what_halved_edges_change() 
     println!("| case | F(h) | F(h/2) | F(h/4) | order | error over change |");
     println!("|---|---|---|---|---|---|");
     for (name, device) in blocks() {
-        let (.., meshes) = device.of_family(Elements::Edge).estimated().unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (.., meshes) =
+            device.of_family(Elements::Edge).estimated().unwrap_or_else(|e| panic!("{name}: {e}"));
         let [a, b, c] = [0, 1, 2].map(|halvings| device.by_second_order(&meshes, halvings));
         let rest = (c - b) / (b - a);
         // A geometric series of changes.
@@ -188,8 +199,14 @@ fn random_device(chance: &mut Chance) -> Vec<(&'static str, String)> {
         ("1e6 S/m", format!("{conductivity} S/m")),
         ("cells = [1, 1, 1]", format!("cells = [{cells}, {cells}, {cells}]")),
         ("cells = [2, 2, 1]", format!("cells = [{0}, {0}, {1}]", 2 * cells, cells)),
-        ("\"20 mm\", \"20 mm\", \"30 mm\"]]\ncells = [2, 2, 1]", format!("\"20 mm\", \"20 mm\", \"30 mm\"]]\ncells = [{0}, {0}, {1}]", 2 * cells, cells)),
-        ("[[\"0 mm\", \"0 mm\", \"0 mm\"], [\"30 mm\", \"30 mm\", \"40 mm\"]]", format!("[[\"0 mm\", \"0 mm\", \"0 mm\"], [\"30 mm\", \"30 mm\", \"{:.1} mm\"]]", iron + 24.0)),
+        (
+            "\"20 mm\", \"20 mm\", \"30 mm\"]]\ncells = [2, 2, 1]",
+            format!("\"20 mm\", \"20 mm\", \"30 mm\"]]\ncells = [{0}, {0}, {1}]", 2 * cells, cells),
+        ),
+        (
+            "[[\"0 mm\", \"0 mm\", \"0 mm\"], [\"30 mm\", \"30 mm\", \"40 mm\"]]",
+            format!("[[\"0 mm\", \"0 mm\", \"0 mm\"], [\"30 mm\", \"30 mm\", \"{:.1} mm\"]]", iron + 24.0),
+        ),
         ("kind = \"flux_density_squared\"", observed),
         ("lower = \"-4 mm\"", format!("lower = \"-{range:.2} mm\"")),
         ("upper = \"4 mm\"", format!("upper = \"{range:.2} mm\"")),
@@ -199,7 +216,8 @@ fn random_device(chance: &mut Chance) -> Vec<(&'static str, String)> {
 /// The gain of a run with its error bar, and by second order on halved edges; `None` where nothing was gained.
 fn gain(folder: &Path, changes: &[(&str, &str)]) -> Option<[f64; 3]> {
     let mut device = written("block", folder, changes);
-    for item in ["analysis.elements=edge", "analysis.order=1", "accuracy.estimate=true", "output.fields=none"] {
+    for item in ["analysis.elements=edge", "analysis.order=1", "accuracy.estimate=true", "output.fields=none"]
+    {
         device = device.with(item);
     }
     let out = folder.join("out");
@@ -212,8 +230,10 @@ fn gain(folder: &Path, changes: &[(&str, &str)]) -> Option<[f64; 3]> {
     let bar = 2.0 * ratio * number(&result, "/accuracy/error_estimate_relative");
     let value = |path: &Path, name: &str| {
         let out = folder.join(name);
-        let sets = ["analysis.order=2", "analysis.elements=edge", "output.fields=none", "accuracy.estimate=false"];
-        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"solve", &path, &"--refine", &"1", &"--out", &out];
+        let sets =
+            ["analysis.order=2", "analysis.elements=edge", "output.fields=none", "accuracy.estimate=false"];
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> =
+            vec![&"solve", &path, &"--refine", &"1", &"--out", &out];
         for set in &sets {
             arguments.extend([&"--set" as &dyn AsRef<std::ffi::OsStr>, set]);
         }
