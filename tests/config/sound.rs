@@ -6,7 +6,7 @@ use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, SpherePara
 
 use crate::case::{Case, overwrite, read};
 use crate::support::program::folder;
-use crate::support::repository_text;
+use crate::support::{repository, repository_text};
 
 /// The configuration must be that of its resolved form, bit for bit.
 #[track_caller]
@@ -100,4 +100,17 @@ fn a_word_of_an_earlier_version_is_read_as_the_new_one_with_a_notice() {
     assert_eq!((source.notices(), silent.notices()), (&[notice.to_owned()][..], &[][..]));
     let setup = set_up(&former, &source, Mode::Inspection).expect("a sound device");
     assert!(setup.warnings.iter().any(|warning| warning == notice), "{:?}", setup.warnings);
+}
+
+/// The far side of the shell that is put around a mesh has its condition: no patch of the outside lies on it.
+#[test]
+fn space_that_is_open_is_no_side_without_a_condition() {
+    let path = repository("configs/pole_open.toml");
+    let (config, source) = Config::from_file(&path, &[]).expect("a shipped configuration");
+    let setup = set_up(&config, &source, Mode::Inspection).expect("a sound device");
+    let far = setup.full_mesh.topology().surface("infinity").expect("the far side of the shell").len();
+    let open: usize = setup.open_patches.iter().map(|patch| patch.faces.len()).sum();
+    let named = config.boundaries.flux_parallel.len() + config.boundaries.flux_normal.len();
+    assert!(far > 0 && named > 0);
+    assert_eq!(open, 0, "{:?}", setup.open_patches);
 }

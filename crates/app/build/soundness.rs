@@ -13,6 +13,7 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 
 use super::entries::material;
+use super::open;
 use crate::config::{self, Boundaries, Config, Diagnostic, MeshConfig, SourceMap};
 use crate::place::millimetres;
 
@@ -136,10 +137,12 @@ pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
 fn with_condition(config: &Config, hull: &Hull<'_>) -> Vec<bool> {
     let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
     let applied = uniform_field.iter().flat_map(|field| &field.surfaces);
+    let infinity = open::condition(config).map(|(name, _)| name);
     let faces: HashSet<[NodeId; 3]> = flux_parallel
         .iter()
         .chain(flux_normal)
         .chain(applied)
+        .chain(&infinity)
         .filter_map(|name| hull.mesh().topology().surface(name).ok())
         .flatten()
         .map(|nodes| face_key(*nodes))
