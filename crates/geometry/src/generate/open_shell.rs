@@ -160,9 +160,10 @@ fn sides(
             if vertices.iter().any(|&v| dot(n, v).abs() > IN_PLANE * norm(n) * norm(v)) {
                 let at = millimetres(mesh.point(edge[0]));
                 let expected = format!(
-                    "all outer faces but symmetry planes through the centre; the face beside the shell at {at} is neither"
+                    "all outer faces but symmetry planes through the centre; the face beside the shell at {at} is neither: \
+                     open space begins there too, or the centre belongs into its plane"
                 );
-                return Err(refuse("open.surfaces", "incomplete", &expected));
+                return Err(refuse("open.surfaces", "a part of the outside", &expected));
             }
             edges_of.entry(face_key(facet.nodes)).or_default().push(edge);
         }
