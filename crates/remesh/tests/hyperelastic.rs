@@ -1,6 +1,6 @@
 //! Motion in all directions by the hyperelastic energy: closed forms, derivatives, one function of the design, and its limits.
 
-use crate::support::{self, Point, noise, on_threads, product, unit_cells, whole};
+use crate::support::{self, Point, noise, product, unit_cells, whole};
 use fluxmorph_geometry::Mesh;
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, LEAST_ROOM, Motion, MotionLaw, RemeshError, RemeshSetup, StiffnessPolicy,
@@ -95,38 +95,18 @@ fn the_pulled_back_derivative_is_that_of_differences() {
     let mesh = support::shaken(&unit_cells([5, 4, 4]), 0.15);
     let motion = outside(&mesh, StiffnessPolicy::InverseSize);
     let design = wavy(&motion, 0.4, 0.5, 3);
-    let weights = support::random(mesh.points().len(), 5);
-    let value = |design: &[Point]| product(&weights, &motion.moved(design).unwrap().displacement);
     let moved = motion.moved(&design).unwrap();
     assert!(moved.inversion.step < 2.0, "far from rest: {}", moved.inversion.step);
-    let gradient = moved.pull_back(&weights).unwrap();
-    for seed in 11..16 {
-        let direction = wavy(&motion, 1.0, 1.0, seed);
-        let step = |h: f64| -> Vec<Point> {
-            design.iter().zip(&direction).map(|(u, d)| std::array::from_fn(|i| u[i] + h * d[i])).collect()
-        };
-        let h = 1e-5;
-        let difference = (value(&step(h)) - value(&step(-h))) / (2.0 * h);
-        let exact = product(&gradient, &direction);
-        // Truncation of h² times third derivatives of a steep barrier, rounding over h.
-        assert!((difference - exact).abs() < 1e-7 * exact.abs().max(1.0), "{difference} against {exact}");
-    }
+    // Third derivatives of a steep barrier.
+    let directions = (11..16).map(|seed| wavy(&motion, 1.0, 1.0, seed));
+    support::assert_pull_back(&motion, &design, directions, 1e-7);
 }
 
 #[test]
 fn the_mesh_of_a_design_has_the_same_bits_whatever_came_before_and_for_any_number_of_threads() {
     let mesh = support::shaken(&unit_cells([5, 4, 4]), 0.15);
-    let bits = |others: u64| {
-        let motion = outside(&mesh, StiffnessPolicy::InverseVolume);
-        for seed in 0..others {
-            drop(motion.moved(&wavy(&motion, 0.5, 0.5, 100 + seed)));
-        }
-        let moved = motion.moved(&wavy(&motion, 0.4, 0.5, 7)).unwrap();
-        moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
-    };
-    let cold = on_threads(1, || bits(0));
-    assert_eq!(cold, on_threads(3, || bits(0)));
-    assert_eq!(cold, on_threads(2, || bits(20)));
+    let motion = || outside(&mesh, StiffnessPolicy::InverseVolume);
+    support::assert_one_function(motion, |own| wavy(own, 0.4, 0.5, 7), |own, seed| wavy(own, 0.5, 0.5, seed));
 }
 
 #[test]

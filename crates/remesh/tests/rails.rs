@@ -1,6 +1,6 @@
 //! Motion along one axis by the convex energy: closed forms, derivatives, one function of the design, and its limits.
 
-use crate::support::{self, Point, noise, on_threads, product, unit_cells, whole};
+use crate::support::{self, Point, noise, product, unit_cells, whole};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{
     Boundary, BoundaryKind, LEAST_ROOM, Motion, MotionLaw, RemeshError, RemeshSetup, StiffnessPolicy,
@@ -78,37 +78,15 @@ fn thin_layers_keep_what_their_weight_says() {
 fn the_pulled_back_derivative_is_that_of_differences() {
     let mesh = support::shaken(&unit_cells([5, 4, 4]), 0.15);
     let motion = motion(&mesh, StiffnessPolicy::InverseSize);
-    let design = rough(&motion, 0.8, 3);
-    let weights = support::random(mesh.points().len(), 5);
-    let value = |design: &[Point]| product(&weights, &motion.moved(design).unwrap().displacement);
-    let gradient = motion.moved(&design).unwrap().pull_back(&weights).unwrap();
-    for seed in 11..16 {
-        let direction = rough(&motion, 1.0, seed);
-        let step = |h: f64| -> Vec<Point> {
-            design.iter().zip(&direction).map(|(u, d)| [0.0, 0.0, u[2] + h * d[2]]).collect()
-        };
-        let h = 1e-5;
-        let difference = (value(&step(h)) - value(&step(-h))) / (2.0 * h);
-        let exact = product(&gradient, &direction);
-        // Truncation of h², rounding over h.
-        assert!((difference - exact).abs() < 1e-8 * exact.abs().max(1.0), "{difference} against {exact}");
-    }
+    let directions = (11..16).map(|seed| rough(&motion, 1.0, seed));
+    support::assert_pull_back(&motion, &rough(&motion, 0.8, 3), directions, 1e-8);
 }
 
 #[test]
 fn the_mesh_of_a_design_has_the_same_bits_whatever_came_before_and_for_any_number_of_threads() {
     let mesh = support::shaken(&unit_cells([5, 4, 4]), 0.15);
-    let bits = |others: u64| {
-        let motion = motion(&mesh, StiffnessPolicy::InverseVolume);
-        for seed in 0..others {
-            drop(motion.moved(&rough(&motion, 1.0, 100 + seed)));
-        }
-        let moved = motion.moved(&rough(&motion, 0.9, 7)).unwrap();
-        moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
-    };
-    let cold = on_threads(1, || bits(0));
-    assert_eq!(cold, on_threads(3, || bits(0)));
-    assert_eq!(cold, on_threads(2, || bits(20)));
+    let motion = || motion(&mesh, StiffnessPolicy::InverseVolume);
+    support::assert_one_function(motion, |own| rough(own, 0.9, 7), |own, seed| rough(own, 1.0, seed));
 }
 
 #[test]

@@ -2,10 +2,10 @@
 //! of one frequency share a matrix, and what they share changes no result.
 
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_optimizer::verify::{Settings, certify};
+use fluxmorph_optimizer::verify::Settings;
 
-use super::{MESHED, check, wavy};
-use crate::problems::{analysed, variables};
+use super::{MESHED, all_hold, all_hold_on, uneven, wavy};
+use crate::problems::analysed;
 use crate::support::folder::read_text;
 use crate::support::{changed, repository, setup, setup_of};
 
@@ -81,23 +81,6 @@ fn problem(objective: &str, tables: &str, changes: &[(&str, &str)]) -> Problem {
     setup_of(&changed(COILS, &[&own[..], changes].concat())).problem
 }
 
-/// A design that is flat nowhere.
-fn uneven(problem: &Problem) -> Vec<f64> {
-    (0..variables(problem)).map(|k| 4e-4 + 6e-4 * (1.7 * k as f64).sin()).collect()
-}
-
-fn all_hold(problem: &Problem) {
-    let settings = Settings { directions: 2, ..Settings::default() };
-    let certificates = certify(problem, &uneven(problem), &settings, &|| false, |_, _, _| {});
-    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
-    println!("objective {:e}", certificates.objective.objective);
-    check(&certificates.objective);
-    for named in &certificates.constraints {
-        println!("{} {:e}", named.name, named.certificate.objective);
-        check(&named.certificate);
-    }
-}
-
 #[test]
 fn sums_over_loads_and_quantities_of_one_are_exact() {
     let problem = problem(TERMS, &format!("{LOADS}{BOUNDS}"), &[]);
@@ -110,7 +93,7 @@ fn sums_over_loads_and_quantities_of_one_are_exact() {
         println!("{} {:?}: {share:.3}", term.label.kind, term.label.load);
         assert!(share > 0.05, "every term has a say");
     }
-    all_hold(&problem);
+    all_hold_on(&problem, uneven);
 }
 
 /// Either term of a worst case has its own exact gradient, on both sides of where they meet.
@@ -127,7 +110,7 @@ fn the_worst_of_loads_has_the_gradient_of_that_load() {
         let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
         println!("{values:?}");
         assert_eq!(objective.terms[objective.worst(&values)].label.load.as_deref(), Some(worst));
-        all_hold(&problem);
+        all_hold_on(&problem, uneven);
     }
 }
 
@@ -199,7 +182,7 @@ fn loads_that_voltages_drive_are_exact_and_those_of_each_alone() {
         // Both within the tolerance of the linear solver.
         assert!((own / value - 1.0).abs() < 1e-10, "{own:e} {value:e}");
     }
-    all_hold(&together);
+    all_hold_on(&together, uneven);
 }
 
 /// In a linear problem the field under all currents is the sum of those under each.
@@ -284,10 +267,5 @@ fn loads_of_saturated_iron_are_exact() {
     assert!(energies[1] / energies[0] > 36.0 * 1.01 || energies[1] / energies[0] < 36.0 * 0.99);
     // As in `saturation`: the second derivative of h jumps at the points of the curve.
     let settings = Settings { directions: 1, difference_step: 1e-5, ..Settings::default() };
-    let certificates = certify(&problem, &p, &settings, &|| false, |_, _, _| {});
-    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
-    check(&certificates.objective);
-    for constraint in &certificates.constraints {
-        check(&constraint.certificate);
-    }
+    all_hold(&problem, &p, &settings);
 }

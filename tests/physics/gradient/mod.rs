@@ -31,6 +31,28 @@ fn holds(problem: &Problem, p: &[f64]) {
     check_in_five(&certificates.unwrap_or_else(|e| panic!("{e}")).objective);
 }
 
+/// The certificates of the objective and of every constraint.
+fn all_hold(problem: &Problem, p: &[f64], settings: &Settings) {
+    let certificates = certify(problem, p, settings, &|| false, |_, _, _| {});
+    let certificates = certificates.unwrap_or_else(|e| panic!("{e}"));
+    println!("objective {:e}", certificates.objective.objective);
+    check(&certificates.objective);
+    for named in &certificates.constraints {
+        println!("{} {:e}", named.name, named.certificate.objective);
+        check(&named.certificate);
+    }
+}
+
+/// The same in two directions, on a design of the problem.
+fn all_hold_on(problem: &Problem, design: fn(&Problem) -> Vec<f64>) {
+    all_hold(problem, &design(problem), &brief());
+}
+
+/// Two directions: where the chain is one that is measured in five elsewhere.
+fn brief() -> Settings {
+    Settings { directions: 2, ..Settings::default() }
+}
+
 fn check(certificate: &Certificate) {
     for direction in &certificate.directions {
         println!(
@@ -79,6 +101,11 @@ fn node_gradient_holds(problem: &Problem) {
 /// A design inside the bounds that is flat nowhere.
 fn wavy(problem: &Problem) -> Vec<f64> {
     (0..variables(problem)).map(|k| 4e-3 + 3e-3 * (1.7 * k as f64).sin()).collect()
+}
+
+/// A design of a small coil device that is flat nowhere.
+fn uneven(problem: &Problem) -> Vec<f64> {
+    (0..variables(problem)).map(|k| 4e-4 + 6e-4 * (1.7 * k as f64).sin()).collect()
 }
 
 #[test]

@@ -1,31 +1,16 @@
 //! Gradients of quadratic elements, of magnets that move with the mesh, and of devices in an applied field.
 
 use fluxmorph::build::{Mode, Setup, set_up};
-use fluxmorph_optimizer::verify::{Settings, certify};
+use fluxmorph_optimizer::verify::Settings;
 
-use super::{MESHED, check, wavy};
+use super::{MESHED, all_hold, brief, wavy};
 use crate::problems::variables;
 use crate::support::{changed, parsed, setup, setup_of};
-
-/// Two directions: the chain is that of the linear elements, which are measured in five.
-fn brief() -> Settings {
-    Settings { directions: 2, ..Settings::default() }
-}
-
-fn all_hold(setup: &Setup, p: &[f64], settings: &Settings) {
-    let certificates =
-        certify(&setup.problem, p, settings, &|| false, |_, _, _| {}).unwrap_or_else(|e| panic!("{e}"));
-    check(&certificates.objective);
-    for constraint in &certificates.constraints {
-        println!("{}", constraint.name);
-        check(&constraint.certificate);
-    }
-}
 
 #[test]
 fn the_gradient_of_quadratic_elements_is_exact_around_an_impedance_surface() {
     let setup = setup("shield_quick.toml", &["analysis.order=2", "mesh.shield.refinement=0.3"]);
-    all_hold(&setup, &wavy(&setup.problem), &brief());
+    all_hold(&setup.problem, &wavy(&setup.problem), &brief());
 }
 
 #[test]
@@ -39,7 +24,7 @@ fn the_gradient_of_quadratic_elements_is_exact_in_a_conductor_and_for_its_loss()
         "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]",
     ]);
     let setup = setup("shield_quick.toml", &overrides);
-    all_hold(&setup, &wavy(&setup.problem), &Settings { directions: 1, ..brief() });
+    all_hold(&setup.problem, &wavy(&setup.problem), &Settings { directions: 1, ..brief() });
 }
 
 /// Of edge elements in five directions for the first order, and two for the second.
@@ -54,7 +39,7 @@ fn the_gradient_of_edge_elements_is_exact_around_an_impedance_surface_and_for_it
     for (order, settings) in [(1, Settings::default()), (2, brief())] {
         let setup = edge(order, &["mesh.shield.refinement=0.3", loss]);
         // Not the wavy design, where the loss hardly changes along one of the directions and the difference is all truncation.
-        all_hold(&setup, &vec![2e-3; variables(&setup.problem)], &settings);
+        all_hold(&setup.problem, &vec![2e-3; variables(&setup.problem)], &settings);
     }
 }
 
@@ -68,7 +53,7 @@ fn the_gradient_of_edge_elements_is_exact_in_a_conductor_and_for_its_loss() {
     ]);
     for (order, settings) in [(1, Settings::default()), (2, brief())] {
         let setup = edge(order, &overrides);
-        all_hold(&setup, &wavy(&setup.problem), &settings);
+        all_hold(&setup.problem, &wavy(&setup.problem), &settings);
     }
 }
 
@@ -152,7 +137,7 @@ fn the_gradient_with_a_magnet_that_moves_is_exact() {
         let p: Vec<f64> =
             if elements == "nodal" { count.map(sine).collect() } else { count.map(cosine).collect() };
         assert_eq!(setup.problem.constraints().len(), 2);
-        all_hold(&setup, &p, &brief());
+        all_hold(&setup.problem, &p, &brief());
     }
 }
 
@@ -223,7 +208,7 @@ fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
         let setup = setup_of(&changed(APPLIED, &[("order = 2", elements)]));
         let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
         assert_eq!(setup.problem.constraints().len(), 4);
-        all_hold(&setup, &p, &brief());
+        all_hold(&setup.problem, &p, &brief());
     }
 }
 
@@ -250,7 +235,7 @@ fn the_gradient_beside_a_coil_region_is_exact_for_every_kind() {
         let changes = [("order = 2", elements), (named, winding), (applied, walls)];
         let setup = setup_of(&changed(APPLIED, &changes));
         let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
-        all_hold(&setup, &p, &brief());
+        all_hold(&setup.problem, &p, &brief());
     }
 }
 

@@ -266,8 +266,7 @@ impl Group for Limit {
         };
         match kind {
             Kind::Field(kind) => Self::field(kind, written, section),
-            Kind::Body(BodyKind::Volume) => Self::body(BodyKind::Volume, Dimension::Volume, written, section),
-            Kind::Body(BodyKind::Mass) => Self::body(BodyKind::Mass, Dimension::Mass, written, section),
+            Kind::Body(kind) => Self::body(kind, written, section),
             Kind::Thickness(_) => Self::thickness(&written, section),
         }
     }
@@ -306,10 +305,14 @@ impl Limit {
         Self::Field { functional, bound }
     }
 
-    fn body(kind: BodyKind, dimension: Dimension, written: LimitKeys, section: &Section<'_>) -> Self {
+    fn body(kind: BodyKind, written: LimitKeys, section: &Section<'_>) -> Self {
         if !section.has("region") {
             section.missing(&["region"], "region = \"plate\"");
         }
+        let dimension = match kind {
+            BodyKind::Volume => Dimension::Volume,
+            BodyKind::Mass => Dimension::Mass,
+        };
         let bound = ValueBound::of(written.ratios(), section, dimension, Range::POSITIVE);
         Self::Body { kind, region: written.region.unwrap_or_default(), bound }
     }

@@ -7,7 +7,7 @@ use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shi
 use fluxmorph_geometry::tet4::{centroid, cross};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, KinematicConstraint, RemeshSetup, StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, KinematicConstraint, Motion, RemeshSetup, StiffnessPolicy, Subregion,
 };
 
 pub(crate) type Point = [f64; 3];
@@ -163,4 +163,49 @@ pub(crate) fn plate_columns(mesh: &Mesh) -> Vec<Vec<NodeId>> {
         columns.entry((p[0].to_bits(), p[1].to_bits())).or_default().push(node);
     }
     columns.into_values().collect()
+}
+
+/// Asserts that what a motion pulls back from a design are its central differences along `directions`, to `tolerance`.
+pub(crate) fn assert_pull_back(
+    motion: &Motion,
+    design: &[Point],
+    directions: impl Iterator<Item = Vec<Point>>,
+    tolerance: f64,
+) {
+    let nodes = motion.moved(design).unwrap().displacement.len();
+    let weights = random(nodes, 5);
+    let value = |design: &[Point]| product(&weights, &motion.moved(design).unwrap().displacement);
+    let gradient = motion.moved(design).unwrap().pull_back(&weights).unwrap();
+    for direction in directions {
+        let step = |h: f64| -> Vec<Point> {
+            design.iter().zip(&direction).map(|(u, d)| std::array::from_fn(|i| u[i] + h * d[i])).collect()
+        };
+        let h = 1e-5;
+        let difference = (value(&step(h)) - value(&step(-h))) / (2.0 * h);
+        let exact = product(&gradient, &direction);
+        // Truncation of h², rounding over h.
+        assert!(
+            (difference - exact).abs() < tolerance * exact.abs().max(1.0),
+            "{difference} against {exact}"
+        );
+    }
+}
+
+/// Asserts that the mesh of a design has the same bits cold and after twenty others, for any number of threads.
+pub(crate) fn assert_one_function(
+    motion: impl Fn() -> Motion + Sync,
+    design: impl Fn(&Motion) -> Vec<Point> + Sync,
+    other: impl Fn(&Motion, u64) -> Vec<Point> + Sync,
+) {
+    let bits = |others: u64| {
+        let motion = motion();
+        for seed in 0..others {
+            drop(motion.moved(&other(&motion, 100 + seed)));
+        }
+        let moved = motion.moved(&design(&motion)).unwrap();
+        moved.displacement.iter().flatten().map(|u| u.to_bits()).collect::<Vec<_>>()
+    };
+    let cold = on_threads(1, || bits(0));
+    assert_eq!(cold, on_threads(3, || bits(0)));
+    assert_eq!(cold, on_threads(2, || bits(20)));
 }
