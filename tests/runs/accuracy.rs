@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::support::device::shipped;
-use crate::support::folder::{count, number, read_json};
-use crate::support::program::{Finished, finish, fluxmorph, folder};
+use crate::support::device::{shipped, written};
+use crate::support::folder::{RunFolder, count, number, read_json, scalars};
+use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 
 fn pole(elements: &'static str, order: &'static str, out: &Path) -> Finished {
     finish(&mut shipped("pole", &["--set", elements, "--set", order]).command("run", out))
@@ -97,4 +97,21 @@ fn a_run_with_a_tolerance_refines_its_mesh_until_its_error_bar_is_within() {
     assert_eq!(last.parse::<usize>().expect("a number"), refinements);
     let page = std::fs::read_to_string(out.join("report.html")).expect("a report");
     assert!(page.contains("within the tolerance") && !page.contains("do not belong together"));
+}
+
+/// One error, wherever it is asked for; the map of the field file adds up to it.
+#[test]
+fn check_and_solve_say_the_same_error_and_the_field_file_where_it_is() {
+    let home = folder();
+    let device = written("block", home.path(), &[]);
+    let edges = ["--set", "analysis.elements=edge", "--set", "analysis.order=1"];
+    let checked = finish(command(&[&"check", &device.config, &"--estimate", &"--json"]).args(edges));
+    let checked = number(&checked.exits_with(0).json(), "/estimate/error_estimate");
+    let out = home.path().join("out");
+    finish(device.command("solve", &out).args(edges)).completed();
+    let solved = RunFolder(out);
+    assert_eq!(number(&solved.result(), "/accuracy/error_estimate/0"), checked);
+    let sum: f64 = scalars(&solved.field(0).cell_data["error_estimate"]).iter().sum();
+    // Beside what is quadratic in the correction.
+    assert!((sum / checked - 1.0).abs() < 0.1, "{sum} {checked}");
 }

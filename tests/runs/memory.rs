@@ -1,5 +1,6 @@
 //! What `check` says of the memory of a run, against what the run held at its peak.
 
+use crate::support::device::written;
 use crate::support::folder::read_json;
 use crate::support::program::{finish, folder, program};
 use crate::support::repository;
@@ -73,4 +74,26 @@ fn a_check_on_finer_elements_that_does_not_fit_is_skipped_with_a_notice() {
     assert!(
         !read_json(&std::path::Path::new(&out).join("result.json"))["objective"]["verification"].is_object()
     );
+}
+
+/// There is room for the meshes before, and none for the factor of the next one with the addresses of its dense kernels.
+#[cfg(unix)]
+#[test]
+fn a_mesh_that_the_memory_does_not_let_refine_is_searched_on_as_it_is() {
+    let folder = folder();
+    let device = written("block", folder.path(), &[])
+        .with("analysis.elements=edge")
+        .with("analysis.order=1")
+        .with("accuracy.tolerance=1e-4");
+    let out = folder.path().join("out");
+    let run = device.command("run", &out);
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", "ulimit -d 100000 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
+    command.args(run.get_args()).args(["--threads", "1"]);
+    finish(&mut command)
+        .completed()
+        .says(&["the mesh cannot be refined further: the problem on", "the tolerance is not kept"]);
+    let result = read_json(&out.join("result.json"));
+    assert_eq!(result["accuracy"]["within_tolerance"], false);
+    assert!(result["accuracy"]["refinements"].as_u64().is_some_and(|count| count > 0));
 }

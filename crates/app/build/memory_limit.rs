@@ -81,15 +81,30 @@ pub(crate) fn check_problem(
     if overwrite == OverwritePolicy::Replace {
         return Ok(());
     }
-    let threads = if needs_workspace(problem) { rayon::current_num_threads() } else { 0 };
-    check_estimate(Sizes::of(problem).here() as u64, threads, source)
+    check_estimate(Sizes::of(problem).here() as u64, threads_with_workspace(problem), source)
+}
+
+/// Threads that ask for the workspace of the dense kernels in an evaluation.
+fn threads_with_workspace(problem: &Problem) -> usize {
+    if needs_workspace(problem) { rayon::current_num_threads() } else { 0 }
 }
 
 /// The same for a problem of about so many bytes, with this many threads in dense kernels.
 fn check_estimate(estimate: u64, threads: usize, source: &SourceMap) -> Result<(), ConfigError> {
-    let workspace = threads as u64 * workspace::bytes_per_thread() as u64;
-    let Some(room) = room(workspace) else { return Ok(()) };
+    let Some(room) = room(workspace(threads)) else { return Ok(()) };
     refuse_beyond(room, source, ("mesh", "solving the problem"), estimate)
+}
+
+/// Addresses of the dense kernels on so many threads [bytes].
+fn workspace(threads: usize) -> u64 {
+    threads as u64 * workspace::bytes_per_thread() as u64
+}
+
+/// Why a problem that is set up cannot be solved; `None` where it can, or nothing is known.
+pub(crate) fn shortage_of(problem: &Problem) -> Option<String> {
+    let needed = Sizes::of(problem).here() as u64;
+    let room = room(workspace(threads_with_workspace(problem)))?;
+    (needed > room.bytes).then(|| beyond(room, needed))
 }
 
 /// Why so many bytes cannot be held; `None` where they can, or nothing is known.

@@ -300,13 +300,17 @@ impl Session<'_> {
         finer.halve(marked).map_err(|error| error.to_string())?;
         let count = |mesh: &RefinedMesh| mesh.mesh().topology().tets().len() as f64;
         let growth = count(&finer) / count(mesh);
-        if let Some(shortage) =
-            memory_limit::shortage(Sizes::of(&self.setup.problem).on_other_mesh(growth)[0])
-        {
-            return Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
+        let too_large =
+            |shortage: String| Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
+        let [least, _] = Sizes::of(&self.setup.problem).on_other_mesh(growth);
+        if let Some(shortage) = memory_limit::shortage(least) {
+            return too_large(shortage);
         }
         let setup = self.set_up(&finer).map_err(|error| error.to_string())?;
-        Ok((finer, setup))
+        match memory_limit::shortage_of(&setup.problem) {
+            Some(shortage) => too_large(shortage),
+            None => Ok((finer, setup)),
+        }
     }
 
     fn set_up(&self, mesh: &RefinedMesh) -> Result<Setup, Error> {

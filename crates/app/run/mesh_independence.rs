@@ -171,7 +171,7 @@ impl MeshIndependence<'_> {
             return Ok(Outcome::TooLarge(shortage));
         }
         let finer = FinerProblem::on(mesh, self.source)?;
-        if let Some(shortage) = memory_limit::shortage(Sizes::of(&finer.setup.problem).here()) {
+        if let Some(shortage) = memory_limit::shortage_of(&finer.setup.problem) {
             return Ok(Outcome::TooLarge(shortage));
         }
         let tets = finer.setup.problem.original().topology().tets().len();
@@ -195,7 +195,7 @@ impl MeshIndependence<'_> {
         let config = fresh_configuration(self.config);
         let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
         // What the factor of this very mesh takes is known now.
-        if let Some(shortage) = memory_limit::shortage(Sizes::of(&setup.problem).here()) {
+        if let Some(shortage) = memory_limit::shortage_of(&setup.problem) {
             return Ok(Outcome::TooLarge(shortage));
         }
         if interrupted() {

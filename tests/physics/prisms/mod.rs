@@ -15,6 +15,7 @@ mod convergence;
 mod derivative;
 mod diffusion;
 mod discretisation;
+mod estimate;
 mod exact;
 mod gradient;
 mod hand;

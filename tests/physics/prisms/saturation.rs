@@ -15,7 +15,7 @@ use super::source::Source;
 use super::{cases, unstructured};
 
 /// The steel of TEAM problem 20, of `tests/reference/team20_bh.csv`.
-fn steel() -> BhCurve {
+pub(super) fn steel() -> BhCurve {
     let rows = include_str!("../../reference/team20_bh.csv").lines().filter(|line| !line.starts_with('#'));
     let point = |line: &str| -> [f64; 2] {
         let numbers: Vec<f64> = line.split(',').map(|n| n.trim().parse().expect("a number")).collect();
@@ -35,7 +35,7 @@ fn flux_density(curve: &BhCurve, h: f64) -> f64 {
 }
 
 /// `c` [A/m] where the region `iron`, which `T` does not reach, follows the curve: `μ0 ∫(T + c) + A B(c) = 0`.
-fn constant(prism: &Prism, curve: &BhCurve) -> f64 {
+pub(super) fn constant(prism: &Prism, curve: &BhCurve) -> f64 {
     let iron = prism.parts.iter().find(|part| part.name == "iron").expect("it has iron");
     assert_eq!(prism.source.over(&iron.shape), 0.0, "no T in the iron");
     let [around, inside] = [prism.outline.area() - iron.shape.area(), iron.shape.area()];
@@ -50,7 +50,7 @@ fn constant(prism: &Prism, curve: &BhCurve) -> f64 {
 }
 
 /// The same with another current.
-fn driven(prism: Prism, ampere_turns: f64) -> Prism {
+pub(super) fn driven(prism: Prism, ampere_turns: f64) -> Prism {
     Prism { source: Source { ampere_turns, ..prism.source }, ..prism }
 }
 

@@ -57,6 +57,13 @@ impl Source {
         self.plateau() * (1.0 - distance(0).max(distance(1)) / self.width).clamp(0.0, 1.0)
     }
 
+    /// `∫T²` [A²] of the whole coil: `t²` over the rings of the winding where `T` is a share `t` of the plateau.
+    pub(super) fn square_over_all(&self) -> f64 {
+        let ([a, b], w) = (self.half_window, self.width);
+        let winding = 4.0 * w * ((a + b) / 3.0 + w / 6.0);
+        self.plateau().powi(2) * (4.0 * a * b + winding)
+    }
+
     /// Distance from the winding outwards [m], in the maximum norm.
     pub(super) fn clearance(&self, place: Place) -> f64 {
         let distance = |d: usize| (place[d] - self.centre[d]).abs() - self.half_window[d] - self.width;
