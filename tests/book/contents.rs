@@ -135,10 +135,3 @@ fn every_page_stands_in_the_table_of_contents_once() {
     expected.sort();
     assert_eq!(listed, expected);
 }
-
-#[test]
-fn headings_become_anchors_as_on_github() {
-    assert_eq!(slug("## 2.9 Resolution of the skin"), "29-resolution-of-the-skin");
-    assert_eq!(slug("### `[[coils]]`"), "coils");
-    assert_eq!(links("see [a](b.md#c) and `[x](y)` and ![d](e.png)"), ["b.md#c", "e.png"]);
-}

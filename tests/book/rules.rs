@@ -95,14 +95,6 @@ impl Rule {
 }
 
 #[test]
-fn a_command_is_long_only_by_its_whole_name() {
-    assert!(is_long("cargo run --release -- run configs/shield.toml --force"));
-    assert!(!is_long("fluxmorph run configs/shield_quick.toml"));
-    assert!(!is_long("fluxmorph resume configs/runs/shield_quick"));
-    assert!(is_long("fluxmorph resume configs/runs/shield --max-evaluations 60"));
-}
-
-#[test]
 fn what_is_never_run_is_checked() {
     let fault = |command: &str| never_run(command).expect("a rule").fault(command);
     assert_eq!(fault("just ci"), None);

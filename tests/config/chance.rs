@@ -54,15 +54,6 @@ fn sound_texts() -> Vec<String> {
 }
 
 #[test]
-fn every_shipped_configuration_and_seed_is_read_and_resolved() {
-    for path in sound() {
-        let text = fs::read_to_string(&path).expect("readable");
-        Config::from_str(&text, "some.toml").unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        read(&text);
-    }
-}
-
-#[test]
 fn every_former_finding_is_answered_in_time() {
     let text = |path: PathBuf| String::from_utf8_lossy(&fs::read(path).expect("readable")).into_owned();
     for path in files("tests/config/regressions/config", "") {

@@ -1,7 +1,6 @@
 //! Colours, lines too long to be shown, faults found later, and that nothing is written for a wrong input.
 
 use std::fs;
-use std::process::Command;
 
 use fluxmorph::config::{Config, ConfigError, DiagnosticReport};
 use fluxmorph::diagnostics::{Style, render};
@@ -38,22 +37,6 @@ fn colours_change_nothing_but_colours() {
         .collect();
     let trimmed = |text: &str| text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n");
     assert_eq!(trimmed(&bare), trimmed(&plain));
-}
-
-#[test]
-fn no_color_and_no_terminal_leave_colours_out() {
-    let home = folder();
-    write(home.path(), "device.toml", three_faults());
-    let said = |no_color: bool| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_fluxmorph"));
-        command.args(["check", "device.toml"]).current_dir(home.path()).env_remove("NO_COLOR");
-        if no_color {
-            command.env("NO_COLOR", "1");
-        }
-        String::from_utf8(command.output().expect("the binary starts").stderr).expect("UTF-8")
-    };
-    assert!(!said(true).contains('\u{1b}'));
-    assert_eq!(said(true), said(false));
 }
 
 #[test]

@@ -231,12 +231,3 @@ fn nearly_all_typos_get_the_right_suggestion() {
     assert!(all.asked >= ASKED, "{}", all.asked);
     assert!(all.share() >= RIGHT, "{}", all.share());
 }
-
-#[test]
-fn typos_are_single_edits() {
-    let of = typos("mma");
-    for typo in ["ma", "mm", "mmma", "mmaa", "mam", "nma", "mka", "mms"] {
-        assert!(of.contains(typo), "{typo}: {of:?}");
-    }
-    assert!(!of.contains("mma") && of.iter().all(|typo| (2..=4).contains(&typo.len())));
-}

@@ -10,7 +10,6 @@ use fluxmorph::show::Evaluation;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::Record;
 use fluxmorph_optimizer::nlopt::{Minimisation, Sample, minimise};
-use fluxmorph_optimizer::problem::Timings;
 
 use crate::disk::SimulatedDisk;
 
@@ -37,37 +36,12 @@ fn function(p: &[f64]) -> (f64, Vec<f64>, (f64, Vec<f64>)) {
 
 fn record(number: usize, p: &[f64], constrained: bool) -> Record {
     let (objective, gradient, constraint) = function(p);
-    let row = Evaluation {
-        evaluation: number,
-        iteration: 0,
-        objective,
-        ratio: 1.0,
-        gradient_norm: 0.0,
-        step_norm: 0.0,
-        worst_quality: 1.0,
-        min_thickness_m: None,
-        max_thickness_m: None,
-        linear_iterations: 0,
-        seconds: 0.0,
-        step_to_inversion: None,
-        inversion_element: None,
-        inversion_region: None,
-        round: 0,
-        level: 0,
-        forces: Vec::new(),
-        constraints: Default::default(),
-    };
     Record {
-        row,
-        improved: false,
+        row: Evaluation { evaluation: number, objective, ..Evaluation::default() },
         design: p.to_vec(),
         gradient,
         constraints: if constrained { vec![constraint] } else { Vec::new() },
-        members: Vec::new(),
-        reference: String::new(),
-        methods: Vec::new(),
-        worst_residual: 0.0,
-        timings: Timings::default(),
+        ..Record::default()
     }
 }
 

@@ -279,7 +279,7 @@ fn a_run_that_is_out_of_time_goes_on() {
     // Time for the first evaluation alone.
     let first = finish(device.command("run", &out).args(["--max-time", "0.001 ms"]));
     first.with(1, &["all evaluations are saved", "fluxmorph resume"]);
-    assert_eq!(rows(&out), 1);
+    assert_eq!((rows(&out), &RunFolder(out.clone()).result()["stop_reason"]), (1, &"max_time".into()));
     finish(resume(&out).args(["--max-time", "1 h"])).completed();
     assert_same(&essence(&files(&out)), &expected, "out of time");
 }

@@ -74,6 +74,8 @@ enum Change {
     Record(Index, [u8; 8]),
     /// Takes bytes out.
     WithoutBytes(Index, usize),
+    /// Puts a byte in the place of another.
+    Byte(Index, u8),
 }
 
 fn change() -> impl Strategy<Value = Change> {
@@ -85,6 +87,7 @@ fn change() -> impl Strategy<Value = Change> {
         (any::<Index>(), prop_oneof![Just([0xff; 8]), Just([0; 8]), any::<[u8; 8]>()])
             .prop_map(|(at, bytes)| Change::Record(at, bytes)),
         (any::<Index>(), 1usize..20).prop_map(|(at, count)| Change::WithoutBytes(at, count)),
+        any::<(Index, u8)>().prop_map(|(at, byte)| Change::Byte(at, byte)),
     ]
 }
 
@@ -116,6 +119,12 @@ impl Change {
                 let mut bytes = bytes;
                 let at = at.index(bytes.len());
                 bytes.drain(at..(at + count).min(bytes.len()));
+                return bytes;
+            }
+            Self::Byte(at, byte) => {
+                let mut bytes = bytes;
+                let at = at.index(bytes.len());
+                bytes[at] = *byte;
                 return bytes;
             }
         }

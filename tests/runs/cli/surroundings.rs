@@ -68,18 +68,6 @@ fn the_environment_asks_for_no_more_threads_than_the_command_line_may() {
 
 #[test]
 #[cfg(unix)]
-fn standard_error_that_is_closed_stops_nothing() {
-    let folder = tiny();
-    let mut command = program();
-    command.args(["run", "tiny.toml"]).current_dir(folder.path());
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
-    drop(child.stderr.take());
-    assert_eq!(child.wait().expect("it ends").code(), Some(1));
-    assert!(folder.path().join("runs/tiny/result.json").is_file());
-}
-
-#[test]
-#[cfg(unix)]
 fn names_that_are_no_utf_8_are_names_or_refused() {
     use std::ffi::{OsStr, OsString};
     use std::os::unix::ffi::OsStrExt;
