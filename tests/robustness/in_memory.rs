@@ -58,5 +58,5 @@ pub(crate) fn run(disk: &Arc<dyn Disk>, (config, source): &(Config, SourceMap)) 
 
 /// Goes on with the run on a disk.
 pub(crate) fn resume(disk: &Arc<dyn Disk>, limits: RunLimits) -> Result<RunResult, Error> {
-    run::resume(SavedRun::open(disk, FOLDER.as_ref())?, limits, support::options(disk), &mut Silent)
+    run::resume(&SavedRun::open(disk, FOLDER.as_ref())?, limits, support::options(disk), &mut Silent)
 }

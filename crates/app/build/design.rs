@@ -9,7 +9,7 @@ use fluxmorph_optimizer::design::{
     default_filter_radius,
 };
 
-use crate::config::{self, Boundaries, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
+use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 use crate::place::millimetres;
 
@@ -75,10 +75,8 @@ pub(super) fn surface(
 
 /// Surfaces that stay where they are: with a condition, or listed in `remesh.slide`.
 fn kept_surfaces(config: &Config) -> BTreeSet<&String> {
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
-    let applied = uniform_field.iter().flat_map(|field| &field.surfaces);
     let slide = config.remesh.iter().flat_map(|remesh| &remesh.slide);
-    flux_parallel.iter().chain(flux_normal).chain(applied).chain(slide).collect()
+    config.boundaries.surfaces().chain(slide).collect()
 }
 
 /// The triangles of the design surface, each once, on the mesh with all regions.

@@ -55,9 +55,6 @@ impl DividedMesh {
     }
 
     /// The mesh, with the interfaces that the configuration names and its shell of open space.
-    ///
-    /// # Errors
-    /// Of the generator, and of the shell.
     pub(crate) fn build(&self, config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
         let mesh = match self {
             Self::Shield(parameters) => shield(parameters),

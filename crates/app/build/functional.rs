@@ -22,9 +22,6 @@ use crate::error::Error;
 
 /// The mesh with the cells of every region that is measured written down: a finer mesh has the same ones then, and a sum
 /// over cells the same terms.
-///
-/// # Errors
-/// As [`Mesh::new`].
 pub(crate) fn with_cells_written_down(config: &Config, mesh: &Mesh) -> Result<Mesh, MeshError> {
     let mut topology = mesh.topology().as_ref().clone();
     for (_, name) in regions(config) {

@@ -41,9 +41,6 @@ pub(crate) fn most_tets() -> usize {
 }
 
 /// Refuses a mesh that cannot fit, before it is made; of a sweep the meshes of all cases.
-///
-/// # Errors
-/// A fault at the key of the mesh.
 pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), ConfigError> {
     let Some(room) = room(0) else { return Ok(()) };
     let cases = config.morph.iter().flat_map(|morph| &morph.cases).enumerate();
@@ -70,9 +67,6 @@ pub(crate) fn check_mesh(config: &Config, source: &SourceMap) -> Result<(), Conf
 
 /// Refuses a problem whose solution on the threads of this pool cannot fit, unless an earlier run is to be replaced: `--force`
 /// means both.
-///
-/// # Errors
-/// A fault at the mesh.
 pub(crate) fn check_problem(
     problem: &Problem,
     source: &SourceMap,

@@ -28,16 +28,16 @@ pub(super) struct Built {
     pub(super) surface: Option<DesignSurface>,
 }
 
-impl From<Mesh> for Built {
-    fn from(mesh: Mesh) -> Self {
-        Self { mesh, notices: Vec::new(), surface: None }
+impl From<(Mesh, Option<DesignSurface>)> for Built {
+    fn from((mesh, surface): (Mesh, Option<DesignSurface>)) -> Self {
+        Self { mesh, notices: Vec::new(), surface }
     }
 }
 
 /// Builds or reads the mesh of a configuration.
 pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error> {
     let generated = |mesh: Result<Mesh, MeshError>| match mesh {
-        Ok(mesh) => Ok(Built::from(mesh)),
+        Ok(mesh) => Ok(Built::from((mesh, None))),
         Err(error) => Err(parameter_fault(error, source)),
     };
     let built = match &config.mesh {
@@ -51,7 +51,7 @@ pub(super) fn build(config: &Config, source: &SourceMap) -> Result<Built, Error>
             let with_file = |message: String| format!("mesh file `{}`: {message}", path.display());
             Ok(Built {
                 notices: read.notices.messages().into_iter().map(with_file).collect(),
-                ..Built::from(read.mesh)
+                ..Built::from((read.mesh, None))
             })
         }
     }?;

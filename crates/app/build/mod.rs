@@ -57,7 +57,7 @@ use self::curves::Curves;
 use self::locate_error::DiagnosticSink;
 use self::names::{check_names, name_faults};
 use self::skin::audits;
-use crate::config::{Boundaries, Config, Diagnostic, SourceMap};
+use crate::config::{Config, Diagnostic, SourceMap};
 use crate::error::Error;
 use crate::place::millimetres;
 
@@ -110,9 +110,6 @@ pub fn set_up(config: &Config, source: &SourceMap, mode: Mode) -> Result<Setup, 
 
 /// As [`set_up`], shared out among the ranks of a group if there is one: every rank sets up the same problem, and only the
 /// first one gives commands. Every stage is reported to `progress` as it begins.
-///
-/// # Errors
-/// As [`set_up`].
 pub fn set_up_watched(
     config: &Config,
     source: &SourceMap,
@@ -123,50 +120,21 @@ pub fn set_up_watched(
     if mode == Mode::Optimisation {
         config.optimisation(source)?;
     }
-    build_problem(config, source, mode, group, progress)
+    progress.stage(Stage::Mesh);
+    mesh::build(config, source)
+        .and_then(|built| problem_on(built, config, source, mode, group, progress))
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
-fn build_problem(
+/// Sets up the problem of a configuration on a mesh that is not its own, but has its regions and surfaces; with the design
+/// surface where that comes from a coarser mesh.
+pub(crate) fn set_up_on(
+    mesh: (Mesh, Option<DesignSurface>),
     config: &Config,
     source: &SourceMap,
     mode: Mode,
-    group: Option<&RankGroup>,
-    progress: &mut dyn Progress,
 ) -> Result<Setup, Error> {
-    progress.stage(Stage::Mesh);
-    problem_on(mesh::build(config, source)?, config, source, mode, group, progress)
-}
-
-/// Sets up an optimisation on a mesh that is not the configuration's own, but has its names.
-///
-/// # Errors
-/// As [`set_up`].
-pub(crate) fn set_up_on(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Setup, Error> {
-    problem_on(mesh.into(), config, source, Mode::Optimisation, None, &mut |_| ())
-        .map_err(|error| locate_error::attribute_error(error, config, source))
-}
-
-/// Sets up the field problem of a configuration on another mesh with all its regions and surfaces.
-///
-/// # Errors
-/// As [`set_up`].
-pub(crate) fn set_up_field(config: &Config, source: &SourceMap, mesh: Mesh) -> Result<Setup, Error> {
-    problem_on(mesh.into(), config, source, Mode::Analysis, None, &mut |_| ())
-        .map_err(|error| locate_error::attribute_error(error, config, source))
-}
-
-/// Sets up an optimisation on a finer mesh of the configuration's own, with the design surface of that.
-///
-/// # Errors
-/// As [`set_up`].
-pub(crate) fn set_up_refined(
-    config: &Config,
-    source: &SourceMap,
-    (mesh, surface): (Mesh, Option<DesignSurface>),
-) -> Result<Setup, Error> {
-    let built = mesh::Built { surface, ..mesh.into() };
-    problem_on(built, config, source, Mode::Optimisation, None, &mut |_| ())
+    problem_on(mesh.into(), config, source, mode, None, &mut |_| ())
         .map_err(|error| locate_error::attribute_error(error, config, source))
 }
 
@@ -283,9 +251,7 @@ fn look_at_mesh(
 
 /// Refuses a field problem whose potential no surface fixes.
 fn check_conditions(config: &Config, source: &SourceMap) -> Result<(), Error> {
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
-    let is_given = !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some();
-    if is_given || open::condition(config).is_some() {
+    if !config.boundaries.is_empty() || open::condition(config).is_some() {
         return Ok(());
     }
     let message = "no surface has a condition: the potential is known up to a constant only";

@@ -10,8 +10,7 @@ use fluxmorph_solver::coil::{self, Racetrack};
 use super::entries::material;
 use super::skin::Audited;
 use crate::config::{
-    Boundaries, Coil, CoilShape, Config, Diagnostic, ElementOrder, Elements, MeshConfig, RegionModel,
-    SourceMap,
+    Coil, CoilShape, Config, Diagnostic, ElementOrder, Elements, MeshConfig, RegionModel, SourceMap,
 };
 use crate::place::millimetres;
 
@@ -78,8 +77,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             ));
         }
     }
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
-    if flux_parallel.is_empty() && flux_normal.is_empty() && uniform_field.is_none() {
+    if config.boundaries.is_empty() {
         warnings.push(
             "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
              flux_normal"

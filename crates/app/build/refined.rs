@@ -24,9 +24,6 @@ pub(crate) struct RefinedMesh {
 
 impl RefinedMesh {
     /// The mesh of a configuration with all its regions, before any refinement.
-    ///
-    /// # Errors
-    /// Faults of the design surface.
     pub(crate) fn new(config: &Config, source: &SourceMap, full_mesh: &Mesh) -> Result<Self, Error> {
         // Cells of what is observed are those of the first mesh: their means stay what they are.
         let mesh = functional::with_cells_written_down(config, full_mesh)?;
@@ -62,9 +59,6 @@ impl RefinedMesh {
     }
 
     /// The design surface on the present mesh: that of the first mesh, with new nodes in the middle of its edges.
-    ///
-    /// # Errors
-    /// When the surface is not one of the mesh's.
     pub(crate) fn surface(&self, config: &Config) -> Result<Option<DesignSurface>, MeshError> {
         let (Some(surface), Some(own)) = (&self.surface, &config.design) else { return Ok(None) };
         let triangles = design::triangles(own, &self.mesh)?;

@@ -14,7 +14,7 @@ use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 
 use super::entries::material;
 use super::open;
-use crate::config::{self, Boundaries, Config, Diagnostic, MeshConfig, SourceMap};
+use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
 use crate::place::millimetres;
 
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
@@ -135,14 +135,9 @@ pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
 
 /// For every face of a hull whether [boundaries] names a surface that it belongs to.
 fn with_condition(config: &Config, hull: &Hull<'_>) -> Vec<bool> {
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
-    let applied = uniform_field.iter().flat_map(|field| &field.surfaces);
     let infinity = open::condition(config).map(|(name, _)| name);
-    let faces: HashSet<[NodeId; 3]> = flux_parallel
-        .iter()
-        .chain(flux_normal)
-        .chain(applied)
-        .chain(&infinity)
+    let surfaces = config.boundaries.surfaces().chain(&infinity);
+    let faces: HashSet<[NodeId; 3]> = surfaces
         .filter_map(|name| hull.mesh().topology().surface(name).ok())
         .flatten()
         .map(|nodes| face_key(*nodes))

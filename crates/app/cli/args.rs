@@ -312,18 +312,12 @@ fn overview() -> String {
 
 impl CommonArgs {
     /// The configuration with `--set` and `--out` applied. A relative `--out` is relative to the working directory.
-    ///
-    /// # Errors
-    /// When the configuration cannot be read, is wrong, or leads out of its folder without `--allow-outside`.
     pub fn load(&self) -> Result<(Config, SourceMap), Error> {
         let (config, source) = Config::from_file(&self.config, &self.overrides).map_err(with_names)?;
         self.checked(config, source)
     }
 
     /// A configuration that leads out of its folder only where that is allowed, and whose mesh fits, with `--out` applied.
-    ///
-    /// # Errors
-    /// As [`CommonArgs::load`].
     pub fn checked(&self, mut config: Config, source: SourceMap) -> Result<(Config, SourceMap), Error> {
         if !self.work.allow_outside {
             let by = if self.out.is_some() { OutputNamedBy::User } else { OutputNamedBy::Configuration };
@@ -358,9 +352,6 @@ impl WorkArgs {
 
 impl RunArgs {
     /// The configuration with all options applied.
-    ///
-    /// # Errors
-    /// When the configuration cannot be read or is wrong.
     pub fn load(&self) -> Result<(Config, SourceMap), Error> {
         let (mut config, source) = self.common.load()?;
         if let Some(evaluations) = self.limits.max_evaluations {
@@ -388,9 +379,6 @@ fn threads(text: &str) -> Result<usize, String> {
 }
 
 /// Whether the environment, where the library of threads looks as well, asks for no more of them than `--threads` may.
-///
-/// # Errors
-/// What is wrong, in words.
 pub(super) fn check_environment(variable: impl Fn(&str) -> Option<String>) -> Result<(), String> {
     for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
         // What is no number has no effect.

@@ -14,9 +14,6 @@ use crate::files::{OutputError, system_disk, write_whole};
 use crate::schema;
 
 /// Print what is asked for.
-///
-/// # Errors
-/// When standard output or a file cannot be written to.
 pub(super) fn generate(args: &GenerateArgs) -> Result<ExitCode, Error> {
     let mut bytes = Vec::new();
     match &args.what {

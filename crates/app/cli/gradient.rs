@@ -3,8 +3,8 @@
 use fluxmorph_optimizer::verify::{Certificate, Certificates, Settings, certify};
 
 use super::args::GradientArgs;
-use super::ranks::Ranks;
-use super::{interrupt, observer, stdout, with_threads};
+use super::ranks::on_all;
+use super::{interrupt, stdout};
 use crate::build::{Mode, memory_limit, set_up_watched};
 use crate::config::FactorReuse;
 use crate::error::Error;
@@ -12,25 +12,18 @@ use crate::exit_code::ExitCode;
 use crate::files::read_design;
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When the configuration or the numbers fail, and when the certificate does not hold.
 pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (mut config, source) = args.common.load()?;
     // The differences are between designs so near to each other that one factor serves them all.
     config.analysis.linear_solver.reuse = FactorReuse::WhileItPays;
-    let ranks = Ranks::join(&config, signal.number())?;
-    let outcome = with_threads(ranks.threads(args.common.work.threads), |_| {
-        if let Some(code) = ranks.run_worker(&config, &source, Mode::Optimisation) {
-            return Ok(code);
-        }
-        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
-        let mut observer = observer(&args.common.work);
+    let work = &args.common.work;
+    on_all((&config, &source, Mode::Optimisation), work, &signal, |options, mut observer| {
+        let interrupted = options.interrupted;
         observer.phase("setting up mesh and matrices");
         let progress = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, ranks.group(), progress)?;
-        memory_limit::check_problem(&setup.problem, &source, args.common.overwrite_policy())?;
+        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, options.ranks, progress)?;
+        memory_limit::check_problem(&setup.problem, &source, options.overwrite_policy)?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }
@@ -43,10 +36,10 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             }
             None => shape.initial().to_vec(),
         };
-        setup.problem.continue_to(&p, &interrupted)?;
+        setup.problem.continue_to(&p, interrupted)?;
         let settings = Settings::default();
         let certificates =
-            certify(&setup.problem, &p, &settings, &interrupted, |constraint, index, direction| {
+            certify(&setup.problem, &p, &settings, interrupted, |constraint, index, direction| {
                 observer.phase(&format!(
                     "{}direction {} of {}: slope {:.4}, difference {:.1e}",
                     constraint.map_or_else(String::new, |name| format!("constraint {name}, ")),
@@ -58,15 +51,11 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             })?;
         // No bar may stand where the table goes.
         drop(observer);
-        print(&certificates, &settings, args.common.work.json)
-    });
-    signal.exit_code_of(outcome)
+        print(&certificates, &settings, work.json)
+    })
 }
 
 /// Prints the certificates, as JSON or as tables.
-///
-/// # Errors
-/// When one does not hold.
 fn print(certificates: &Certificates, settings: &Settings, json: bool) -> Result<ExitCode, Error> {
     let constraints = certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
     let all: Vec<(&Certificate, &str)> =

@@ -13,9 +13,6 @@ use crate::files::{OutputError, shell_word, system_disk, write_whole};
 use crate::printable::printable;
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When a file is there already, the name is none, or the files fail.
 pub(super) fn init(args: &InitArgs) -> Result<ExitCode, Error> {
     let place = Place::of(args)?;
     let files: Vec<(PathBuf, Vec<u8>)> = place

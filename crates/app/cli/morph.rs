@@ -11,9 +11,6 @@ use crate::run::Options;
 use crate::run::morph::{self, Parameters};
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When the configuration, the files or the numbers fail; a mesh that a motion breaks is a result.
 pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
     let (config, source) = args.common.load()?;

@@ -33,9 +33,6 @@ pub(super) struct PetscRank {
 
 impl PetscRank {
     /// Starts MPI and PETSc with a user's options.
-    ///
-    /// # Errors
-    /// What the libraries say.
     pub(super) fn start(options: &str) -> Result<Self, String> {
         let petsc = Petsc::start(options)?;
         let of_field = option_pairs(options).into_iter().filter(|(name, _)| is_field_option(name));

@@ -9,19 +9,23 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 
-use super::launcher;
+use super::args::WorkArgs;
+use super::interrupt::Signal;
 #[cfg(feature = "petsc")]
 use super::petsc::PetscRank;
+use super::{launcher, observer, with_threads};
 use crate::build::Mode;
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::run;
+use crate::files::system_disk;
+use crate::run::{self, Options};
+use crate::show::RunObserver;
 
 /// The ranks that this process belongs to. Dropped at the first rank, it ends the others: cleanly, or where this one panics
 /// at once, since they may wait for it in the middle of their work. So it is at a worker that leaves before it was shut down.
 #[derive(Debug)]
-pub(super) struct Ranks {
+struct Ranks {
     group: Option<RankGroup>,
     /// Threads that a rank takes by default.
     threads: Option<usize>,
@@ -29,11 +33,8 @@ pub(super) struct Ranks {
 
 impl Ranks {
     /// Joins the other ranks, where a launcher has started several processes; `signal` is what an outside signal sets.
-    ///
-    /// # Errors
-    /// [`Error::Ranks`] where the program was built without PETSc, or that does not start.
     #[cfg(feature = "petsc")]
-    pub(super) fn join(config: &Config, signal: &Arc<AtomicUsize>) -> Result<Self, Error> {
+    fn join(config: &Config, signal: &Arc<AtomicUsize>) -> Result<Self, Error> {
         if !launcher::is_launched() {
             return match launcher::size() {
                 0 | 1 => Ok(Self { group: None, threads: None }),
@@ -53,11 +54,8 @@ impl Ranks {
     }
 
     /// Joins the other ranks, where a launcher has started several processes; `signal` is what an outside signal sets.
-    ///
-    /// # Errors
-    /// [`Error::Ranks`] where the program was built without PETSc, or that does not start.
     #[cfg(not(feature = "petsc"))]
-    pub(super) fn join(_: &Config, _: &Arc<AtomicUsize>) -> Result<Self, Error> {
+    fn join(_: &Config, _: &Arc<AtomicUsize>) -> Result<Self, Error> {
         match launcher::size() {
             0 | 1 => Ok(Self { group: None, threads: None }),
             size => Err(Error::Ranks {
@@ -70,30 +68,36 @@ impl Ranks {
         }
     }
 
-    /// The group; `None` for one process.
-    pub(super) fn group(&self) -> Option<&RankGroup> {
-        self.group.as_ref()
-    }
-
-    /// Threads to take: as many as asked for, or this rank's share of the machine.
-    pub(super) fn threads(&self, asked: Option<usize>) -> Option<usize> {
-        asked.or(self.threads)
-    }
-
     /// Whether an outside signal has asked any rank to end; `signal` then has its number.
-    pub(super) fn are_signalled(&self, signal: &AtomicUsize) -> bool {
+    fn are_signalled(&self, signal: &AtomicUsize) -> bool {
         let number = self.group.as_ref().map_or(0, RankGroup::signal);
         let _ = signal.compare_exchange(0, number, Ordering::SeqCst, Ordering::SeqCst);
         number != 0
     }
+}
 
-    /// Where this rank is a worker: sets the problem up, executes commands until the first rank ends, and says how this one
-    /// ended.
-    pub(super) fn run_worker(&self, config: &Config, source: &SourceMap, mode: Mode) -> Option<ExitCode> {
-        let group = self.group.as_ref().filter(|group| group.role() == Role::Worker)?;
-        run::serve(group, config, source, mode);
-        Some(ExitCode::Success)
-    }
+/// Does a command on the threads of all ranks: the first one does `work`, the others set the problem up and execute commands
+/// until it ends.
+pub(super) fn on_all(
+    (config, source, mode): (&Config, &SourceMap, Mode),
+    args: &WorkArgs,
+    signal: &Signal,
+    work: impl FnOnce(Options<'_>, Box<dyn RunObserver>) -> Result<ExitCode, Error> + Send,
+) -> Result<ExitCode, Error> {
+    let ranks = Ranks::join(config, signal.number())?;
+    let outcome = with_threads(args.threads.or(ranks.threads), |threads| {
+        let group = ranks.group.as_ref();
+        if let Some(group) = group.filter(|group| group.role() == Role::Worker) {
+            run::serve(group, config, source, mode);
+            return Ok(ExitCode::Success);
+        }
+        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+        let (disk, overwrite_policy) = (system_disk(), args.overwrite_policy());
+        let options =
+            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
+        work(options, observer(args))
+    });
+    signal.exit_code_of(outcome)
 }
 
 impl Drop for Ranks {

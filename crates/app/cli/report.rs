@@ -10,10 +10,6 @@ use crate::show::report::ReportedRun;
 use crate::show::{Console, Observer};
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When the directory holds no run, its mesh leads out of its folder without `--allow-outside`, its files are damaged, or
-/// the page cannot be written.
 pub(super) fn report(args: &ReportArgs) -> Result<ExitCode, Error> {
     let run = ReportedRun::open(&system_disk(), &args.directory)?;
     let (config, source) = run.config();

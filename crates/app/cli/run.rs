@@ -5,78 +5,48 @@ use std::path::Path;
 
 use super::args::{ResumeArgs, RunArgs};
 use super::interrupt::{self, Signal};
-use super::ranks::Ranks;
-use super::{observer, stdout, with_threads};
+use super::ranks::on_all;
+use super::stdout;
 use crate::build::{Mode, memory_limit};
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::{self, Concluded, Options, RunLimits, SavedRun};
+use crate::run::{self, Concluded, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When the configuration, the files or the numbers fail; the error knows its exit code.
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let (config, source) = args.load()?;
-    let ranks = Ranks::join(&config, signal.number())?;
-    let outcome = with_threads(ranks.threads(args.common.work.threads), |threads| {
-        if let Some(code) = ranks.run_worker(&config, &source, Mode::Optimisation) {
-            return Ok(code);
-        }
-        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
-        let disk = system_disk();
-        let overwrite_policy = args.common.overwrite_policy();
-        let group = ranks.group();
-        let options =
-            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
-        let mut observer = observer(&args.common.work);
+    let work = &args.common.work;
+    on_all((&config, &source, Mode::Optimisation), work, &signal, |options, mut observer| {
         let result = run::run_held(&config, &source, options, &mut *observer);
-        let (report, json) = (config.output.report, args.common.work.json);
-        let ended = Ended { directory: &config.output.directory, report, json };
+        let ended =
+            Ended { directory: &config.output.directory, report: config.output.report, json: work.json };
         conclude(result, &ended, &signal, &mut *observer)
-    });
-    signal.exit_code_of(outcome)
+    })
 }
 
 /// Do what the command line says.
-///
-/// # Errors
-/// As [`run`].
 pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
-    let disk = system_disk();
-    let saved = SavedRun::open(&disk, &args.directory)?;
-    let ranks = Ranks::join(saved.config().0, signal.number())?;
-    let outcome = with_threads(ranks.threads(args.work.threads), |threads| {
-        let (config, source) = saved.config();
-        if let Some(code) = ranks.run_worker(config, source, Mode::Optimisation) {
-            return Ok(code);
-        }
-        let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
+    let saved = SavedRun::open(&system_disk(), &args.directory)?;
+    let (config, source) = saved.config();
+    on_all((config, source, Mode::Optimisation), &args.work, &signal, |options, mut observer| {
         if !args.work.allow_outside {
             source.confined(OutputNamedBy::User)?;
         }
         if !args.work.force {
             memory_limit::check_mesh(config, source)?;
         }
-        let overwrite_policy = args.work.overwrite_policy();
-        let group = ranks.group();
-        let options =
-            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
-        let report = config.output.report;
         let limits =
             RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
-        let mut observer = observer(&args.work);
-        let result = run::resume_held(saved, limits, options, &mut *observer);
-        let ended = Ended { directory: &args.directory, report, json: args.work.json };
+        let result = run::resume_held(&saved, limits, options, &mut *observer);
+        let ended = Ended { directory: &args.directory, report: config.output.report, json: args.work.json };
         conclude(result, &ended, &signal, &mut *observer)
-    });
-    signal.exit_code_of(outcome)
+    })
 }
 
 /// What to do when a run has ended.

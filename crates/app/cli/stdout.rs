@@ -11,9 +11,6 @@ use crate::printable::{printable, printable_json};
 /// Print a text; letters in it that would act on a terminal are written out.
 ///
 /// A reader that has closed its end, such as `head`, has what it wanted: that is no error.
-///
-/// # Errors
-/// When standard output cannot be written to.
 pub fn print(text: &str) -> Result<(), Error> {
     write(&printable(text))
 }
@@ -29,9 +26,6 @@ fn write(text: &str) -> Result<(), Error> {
 }
 
 /// Print a value as indented JSON.
-///
-/// # Errors
-/// When standard output cannot be written to.
 pub fn print_json(value: &impl Serialize) -> Result<(), Error> {
     let text = serde_json::to_string_pretty(value).expect("structs of numbers and text have a JSON form");
     write(&format!("{}\n", printable_json(&text)))

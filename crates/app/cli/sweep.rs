@@ -27,9 +27,6 @@ const SHARE: u32 = 10;
 const LONGEST_LOG: u64 = 1 << 24;
 
 /// Do what the command line says.
-///
-/// # Errors
-/// When the values, a configuration or the directory are wrong, before anything is run; or when the files of the sweep fail.
 pub(super) fn sweep(args: &SweepArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(FINISHES_RUNS);
     let sweep = Sweep::plan(&args.request()).inspect_err(report_faults)?;

@@ -11,12 +11,10 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::io::open_regular;
 
-/// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something.
+/// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something, and all fail where the
+/// operating system refuses; what else they fail with stands with them.
 pub trait Disk: Debug + Send + Sync {
     /// Makes a folder and those above it; one that is there already is no error.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn create_dir(&self, path: &Path) -> io::Result<()>;
 
     /// Makes a new file, readable for others as the user's mask says.
@@ -39,15 +37,9 @@ pub trait Disk: Debug + Send + Sync {
     fn lock(&self, path: &Path, sharing: Sharing) -> io::Result<Option<Box<dyn DiskLock>>>;
 
     /// Gives a file another name, in place of what had it.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
 
     /// Removes a file or a link.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn remove(&self, path: &Path) -> io::Result<()>;
 
     /// Removes an empty folder.
@@ -57,9 +49,6 @@ pub trait Disk: Debug + Send + Sync {
     fn remove_dir(&self, path: &Path) -> io::Result<()>;
 
     /// Waits until the names in a folder are on the disk.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn sync_dir(&self, path: &Path) -> io::Result<()>;
 
     /// Reads a whole regular file; a pipe or a device, which may never end, is refused.
@@ -69,9 +58,6 @@ pub trait Disk: Debug + Send + Sync {
     fn read(&self, path: &Path, most: u64) -> io::Result<Vec<u8>>;
 
     /// Names in a folder, sorted.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn names(&self, path: &Path) -> io::Result<Vec<String>>;
 
     /// Whether a link is there, wherever it leads.
@@ -95,15 +81,9 @@ impl DiskLock for File {}
 /// A file that is written.
 pub trait DiskFile: Write + Debug + Send {
     /// Waits until the content is on the disk.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn sync(&mut self) -> io::Result<()>;
 
     /// Cuts off what follows the first `length` bytes, and writes on from there.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     fn cut(&mut self, length: u64) -> io::Result<()>;
 }
 

@@ -20,9 +20,6 @@ const LARGEST_TEXT: usize = 500_000;
 /// Writes what `[output]` asks for, the mesh as `optimum`.
 ///
 /// A surface that cannot be written is a warning: the result of a run is worth more than one of its forms.
-///
-/// # Errors
-/// When the operating system refuses.
 pub(crate) fn write(
     config: &Config,
     directory: &RunDirectory,

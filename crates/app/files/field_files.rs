@@ -57,9 +57,6 @@ impl RunDirectory {
 
     /// The field files of evaluations as a collection names them, relative to the run directory; the VTU file where
     /// there is none yet.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn fields_in_collection(&self, evaluations: &[usize]) -> Result<Vec<String>, OutputError> {
         let names = self.entries(&self.fields())?;
         let file = |&evaluation: &usize| {
@@ -71,9 +68,6 @@ impl RunDirectory {
     }
 
     /// How the field of an evaluation is kept; `None` where it is not.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn field_form(&self, evaluation: usize) -> Result<Option<FieldForm>, OutputError> {
         Ok(self.form_among(&self.entries(&self.fields())?, evaluation))
     }
@@ -85,9 +79,6 @@ impl RunDirectory {
     }
 
     /// Evaluations with a field file of either form, ascending.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn evaluations_with_fields(&self) -> Result<Vec<usize>, OutputError> {
         let number = |name: &String| number(name, WHOLE).or_else(|| number_of_header(name));
         let mut numbers: Vec<usize> = self.entries(&self.fields())?.iter().filter_map(number).collect();
@@ -97,9 +88,6 @@ impl RunDirectory {
     }
 
     /// Writes the VTU file of an evaluation; pieces of it that were there go.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write_field(&self, evaluation: usize, bytes: &[u8]) -> Result<(), OutputError> {
         self.write(&self.field(evaluation), bytes)?;
         let is_of_pieces = |name: &String| [stem(evaluation), stem(evaluation) + HEADER].contains(name);
@@ -112,9 +100,6 @@ impl RunDirectory {
 
     /// Makes the empty folder that ranks write the pieces of an evaluation into; there is no header until
     /// [`RunDirectory::finish_pieces`].
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn begin_pieces(&self, evaluation: usize) -> Result<(), OutputError> {
         self.remove_pieces(evaluation)?;
         let folder = self.fields().join(stem(evaluation));
@@ -125,9 +110,6 @@ impl RunDirectory {
     }
 
     /// Writes the header of an evaluation, all of whose pieces are there; a VTU file that was there goes.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn finish_pieces(&self, evaluation: usize, header: &str) -> Result<(), OutputError> {
         self.write(&self.field_header(evaluation), header.as_bytes())?;
         self.remove(&self.field(evaluation))

@@ -18,9 +18,6 @@ pub struct History {
 impl History {
     /// Starts the file with the rows so far; `constraints` and `bodies` are the names of the constraints and of the bodies whose
     /// forces are reported, in their order.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn create(
         directory: &RunDirectory,
         (constraints, bodies): (&[&str], &[&str]),
@@ -34,9 +31,6 @@ impl History {
     }
 
     /// Appends one evaluation, and waits until it is on the disk.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn append(&mut self, evaluation: &Evaluation) -> Result<(), OutputError> {
         self.csv.append(csv_line(evaluation, &self.columns).as_bytes())
     }

@@ -257,9 +257,6 @@ impl Manifest {
     }
 
     /// Write the manifest into a run directory, replacing an older one.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
         directory.write(&directory.manifest(), &to_json(self))
     }

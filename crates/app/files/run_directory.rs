@@ -71,9 +71,6 @@ impl RunDirectory {
     }
 
     /// Makes the folder of the fields, if it is not there.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn make_fields(&self) -> Result<(), OutputError> {
         self.make(&self.fields())
     }
@@ -101,9 +98,6 @@ impl RunDirectory {
     }
 
     /// The same without a folder for fields.
-    ///
-    /// # Errors
-    /// As [`RunDirectory::create`].
     pub fn create_flat(
         disk: &Arc<dyn Disk>,
         path: &Path,
@@ -252,9 +246,6 @@ impl RunDirectory {
     }
 
     /// Removes what a killed process left half-written, and the fields of all evaluations but some.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn remove_leftovers(&self, kept: &[usize]) -> Result<(), OutputError> {
         self.remove_unfinished(&self.path)?;
         self.remove_fields(kept)
@@ -289,9 +280,6 @@ impl RunDirectory {
     }
 
     /// Removes a file of the run, if it is there.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn remove(&self, path: &Path) -> Result<(), OutputError> {
         match self.disk.remove(path) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -302,17 +290,11 @@ impl RunDirectory {
     }
 
     /// Writes a whole file of the run, replacing an older one: at any moment its place holds the one or the other.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         write_whole(&*self.disk, path, bytes)
     }
 
     /// A new log of the run, in place of an older one.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn log(&self, path: &Path, start: &[u8]) -> Result<SyncedLog, OutputError> {
         SyncedLog::create(&*self.disk, path, start)
     }

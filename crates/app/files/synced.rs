@@ -62,9 +62,6 @@ pub struct SyncedLog {
 
 impl SyncedLog {
     /// A new log that starts with some bytes. Those are written aside: the log never is without them.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub(super) fn create(disk: &dyn Disk, path: &Path, start: &[u8]) -> Result<Self, OutputError> {
         write_whole(disk, path, start)?;
         Self::reopen(disk, path, start.len() as u64)

@@ -42,9 +42,6 @@ impl Session<'_> {
     }
 
     /// The estimated errors at the initial and the best design of a run; `at_best` where that is known.
-    ///
-    /// # Errors
-    /// As [`fluxmorph_optimizer::problem::Problem::analyse`].
     pub(super) fn estimate_errors(
         &self,
         initial: Moved,
@@ -126,9 +123,6 @@ impl Session<'_> {
 }
 
 /// The ratio of a run by other elements on its own mesh; `None` for first-order edge elements, which the estimate checks.
-///
-/// # Errors
-/// As [`FinerProblem::analyse`].
 pub(super) fn cross_check(
     config: &Config,
     source: &SourceMap,

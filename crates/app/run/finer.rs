@@ -13,7 +13,7 @@ use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_remesh::{Moved, StepToInversion};
 
-use crate::build::{Setup, memory_limit, remaining_nodes, set_up_field, with_cells_written_down};
+use crate::build::{Mode, Setup, memory_limit, remaining_nodes, set_up_on, with_cells_written_down};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 
@@ -81,12 +81,9 @@ impl FinerProblem {
     }
 
     /// The same on a mesh that was cut before.
-    ///
-    /// # Errors
-    /// What the set-up fails with.
     pub fn on(mesh: FinerMesh, source: &SourceMap) -> Result<Self, Error> {
         let FinerMesh { config, refinement, coarse, remaining, .. } = mesh;
-        let setup = set_up_field(&config, source, refinement.mesh().clone())?;
+        let setup = set_up_on((refinement.mesh().clone(), None), &config, source, Mode::Analysis)?;
         let remaining = [remaining, remaining_nodes(&config, refinement.mesh().topology())];
         Ok(Self { setup, refinement, coarse, remaining })
     }
@@ -119,9 +116,6 @@ impl FinerProblem {
     }
 
     /// The objective at two shapes; `None` where a signal comes first.
-    ///
-    /// # Errors
-    /// As [`FinerProblem::analyse`].
     pub fn values(
         &self,
         shapes: &[Mesh; 2],

@@ -22,7 +22,7 @@ use fluxmorph_remesh::Moved;
 use super::Session;
 use super::journal::mesh_hash;
 use super::recorder::DirectoryRecorder;
-use crate::build::{RefinedMesh, Setup, memory_limit, remaining_elements, set_up_refined};
+use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
 use crate::config::ElementOrder;
 use crate::error::Error;
 use crate::files::{OutputError, RefinementStep, Refinements, relative_bar};
@@ -314,7 +314,8 @@ impl Session<'_> {
     }
 
     fn set_up(&self, mesh: &RefinedMesh) -> Result<Setup, Error> {
-        set_up_refined(self.config, self.source, (mesh.mesh().clone(), mesh.surface(self.config)?))
+        let finer = (mesh.mesh().clone(), mesh.surface(self.config)?);
+        set_up_on(finer, self.config, self.source, Mode::Optimisation)
     }
 
     /// Takes the new mesh near the initial design.

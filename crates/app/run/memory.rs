@@ -17,9 +17,6 @@ use crate::error::Error;
 const EDGE_OVER_NODAL: usize = 2;
 
 /// Bytes, about.
-///
-/// # Errors
-/// As [`FinerMesh::new`].
 pub(crate) fn peak(config: &Config, setup: &Setup) -> Result<usize, Error> {
     let (problem, sizes) = (&setup.problem, Sizes::of(&setup.problem));
     let is_run = problem.shape().is_some() && problem.objective().is_some();

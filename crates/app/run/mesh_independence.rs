@@ -24,7 +24,7 @@ use super::confirmation::ShapeMeshes;
 use super::finer::{Cut, FinerMesh, FinerProblem};
 use super::shape_pair::ShapePair;
 use super::summary;
-use crate::build::{DividedMesh, memory_limit, set_up_on};
+use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
@@ -193,7 +193,8 @@ impl MeshIndependence<'_> {
     /// Both values on the fresh mesh.
     fn compute_on(&self, fresh: &FreshMesh, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         let config = fresh_configuration(self.config);
-        let setup = set_up_on(fresh.mesh.build(&config, self.source)?, &config, self.source)?;
+        let mesh = (fresh.mesh.build(&config, self.source)?, None);
+        let setup = set_up_on(mesh, &config, self.source, Mode::Optimisation)?;
         // What the factor of this very mesh takes is known now.
         if let Some(shortage) = memory_limit::shortage_of(&setup.problem) {
             return Ok(Outcome::TooLarge(shortage));
@@ -282,8 +283,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::build::Setup;
-    use crate::build::{Mode, set_up};
+    use crate::build::{Setup, set_up};
 
     /// The coarse shield; without its control grid and a filter every node is a variable.
     fn quick(variables_on_nodes: bool) -> (Config, SourceMap) {

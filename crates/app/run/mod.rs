@@ -286,9 +286,6 @@ impl Session<'_> {
 
     /// The result with the gain checked on a fresh mesh, by other elements and by its estimated errors; the run's own problem
     /// is gone then.
-    ///
-    /// # Errors
-    /// When the result cannot be written.
     fn confirm(
         &mut self,
         mut result: RunResult,
@@ -347,11 +344,8 @@ fn table_hashes(tables: &BTreeMap<PathBuf, String>) -> Vec<FileHash> {
 /// Origin and content hash of the mesh with all its regions.
 pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
     let origin = match &config.mesh {
-        MeshConfig::Shield(_) => "shield".to_owned(),
-        MeshConfig::Block(_) => "block".to_owned(),
-        MeshConfig::Boxes(_) => "boxes".to_owned(),
-        MeshConfig::Sphere(_) => "sphere".to_owned(),
         MeshConfig::File { path, .. } => path.display().to_string(),
+        generated => generated.generator().map_or_else(String::new, |own| own.name().to_owned()),
     };
     let topology = mesh.topology();
     MeshHash {

@@ -36,9 +36,6 @@ impl SharedPieces {
     }
 
     /// Writes the field of an evaluation.
-    ///
-    /// # Errors
-    /// When a rank or the operating system refuses.
     pub(super) fn write(
         &self,
         directory: &RunDirectory,

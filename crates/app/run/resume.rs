@@ -32,7 +32,7 @@ pub struct RunLimits {
 }
 
 /// A run as its directory holds it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct SavedRun {
     directory: RunDirectory,
     manifest: Manifest,
@@ -73,7 +73,7 @@ impl SavedRun {
 /// [`Error::OtherRun`] where configuration, mesh or program are others, [`Error::Replay`]; before anything is written.
 /// Afterwards as [`super::run`].
 pub fn resume(
-    saved: SavedRun,
+    saved: &SavedRun,
     limits: RunLimits,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
@@ -83,12 +83,12 @@ pub fn resume(
 
 /// [`resume`], with the directory still held against other processes.
 pub(crate) fn resume_held(
-    saved: SavedRun,
+    saved: &SavedRun,
     limits: RunLimits,
     options: Options<'_>,
     observer: &mut dyn RunObserver,
 ) -> Result<Concluded, Error> {
-    let SavedRun { directory, manifest, mut config, source } = saved;
+    let SavedRun { directory, manifest, mut config, source } = saved.clone();
     let directory = directory.locked()?;
     manifest.check_current(&directory)?;
     let in_force = manifest.limits.unwrap_or(LimitsInForce::of(&config.optimizer));

@@ -17,9 +17,6 @@ use crate::show::RunObserver;
 
 /// Analyses one design and writes its field and result; on a mesh with all edges halved so many times, where its mesh is
 /// that of the design on the coarse one.
-///
-/// # Errors
-/// As [`super::run`].
 pub fn solve(
     config: &Config,
     source: &SourceMap,

@@ -224,10 +224,7 @@ impl Session<'_> {
             frequency_hz: model.setup().frequency,
             losses_w: solution.losses(model, mesh).into_iter().collect(),
             probes,
-            forces: Vec::new(),
-            saturation: None,
-            coils: Vec::new(),
-            multipoles: Vec::new(),
+            ..StateResult::default()
         }
     }
 }

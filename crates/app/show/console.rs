@@ -131,18 +131,4 @@ mod tests {
         let text = String::from_utf8(bytes).expect("text");
         assert!(text.starts_with("  factoring ") && text.ends_with("3.0 s\n"), "{text}");
     }
-
-    #[test]
-    fn a_closed_writer_is_no_reason_to_stop() {
-        struct Closed;
-        impl Write for Closed {
-            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
-                Err(std::io::ErrorKind::BrokenPipe.into())
-            }
-            fn flush(&mut self) -> std::io::Result<()> {
-                Err(std::io::ErrorKind::BrokenPipe.into())
-            }
-        }
-        Console::new(Closed).evaluation(&evaluation(0));
-    }
 }

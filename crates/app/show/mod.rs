@@ -12,6 +12,7 @@ pub mod report;
 mod styles;
 mod summary;
 mod table;
+pub(crate) mod text_table;
 
 use std::io::Write;
 use std::path::Path;
@@ -75,8 +76,6 @@ fn show(writer: &mut impl Write, text: &str) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
 
     pub(super) fn evaluation(number: usize) -> Evaluation {
@@ -95,10 +94,7 @@ mod tests {
             step_to_inversion: Some(1.25),
             inversion_element: Some(17),
             inversion_region: Some("plate".to_owned()),
-            round: 0,
-            level: 0,
-            forces: Vec::new(),
-            constraints: BTreeMap::new(),
+            ..Evaluation::default()
         }
     }
 }

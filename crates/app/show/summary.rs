@@ -30,8 +30,6 @@ impl Named {
             Goal::Maximise => "maximise",
         };
         let terms = objective.terms();
-        let unit = terms[0].functional.dimension().si_unit();
-        let is_one_unit = terms.iter().all(|term| term.functional.dimension().si_unit() == unit);
         let name = match terms {
             [term] => {
                 let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
@@ -40,7 +38,8 @@ impl Named {
             _ => format!("{goal} a sum of {} terms", terms.len()),
         };
         let name = printable(&name).into_owned();
-        Self { name, unit: if is_one_unit && unit != "1" { format!(" {unit}") } else { String::new() } }
+        let unit = objective.si_unit().filter(|unit| *unit != "1");
+        Self { name, unit: unit.map_or_else(String::new, |unit| format!(" {unit}")) }
     }
 }
 

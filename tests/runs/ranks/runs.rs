@@ -57,7 +57,7 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
         let result = match task {
             Task::Resume => {
                 let saved = SavedRun::open(&disk, directory).expect("there is a run");
-                run::resume(saved, RunLimits::default(), options, &mut Silent)
+                run::resume(&saved, RunLimits::default(), options, &mut Silent)
             }
             _ => run::run(&config, &source, options, &mut Silent),
         };

@@ -6,7 +6,6 @@
 mod advice;
 mod estimate;
 mod summary;
-mod table;
 mod text;
 mod truncation;
 
@@ -19,9 +18,6 @@ use crate::exit_code::ExitCode;
 use crate::show::{Bar, Observer, Silent, Styles};
 
 /// Set the problem up and print what it is, as a table or JSON.
-///
-/// # Errors
-/// When the configuration or the mesh is wrong, or standard output cannot be written to.
 pub(super) fn check(args: &CheckArgs) -> Result<ExitCode, Error> {
     let (config, source) = args.common.load()?;
     let work = &args.common.work;

@@ -15,8 +15,8 @@ use super::estimate::EstimateSummary;
 use super::truncation::Truncation;
 use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched, stiffness_policy};
 use crate::config::{
-    self, Boundaries, Coil, Config, Constraint, Design, Load, MeshConfig, Objective, Open, Optimizer, Probe,
-    RegionModel, Remesh, SourceMap,
+    self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, MeshConfig, Objective, Open,
+    Optimizer, Probe, RegionModel, Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
@@ -153,20 +153,12 @@ impl SkinSummary {
         let audit = &audited.audit;
         Self {
             region: audit.region.clone(),
-            model: model_name(audited.model),
+            model: audited.model.name(),
             skin_depth_m: audit.skin_depth,
             median_elements_per_skin_depth: audit.median_elements_per_skin_depth,
             least_elements_per_skin_depth: audit.least_elements_per_skin_depth,
             thickness_in_skin_depths: audit.thickness_in_skin_depths,
         }
-    }
-}
-
-fn model_name(model: RegionModel) -> &'static str {
-    match model {
-        RegionModel::Volume => "volume",
-        RegionModel::Impedance => "impedance",
-        RegionModel::Perfect => "perfect",
     }
 }
 
@@ -181,9 +173,6 @@ fn stiffness(remesh: &Remesh, shape: Option<&Shape>) -> String {
 }
 
 /// Inspects a configuration; every stage is reported to `progress` as it begins.
-///
-/// # Errors
-/// When the configuration or the mesh is wrong.
 pub(super) fn summary<'a>(
     config: &'a Config,
     source: &SourceMap,
@@ -202,7 +191,7 @@ pub(super) fn summary<'a>(
     warnings.splice(0..0, setup.warnings.iter().cloned());
     Ok(Summary {
         title: &config.title,
-        mesh_origin: origin(&config.mesh),
+        mesh_origin: config.mesh.generator().map_or("file", Generator::name),
         mesh_file: MeshFileSummary::of(&config.mesh),
         field_problem: field_problem(config),
         frequencies_hz: config.frequencies(),
@@ -249,21 +238,9 @@ impl MeshFileSummary {
     }
 }
 
-fn origin(mesh: &MeshConfig) -> &'static str {
-    match mesh {
-        MeshConfig::Shield(_) => "shield",
-        MeshConfig::Block(_) => "block",
-        MeshConfig::Boxes(_) => "boxes",
-        MeshConfig::Sphere(_) => "sphere",
-        MeshConfig::File { .. } => "file",
-    }
-}
-
 /// With [morph] a field problem need not be there.
 fn field_problem(config: &Config) -> FieldProblem {
-    let Boundaries { flux_parallel, flux_normal, uniform_field } = &config.boundaries;
-    let conditions = !flux_parallel.is_empty() || !flux_normal.is_empty() || uniform_field.is_some();
-    let is_given = conditions || !config.coils.is_empty() || config.objective.is_some();
+    let is_given = !config.boundaries.is_empty() || !config.coils.is_empty() || config.objective.is_some();
     if config.morph.is_some() && !is_given { FieldProblem::None } else { FieldProblem::Given }
 }
 
@@ -276,7 +253,7 @@ fn regions(config: &Config, mesh: &Mesh) -> Vec<RegionSummary> {
             tets: 0,
             volume_m3: 0.0,
             material: entry.map_or_else(|| "air".to_owned(), |region| region.material.clone()),
-            model: entry.map_or("volume", |region| model_name(region.model)),
+            model: entry.map_or(RegionModel::Volume, |region| region.model).name(),
         }
     };
     let mut regions: Vec<RegionSummary> = topology.region_names().iter().map(empty).collect();

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::estimate::EstimateSummary;
 use super::summary::{FieldProblem, Summary};
-use super::table::{Align, Table};
 use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, ValueBound};
 use crate::files::shell_word;
+use crate::show::text_table::{Align, Table};
 
 /// Names stand in a column of this width: the longest is `design variables`.
 const NAMES: usize = 18;

@@ -157,6 +157,26 @@ impl<'a> Section<'a> {
         });
     }
 
+    /// Whether one of these keys is written; it is wrong to write two.
+    pub(super) fn at_most_one(&self, keys: &[&str], expected: &str) -> bool {
+        let written: Vec<&str> = keys.iter().copied().filter(|key| self.has(key)).collect();
+        if let [first, second, ..] = written[..] {
+            self.clash(
+                [first, second],
+                format!("`{}` has both `{first}` and `{second}`", self.path),
+                expected,
+            );
+        }
+        !written.is_empty()
+    }
+
+    /// It is wrong to write none of these keys, or two; `example` is a line that would do.
+    pub(super) fn exactly_one(&self, keys: &[&'static str], example: &str, expected: &str) {
+        if !self.at_most_one(keys, expected) {
+            self.missing(keys, example);
+        }
+    }
+
     /// Record that two items of a list of tables have one name.
     pub(super) fn named_twice<'n>(
         &self,

@@ -151,15 +151,9 @@ impl Group for Frequencies {
 
     /// Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
     fn of(written: FrequencyKeys, section: &Section<'_>) -> Self {
+        section.exactly_one(&["frequency", "frequencies"], "frequency = \"60 Hz\"", "one of them");
         if !section.has("frequencies") {
-            if !section.has("frequency") {
-                section.missing(&["frequency"], "frequency = \"60 Hz\"");
-            }
             return Self::One(written.frequency.unwrap_or(f64::NAN));
-        }
-        if section.has("frequency") {
-            let message = format!("`{}` has both `frequency` and `frequencies`", section.path());
-            section.clash(["frequency", "frequencies"], message, "one of them");
         }
         // A list with a fault is not handed out.
         let several = written.frequencies.unwrap_or_else(|| vec![f64::NAN]);

@@ -23,6 +23,19 @@ table! {
     check = Boundaries::check;
 }
 
+impl Boundaries {
+    /// The surfaces that have a condition.
+    pub fn surfaces(&self) -> impl Iterator<Item = &String> {
+        let applied = self.uniform_field.iter().flat_map(|field| &field.surfaces);
+        self.flux_parallel.iter().chain(&self.flux_normal).chain(applied)
+    }
+
+    /// Whether no surface has a condition.
+    pub fn is_empty(&self) -> bool {
+        self.flux_parallel.is_empty() && self.flux_normal.is_empty() && self.uniform_field.is_none()
+    }
+}
+
 table! {
     /// A uniform field applied from outside: A = ½ B × (x − `center`) is prescribed on some surfaces. Where planes with a
     /// condition touch these surfaces, the field must agree with it: parallel to flux-parallel planes, at right angles to

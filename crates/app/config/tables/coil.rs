@@ -335,14 +335,7 @@ impl Coil {
     }
 
     fn check(&mut self, section: &Section<'_>) {
-        match ["ampere_turns", "voltage"].map(|key| section.has(key)) {
-            [false, false] => section.missing(&["ampere_turns"], "ampere_turns = \"40 kA\""),
-            [true, true] => {
-                let message = format!("`{}` has both `ampere_turns` and `voltage`", section.path());
-                section.clash(["ampere_turns", "voltage"], message, "one of them");
-            }
-            _ => {}
-        }
+        section.exactly_one(&["ampere_turns", "voltage"], "ampere_turns = \"40 kA\"", "one of them");
         let is_solid = self.is_solid();
         if let Some(turns) = self.turns.filter(|turns| is_solid && *turns != 1.0) {
             let message = format!("`{}` is a solid conductor with {turns} turns", section.path());
@@ -373,19 +366,14 @@ impl Group for CoilShape {
     type Written = ShapeKeys;
 
     fn of(written: ShapeKeys, section: &Section<'_>) -> Self {
-        let (has_shape, has_region) = (section.has("shape"), section.has("region"));
-        if has_shape && has_region {
-            section.clash(
-                ["shape", "region"],
-                format!("`{}` has both `shape` and `region`", section.path()),
-                "shape with its dimensions, or region with its terminals",
-            );
-        } else if !has_shape && !has_region {
-            section.missing(&["shape", "region"], "shape = \"racetrack\", or region = \"winding\"");
-        }
+        section.exactly_one(
+            &["shape", "region"],
+            "shape = \"racetrack\", or region = \"winding\"",
+            "shape with its dimensions, or region with its terminals",
+        );
         check_axis(written.axis, section);
         match written.region.clone() {
-            Some(region) if !has_shape => {
+            Some(region) if !section.has("shape") => {
                 let conductor = written.conductor.unwrap_or(ConductorWord::Stranded);
                 let connection = written.connection.unwrap_or(ConnectionWord::Series);
                 if conductor == ConductorWord::Stranded && section.has("connection") {
@@ -458,10 +446,7 @@ impl CoilPath {
 
 impl Corner {
     fn of(word: Option<CornerWord>, radius: Option<f64>, [a, b]: [f64; 2], section: &Section<'_>) -> Self {
-        if CORNERS.iter().all(|key| section.has(key)) {
-            let message = format!("`{}` has both `corner` and `inner_radius`", section.path());
-            section.clash(CORNERS, message, "one of them");
-        }
+        section.at_most_one(&CORNERS, "one of them");
         let Some(radius) = radius else { return Self::Sharp(word.unwrap_or(CornerWord::Mitred)) };
         if radius > a.min(b) {
             section.wrong(

@@ -5,13 +5,14 @@ use serde_json::json;
 
 use super::constraint_kind::{BodyKind, Kind, ThicknessKind};
 use super::design::COMPONENTS;
-use super::functional::{Compared, Functional, ObjectiveKind, TARGET_FIELD, Weighting, keys_of_the_kind};
+use super::functional::{Compared, Functional, ObjectiveKind, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
 use crate::config::table::kinds::{WORD, quantity};
 use crate::config::table::rules::{Rules, Then, is, present};
 use crate::config::table::{Group, Unread, table};
 use crate::config::text::dimension::Dimension;
 use crate::config::value::Column;
+use crate::config::value::choice::Choice;
 use crate::config::value::range::Range;
 
 table! {
@@ -100,21 +101,9 @@ const BOUNDS: [&str; 4] = ["upper", "upper_ratio", "lower", "lower_ratio"];
 /// The keys of a bound on a thickness.
 const THICKNESSES: [&str; 2] = ["minimum", "maximum"];
 /// The keys that a thickness does not have.
-const NOT_OF_A_THICKNESS: [&str; 13] = [
-    "region",
-    "coils",
-    "harmonics",
-    "weighting",
-    "target",
-    "compare",
-    "direction",
-    "frequency",
-    "load",
-    "upper",
-    "upper_ratio",
-    "lower",
-    "lower_ratio",
-];
+fn not_of_a_thickness() -> Vec<&'static str> {
+    [&["region"], &OF_A_FIELD[..], &BOUNDS[..]].concat()
+}
 
 impl LimitKeys {
     /// `upper_ratio` and `lower_ratio`.
@@ -125,13 +114,13 @@ impl LimitKeys {
     /// The keys that go with other kinds.
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("kind", &WORD) {
-            Some(Kind::Thickness(_)) => NOT_OF_A_THICKNESS.to_vec(),
+            Some(Kind::Thickness(_)) => not_of_a_thickness(),
             Some(Kind::Body(_)) => [&OF_A_FIELD[..], &THICKNESSES[..]].concat(),
             Some(_) => THICKNESSES.to_vec(),
             // Nothing can be said of the other keys.
             None => {
                 section.silence();
-                [&NOT_OF_A_THICKNESS[..], &THICKNESSES[..]].concat()
+                [not_of_a_thickness(), THICKNESSES.to_vec()].concat()
             }
         }
     }
@@ -139,7 +128,7 @@ impl LimitKeys {
 
 /// Which keys go with which kind, and the unit of the bound.
 fn keys_of_the_limit(rules: Rules) -> Rules {
-    let thickness = Then { required: &[], refused: &NOT_OF_A_THICKNESS };
+    let thickness = Then { required: &[], refused: &not_of_a_thickness() };
     let body = Then { required: &["region"], refused: &OF_A_FIELD };
     let mut rules = rules
         .when("kind", &["thickness"], thickness)
@@ -152,33 +141,21 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
             "else": { "oneOf": present(&BOUNDS) },
         }));
     let by_volume = is("weighting", &["volume"]);
-    let sums = is("kind", &[&["flux_density_squared"], &TARGET_FIELD[..]].concat());
-    let units = [
-        (json!({ "allOf": [sums, by_volume] }), Dimension::FluxDensityIntegral, Range::POSITIVE),
-        (json!({ "allOf": [sums, { "not": by_volume }] }), Dimension::FluxDensitySquared, Range::POSITIVE),
-        (is("kind", &["homogeneity"]), Dimension::Ratio, Range::POSITIVE),
-        (is("kind", &["field_component"]), Dimension::FluxDensity, Range::FINITE),
-        (is("kind", &["loss"]), Dimension::Power, Range::POSITIVE),
-        (is("kind", &["energy"]), Dimension::Energy, Range::POSITIVE),
-        (is("kind", &["force"]), Dimension::Force, Range::FINITE),
-        (is("kind", &["torque"]), Dimension::Torque, Range::FINITE),
-        (is("kind", &["inductance"]), Dimension::Inductance, Range::POSITIVE),
-        (is("kind", &["mutual_inductance"]), Dimension::Inductance, Range::FINITE),
-        (is("kind", &["coupling", "power_factor"]), Dimension::Ratio, Range::FINITE),
-        (
-            is("kind", &["quality_factor", "link_efficiency", "multipole_content"]),
-            Dimension::Ratio,
-            Range::POSITIVE,
-        ),
-        (is("kind", &["multipole"]), Dimension::FluxDensity, Range::FINITE),
-        (is("kind", &["resistance"]), Dimension::Resistance, Range::POSITIVE),
-        (is("kind", &["flux_linkage"]), Dimension::FluxLinkage, Range::FINITE),
-        (is("kind", &["current"]), Dimension::Current, Range::POSITIVE),
-        (is("kind", &["voltage"]), Dimension::Voltage, Range::POSITIVE),
-        (is("kind", &["power"]), Dimension::Power, Range::FINITE),
-        (is("kind", &["volume"]), Dimension::Volume, Range::POSITIVE),
-        (is("kind", &["mass"]), Dimension::Mass, Range::POSITIVE),
-    ];
+    let mut units = Vec::new();
+    for (word, kind, _) in ObjectiveKind::choices() {
+        let former = ObjectiveKind::FORMER.iter().filter(|(_, now)| *now == word).map(|(former, _)| *former);
+        let is_kind = is("kind", &std::iter::once(word).chain(former).collect::<Vec<_>>());
+        let [usual, over_volume] = [None, Some(Weighting::Volume)].map(|weighting| kind.dimension(weighting));
+        if usual == over_volume {
+            units.push((is_kind, usual, kind.range()));
+        } else {
+            let pointwise = json!({ "allOf": [is_kind, { "not": by_volume }] });
+            units.push((json!({ "allOf": [is_kind, by_volume] }), over_volume, kind.range()));
+            units.push((pointwise, usual, kind.range()));
+        }
+    }
+    let bodies = BodyKind::choices().into_iter();
+    units.extend(bodies.map(|(word, kind, _)| (is("kind", &[word]), kind.dimension(), Range::POSITIVE)));
     for (condition, dimension, range) in units {
         let bound = rules.definitions.quantity(dimension, range);
         let bounds = json!({ "upper": bound, "lower": bound });
@@ -300,8 +277,7 @@ impl Limit {
             load,
         };
         functional.check(section);
-        let range = if kind.may_be_negative() { Range::FINITE } else { Range::POSITIVE };
-        let bound = ValueBound::of(ratios, section, functional.dimension(), range);
+        let bound = ValueBound::of(ratios, section, functional.dimension(), kind.range());
         Self::Field { functional, bound }
     }
 
@@ -309,11 +285,7 @@ impl Limit {
         if !section.has("region") {
             section.missing(&["region"], "region = \"plate\"");
         }
-        let dimension = match kind {
-            BodyKind::Volume => Dimension::Volume,
-            BodyKind::Mass => Dimension::Mass,
-        };
-        let bound = ValueBound::of(written.ratios(), section, dimension, Range::POSITIVE);
+        let bound = ValueBound::of(written.ratios(), section, kind.dimension(), Range::POSITIVE);
         Self::Body { kind, region: written.region.unwrap_or_default(), bound }
     }
 
@@ -335,22 +307,12 @@ impl Limit {
 impl ValueBound {
     fn of(ratios: [Option<f64>; 2], section: &Section<'_>, dimension: Dimension, range: Range) -> Self {
         let [upper, lower] = ["upper", "lower"].map(|key| section.read(key, &quantity(dimension, range)));
-        let written: Vec<&str> = BOUNDS.into_iter().filter(|key| section.has(key)).collect();
-        match written[..] {
-            [] => {
-                let example = format!("upper = \"{}\", or upper_ratio = 0.9", dimension.example());
-                section.missing(&BOUNDS, &example);
-            }
-            [_] => {}
-            [first, second, ..] => {
-                let message = format!("`{}` has both `{first}` and `{second}`", section.path());
-                section.clash([first, second], message, "one of them");
-            }
-        }
-        match (written.first(), ratios) {
-            (Some(&"upper_ratio"), [Some(ratio), _]) => Self::AtMostRatio(ratio),
-            (Some(&"lower_ratio"), [_, Some(ratio)]) => Self::AtLeastRatio(ratio),
-            (Some(&"lower"), _) => Self::AtLeast(lower.unwrap_or(f64::NAN)),
+        let example = format!("upper = \"{}\", or upper_ratio = 0.9", dimension.example());
+        section.exactly_one(&BOUNDS, &example, "one of them");
+        match (BOUNDS.into_iter().find(|key| section.has(key)), ratios) {
+            (Some("upper_ratio"), [Some(ratio), _]) => Self::AtMostRatio(ratio),
+            (Some("lower_ratio"), [_, Some(ratio)]) => Self::AtLeastRatio(ratio),
+            (Some("lower"), _) => Self::AtLeast(lower.unwrap_or(f64::NAN)),
             _ => Self::AtMost(upper.unwrap_or(f64::NAN)),
         }
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::functional::ObjectiveKind;
+use crate::config::text::dimension::Dimension;
 use crate::config::value::choice::{Choice, choice};
 
 choice! {
@@ -23,6 +24,16 @@ choice! {
     }
 }
 
+impl BodyKind {
+    /// Unit of its values.
+    pub fn dimension(self) -> Dimension {
+        match self {
+            Self::Volume => Dimension::Volume,
+            Self::Mass => Dimension::Mass,
+        }
+    }
+}
+
 /// What a constraint bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(untagged)]
@@ -35,40 +46,22 @@ pub(in crate::config) enum Kind {
     Thickness(ThicknessKind),
 }
 
-/// How many words there are, of each table.
-const COUNTS: [usize; 3] =
-    [ObjectiveKind::CHOICES.len(), BodyKind::CHOICES.len(), ThicknessKind::CHOICES.len()];
-const COUNT: usize = COUNTS[0] + COUNTS[1] + COUNTS[2];
-
-type Meaning = &'static [&'static str];
-
-const ALL: ([(&str, Kind); COUNT], [Meaning; COUNT]) = {
-    let (mut words, mut meanings): ([_; COUNT], [Meaning; COUNT]) =
-        ([("", Kind::Thickness(ThicknessKind::Thickness)); COUNT], [&[]; COUNT]);
-    let mut i = 0;
-    while i < COUNT {
-        (words[i], meanings[i]) = if i < COUNTS[0] {
-            let (word, kind) = ObjectiveKind::CHOICES[i];
-            ((word, Kind::Field(kind)), &[" As in `[objective]`."] as Meaning)
-        } else if i < COUNTS[0] + COUNTS[1] {
-            let (word, kind) = BodyKind::CHOICES[i - COUNTS[0]];
-            ((word, Kind::Body(kind)), BodyKind::MEANINGS[i - COUNTS[0]])
-        } else {
-            let own = i - COUNTS[0] - COUNTS[1];
-            let (word, kind) = ThicknessKind::CHOICES[own];
-            ((word, Kind::Thickness(kind)), ThicknessKind::MEANINGS[own])
-        };
-        i += 1;
-    }
-    (words, meanings)
-};
-
 impl Choice for Kind {
     const NAME: &'static str = "Kind";
-    const ABOUT: Meaning = &[" Every word that `kind` may be."];
-    const CHOICES: &'static [(&'static str, Self)] = &ALL.0;
-    const MEANINGS: &'static [Meaning] = &ALL.1;
+    const ABOUT: &'static [&'static str] = &[" Every word that `kind` may be."];
     const FORMER: &'static [(&'static str, &'static str)] = ObjectiveKind::FORMER;
+
+    fn choices() -> Vec<(&'static str, Self, &'static [&'static str])> {
+        let as_there: &[&str] = &[" As in `[objective]`."];
+        let fields =
+            ObjectiveKind::choices().into_iter().map(|(word, kind, _)| (word, Self::Field(kind), as_there));
+        let bodies = BodyKind::choices().into_iter().map(|(word, kind, own)| (word, Self::Body(kind), own));
+        let thickness = ThicknessKind::choices().into_iter();
+        fields
+            .chain(bodies)
+            .chain(thickness.map(|(word, kind, own)| (word, Self::Thickness(kind), own)))
+            .collect()
+    }
 }
 
 impl Kind {

@@ -10,6 +10,7 @@ use crate::config::table::table;
 use crate::config::text::dimension::Dimension;
 use crate::config::text::message::shown;
 use crate::config::value::choice::choice;
+use crate::config::value::range::Range;
 
 table! {
     /// A real quantity of the field.
@@ -186,20 +187,46 @@ impl ObjectiveKind {
         matches!(self, Self::FluxDensitySquared | Self::TargetField | Self::Homogeneity)
     }
 
-    /// Whether its values have either sign.
-    pub(super) fn may_be_negative(self) -> bool {
-        matches!(
-            self,
+    /// What a bound on it may be: its values have either sign, or are positive.
+    pub(super) fn range(self) -> Range {
+        match self {
             Self::FieldComponent
-                | Self::Force
-                | Self::Torque
-                | Self::MutualInductance
-                | Self::Coupling
-                | Self::PowerFactor
-                | Self::FluxLinkage
-                | Self::Power
-                | Self::Multipole
-        )
+            | Self::Force
+            | Self::Torque
+            | Self::MutualInductance
+            | Self::Coupling
+            | Self::PowerFactor
+            | Self::FluxLinkage
+            | Self::Power
+            | Self::Multipole => Range::FINITE,
+            _ => Range::POSITIVE,
+        }
+    }
+
+    /// Unit of its values.
+    pub(super) fn dimension(self, weighting: Option<Weighting>) -> Dimension {
+        match self {
+            Self::FluxDensitySquared | Self::TargetField if weighting == Some(Weighting::Volume) => {
+                Dimension::FluxDensityIntegral
+            }
+            Self::FluxDensitySquared | Self::TargetField => Dimension::FluxDensitySquared,
+            Self::FieldComponent | Self::Multipole => Dimension::FluxDensity,
+            Self::Loss | Self::Power => Dimension::Power,
+            Self::Energy => Dimension::Energy,
+            Self::Force => Dimension::Force,
+            Self::Torque => Dimension::Torque,
+            Self::Inductance | Self::MutualInductance => Dimension::Inductance,
+            Self::Homogeneity
+            | Self::Coupling
+            | Self::QualityFactor
+            | Self::LinkEfficiency
+            | Self::PowerFactor
+            | Self::MultipoleContent => Dimension::Ratio,
+            Self::Resistance => Dimension::Resistance,
+            Self::FluxLinkage => Dimension::FluxLinkage,
+            Self::Current => Dimension::Current,
+            Self::Voltage => Dimension::Voltage,
+        }
     }
 
     /// How many coils it is of.
@@ -343,34 +370,6 @@ impl Functional {
 
     /// Unit of its values.
     pub fn dimension(&self) -> Dimension {
-        match (self.kind, self.weighting) {
-            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField, Some(Weighting::Volume)) => {
-                Dimension::FluxDensityIntegral
-            }
-            (ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField, _) => {
-                Dimension::FluxDensitySquared
-            }
-            (ObjectiveKind::Homogeneity, _) => Dimension::Ratio,
-            (ObjectiveKind::FieldComponent, _) => Dimension::FluxDensity,
-            (ObjectiveKind::Loss, _) => Dimension::Power,
-            (ObjectiveKind::Energy, _) => Dimension::Energy,
-            (ObjectiveKind::Force, _) => Dimension::Force,
-            (ObjectiveKind::Torque, _) => Dimension::Torque,
-            (ObjectiveKind::Inductance | ObjectiveKind::MutualInductance, _) => Dimension::Inductance,
-            (
-                ObjectiveKind::Coupling
-                | ObjectiveKind::QualityFactor
-                | ObjectiveKind::LinkEfficiency
-                | ObjectiveKind::PowerFactor
-                | ObjectiveKind::MultipoleContent,
-                _,
-            ) => Dimension::Ratio,
-            (ObjectiveKind::Multipole, _) => Dimension::FluxDensity,
-            (ObjectiveKind::Resistance, _) => Dimension::Resistance,
-            (ObjectiveKind::FluxLinkage, _) => Dimension::FluxLinkage,
-            (ObjectiveKind::Current, _) => Dimension::Current,
-            (ObjectiveKind::Voltage, _) => Dimension::Voltage,
-            (ObjectiveKind::Power, _) => Dimension::Power,
-        }
+        self.kind.dimension(self.weighting)
     }
 }

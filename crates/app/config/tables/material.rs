@@ -144,12 +144,7 @@ impl Material {
 
     /// A curve comes from one place, and stands in place of the permeability.
     fn check(&mut self, section: &Section<'_>) {
-        for keys in [["bh", "bh_file"], ["bh", "saturation"], ["bh_file", "saturation"]] {
-            if keys.iter().all(|key| section.has(key)) {
-                let message = format!("`{}` has both `{}` and `{}`", section.path(), keys[0], keys[1]);
-                section.clash(keys, message, "one of them");
-            }
-        }
+        section.at_most_one(&["bh", "bh_file", "saturation"], "one of them");
         if self.bh.is_some() || self.bh_file.is_some() {
             if self.relative_permeability != 1.0 {
                 let message = format!(

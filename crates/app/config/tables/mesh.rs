@@ -138,9 +138,9 @@ fn keys_of_the_mesh(rules: Rules) -> Rules {
         rules.exactly_one(&["generator", "file"]).needs("file", &["unit"]).needs("unit", &["file"]).add(
             json!({ "if": is("generator", &[Generator::Boxes.name()]), "then": { "required": ["boxes"] } }),
         );
-    for (table, _) in Generator::CHOICES {
+    for (table, ..) in Generator::choices() {
         let own = json!({ "properties": { "generator": { "enum": [table] } }, "required": ["generator"] });
-        rules = rules.add(json!({ "dependentSchemas": { (*table): own } }));
+        rules = rules.add(json!({ "dependentSchemas": { (table): own } }));
     }
     rules
 }
@@ -167,9 +167,9 @@ impl MeshKeys {
         if self.generator == Some(Generator::Boxes) && !section.has("boxes") {
             section.missing(&["boxes"], "[mesh.boxes] with the box of the whole and its regions");
         }
-        for (key, owner) in Generator::CHOICES {
+        for (key, owner, _) in Generator::choices() {
             let other_mesh = match self.generator {
-                Some(generator) => generator != *owner,
+                Some(generator) => generator != owner,
                 None => section.has("file") && !section.has("generator"),
             };
             if section.has(key) && other_mesh {
@@ -228,6 +228,17 @@ impl From<MeshConfig> for MeshKeys {
 }
 
 impl MeshConfig {
+    /// The generator; `None` for a file.
+    pub fn generator(&self) -> Option<Generator> {
+        match self {
+            Self::Shield(_) => Some(Generator::Shield),
+            Self::Block(_) => Some(Generator::Block),
+            Self::Boxes(_) => Some(Generator::Boxes),
+            Self::Sphere(_) => Some(Generator::Sphere),
+            Self::File { .. } => None,
+        }
+    }
+
     /// Tetrahedra that a generator makes; `None` for a file, and for parameters that the generator refuses.
     pub fn tet_count(&self) -> Option<u64> {
         let tets = match self {

@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::order::box_with_volume;
 use crate::config::section::Section;
 use crate::config::table::{Group, table};
-use crate::config::value::choice::{Choice, choice};
+use crate::config::value::choice::choice;
+use crate::config::value::choice_named;
 use crate::config::value::range::Range;
 
 /// Poisson's ratio of a stable body.
@@ -143,8 +144,7 @@ table! {
 impl StiffnessLaw {
     /// The law of a policy of the elastic map; `None` for one that the configuration has no word for.
     pub fn of_policy(policy: fluxmorph_remesh::StiffnessPolicy) -> Option<Self> {
-        let same = |(word, _): &&(&str, Self)| *word == policy.name();
-        Self::CHOICES.iter().find(same).map(|(_, law)| *law)
+        choice_named(policy.name())
     }
 }
 
@@ -172,19 +172,8 @@ impl Group for RemeshExtent {
     type Written = ExtentKeys;
 
     fn of(written: ExtentKeys, section: &Section<'_>) -> Self {
-        match (section.has("region"), section.has("box")) {
-            (true, true) => {
-                section.clash(
-                    ["region", "box"],
-                    "remesh.region and remesh.box are both given",
-                    "one of them",
-                );
-            }
-            (false, false) => {
-                section.missing(&["region", "box"], "region = \"remesh\", or box = [[0, 0, 0], [1, 1, 1]]");
-            }
-            _ => {}
-        }
+        let example = "region = \"remesh\", or box = [[0, 0, 0], [1, 1, 1]]";
+        section.exactly_one(&["region", "box"], example, "one of them");
         match written.corners.and_then(|corners| box_with_volume(section, "box", corners)) {
             Some(corners) => Self::Box(corners),
             None => Self::Regions(written.region.unwrap_or_default()),

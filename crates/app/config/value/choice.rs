@@ -6,12 +6,11 @@ pub(in crate::config) trait Choice: Copy + 'static {
     const NAME: &'static str;
     /// Lines that describe the enum.
     const ABOUT: &'static [&'static str];
-    /// Word and variant.
-    const CHOICES: &'static [(&'static str, Self)];
-    /// Lines that describe each variant.
-    const MEANINGS: &'static [&'static [&'static str]];
     /// Words of earlier versions and the words that took their place: still read, with a notice.
     const FORMER: &'static [(&'static str, &'static str)];
+
+    /// Words and variants, and lines that describe each.
+    fn choices() -> Vec<(&'static str, Self, &'static [&'static str])>;
 }
 
 /// Declares such an enum: the word, the variant, its meaning, its form in `resolved.toml` and in the schema stay together.
@@ -58,9 +57,11 @@ macro_rules! choice {
         impl $crate::config::value::choice::Choice for $name {
             const NAME: &'static str = stringify!($name);
             const ABOUT: &'static [&'static str] = &[$($about),*];
-            const CHOICES: &'static [(&'static str, Self)] = &[$(($word, Self::$variant)),+];
-            const MEANINGS: &'static [&'static [&'static str]] = &[$(&[$($meaning),*]),+];
             const FORMER: &'static [(&'static str, &'static str)] = &[$($(($former, $word),)?)+];
+
+            fn choices() -> Vec<(&'static str, Self, &'static [&'static str])> {
+                vec![$(($word, Self::$variant, &[$($meaning),*] as &[&str])),+]
+            }
         }
     };
 }

@@ -24,4 +24,4 @@ pub(super) use limits::LONGEST_LENGTH;
 pub(super) use list::NotEmpty;
 pub(super) use number::{Number, PerAxis, Whole, ZeroOr};
 pub(super) use placeholder::Placeholder;
-pub(super) use text::{Column, Flag, NameOrNames, Names, Text, Word, first_duplicate};
+pub(super) use text::{Column, Flag, NameOrNames, Names, Text, Word, choice_named, first_duplicate};

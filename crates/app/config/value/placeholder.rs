@@ -35,7 +35,7 @@ impl Placeholder for String {
 
 impl<T: Choice> Placeholder for T {
     fn placeholder() -> Self {
-        Self::CHOICES[0].1
+        Self::choices()[0].1
     }
 }
 

@@ -193,12 +193,12 @@ impl<T: Choice> Value<Word> for T {
 
     fn schema(_: &Word, definitions: &mut Definitions) -> Keywords {
         let words = || {
-            let word = |((word, _), meaning): (&(&str, T), &&[&str])| json!({ "description": described(meaning), "type": "string", "const": word });
+            let word = |(word, _, meaning): (&str, T, &[&str])| json!({ "description": described(meaning), "type": "string", "const": word });
             let former = |(former, word): &(&str, &str)| {
                 let meaning = format!("What `{word}` was called before.");
                 json!({ "description": meaning, "type": "string", "const": former, "deprecated": true })
             };
-            let words = T::CHOICES.iter().zip(T::MEANINGS).map(word);
+            let words = T::choices().into_iter().map(word);
             let words: Vec<Json> = words.chain(T::FORMER.iter().map(former)).collect();
             json!({ "description": described(T::ABOUT), "oneOf": words })
         };
@@ -233,7 +233,7 @@ impl<T: Choice> Value<Word> for Vec<T> {
 /// The choice that a word stands for.
 pub(in crate::config) fn choice_named<T: Choice>(word: &str) -> Option<T> {
     let word = former::<T>(word).map_or(word, |(_, now)| now);
-    T::CHOICES.iter().find(|(name, _)| *name == word).map(|(_, choice)| *choice)
+    T::choices().into_iter().find(|(name, ..)| *name == word).map(|(_, choice, _)| choice)
 }
 
 /// A word of earlier versions, with the one that took its place.
@@ -242,7 +242,7 @@ fn former<T: Choice>(word: &str) -> Option<(&'static str, &'static str)> {
 }
 
 fn words<T: Choice>() -> Vec<&'static str> {
-    T::CHOICES.iter().map(|(word, _)| *word).collect()
+    T::choices().into_iter().map(|(word, ..)| word).collect()
 }
 
 /// `true` or `false`.

@@ -96,9 +96,6 @@ pub struct Journal {
 
 impl Journal {
     /// A new journal in a run directory, without records.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn create(directory: &RunDirectory, identity: Identity) -> Result<Self, OutputError> {
         let (header, sum) = line::header(&identity);
         Ok(Self { log: directory.log(&directory.journal(), header.as_bytes())?, identity, sum })
@@ -140,9 +137,6 @@ impl Journal {
     }
 
     /// Keeps a copy of a damaged journal beside it, before it is cut after its whole records.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn keep_damaged(directory: &RunDirectory) -> Result<(), OutputError> {
         let path = directory.journal();
         let bytes = directory.disk().read(&path, LARGEST).map_err(OutputError::io("read", &path))?;

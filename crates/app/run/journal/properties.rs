@@ -84,12 +84,6 @@ proptest! {
     }
 
     #[test]
-    fn cut_at_any_byte_a_journal_is_a_prefix_of_its_records(written in written(), cut in any::<Index>()) {
-        let cut = cut.index(written.bytes.len());
-        written.assert_prefix(&written.bytes[..cut], cut);
-    }
-
-    #[test]
     fn changed_bits_shorten_a_journal_and_never_alter_it(
         written in written(),
         flips in vec((any::<Index>(), 0u8..8), 1..4),
@@ -133,7 +127,7 @@ fn seeds() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/journal")
 }
 
-/// Writes the seeds of the fuzz target: `cargo test --release -p fluxmorph-optimizer --lib -- --ignored write_the_journals`.
+/// Writes the seeds of the fuzz target: `cargo test --release --workspace --lib -- --ignored write_the_journals`.
 #[test]
 #[ignore = "writes fuzz/seeds"]
 fn write_the_journals() {

@@ -53,9 +53,6 @@ struct Steps {
 /// Moves the mesh along the path of a set-up; no increment but the last of a given number may fall below a quality.
 ///
 /// `report` receives a line for each thing that happens on the way, and may end the motion there.
-///
-/// # Errors
-/// Whatever the elastic map refuses.
 pub fn step_along(
     setup: &MotionSetup,
     increments: Increments,

@@ -3,6 +3,7 @@
 use super::{CaseReport, CaseResult, MorphReport, TuneReport};
 use crate::config::Paper;
 use crate::files::csv_text;
+use crate::show::text_table::Table;
 
 /// The columns of the first table.
 const ROW: [&str; 9] = [
@@ -31,15 +32,10 @@ pub fn text(report: &MorphReport) -> String {
     if report.cases.iter().any(|case| case.paper.is_some()) {
         text += "; (in brackets: the paper)";
     }
-    text += "\n\n";
-    let rows: Vec<Vec<String>> = report.cases.iter().map(row).collect();
-    text += &align(&ROW, &rows);
-    text.push('\n');
-    let rows: Vec<Vec<String>> = report.cases.iter().map(shares).collect();
-    text += &align(&SHARES, &rows);
-    text.push('\n');
-    let rows: Vec<Vec<String>> = report.cases.iter().map(places).collect();
-    text += &align(&PLACES, &rows);
+    text += "\n";
+    text += &Table::of_numbers(ROW, report.cases.iter().map(row)).text();
+    text += &Table::of_numbers(SHARES, report.cases.iter().map(shares)).text();
+    text += &Table::of_numbers(PLACES, report.cases.iter().map(places)).text();
     for case in report.cases.iter().filter(|case| !case.valid) {
         text += &format!("\n{}: {}", case.name, trouble(case));
     }
@@ -63,11 +59,11 @@ fn trouble(case: &CaseReport) -> String {
     format!("the worst quality {:.4} is below morph.least_quality", case.after.worst)
 }
 
-fn row(case: &CaseReport) -> Vec<String> {
+fn row(case: &CaseReport) -> [String; ROW.len()] {
     let paper = case.paper.unwrap_or_default();
-    let Some(result) = &case.result else { return without_result(case, ROW.len()) };
+    let Some(result) = &case.result else { return without_result(case) };
     let CaseResult { before, after, .. } = result;
-    vec![
+    [
         case.name.clone(),
         beside(result.equations.to_string(), paper.equations.map(|n| n.to_string())),
         after.elements.to_string(),
@@ -83,16 +79,16 @@ fn row(case: &CaseReport) -> Vec<String> {
     ]
 }
 
-fn shares(case: &CaseReport) -> Vec<String> {
+fn shares(case: &CaseReport) -> [String; SHARES.len()] {
     let paper = case.paper.unwrap_or_default();
     let Some(CaseResult { before, after, .. }) = &case.result else {
-        return without_result(case, SHARES.len());
+        return without_result(case);
     };
     let share = |k: usize, published: Option<f64>| {
         let [was, is] = [before, after].map(|quality| quality.shares_percent[k]);
         beside(format!("{was:.2} -> {is:.2}"), published.map(|value| format!("{value}")))
     };
-    vec![
+    [
         case.name.clone(),
         share(0, paper.share_poor_percent),
         share(1, paper.share_fair_percent),
@@ -109,22 +105,20 @@ fn beside(own: String, published: Option<String>) -> String {
 }
 
 /// The row of a case that could not be computed.
-fn without_result(case: &CaseReport, columns: usize) -> Vec<String> {
-    let mut cells = vec!["-".to_owned(); columns];
-    cells[0].clone_from(&case.name);
-    cells
+fn without_result<const N: usize>(case: &CaseReport) -> [String; N] {
+    std::array::from_fn(|k| if k == 0 { case.name.clone() } else { "-".to_owned() })
 }
 
-fn places(case: &CaseReport) -> Vec<String> {
+fn places(case: &CaseReport) -> [String; PLACES.len()] {
     let place = |p: [f64; 3]| {
         let [x, y, z] = p.map(|c| (c * 1e6).round() * 1e-3 + 0.0);
         format!("{x:.2} {y:.2} {z:.2}")
     };
     let dash = || "-".to_owned();
     let Some(CaseResult { inversion, worst_element: worst, .. }) = &case.result else {
-        return without_result(case, PLACES.len());
+        return without_result(case);
     };
-    vec![
+    [
         case.name.clone(),
         worst.element.to_string(),
         worst.region.clone(),
@@ -136,110 +130,57 @@ fn places(case: &CaseReport) -> Vec<String> {
     ]
 }
 
-/// Columns of equal width, the first to the left.
-pub(super) fn align(header: &[&str], rows: &[Vec<String>]) -> String {
-    let width = |column: usize| {
-        let cells = rows.iter().map(|row| row[column].chars().count());
-        cells.chain([header[column].chars().count()]).max().unwrap_or(0)
-    };
-    let widths: Vec<usize> = (0..header.len()).map(width).collect();
-    let line = |cells: Vec<&str>| {
-        let padded: Vec<String> = cells
-            .into_iter()
-            .zip(&widths)
-            .enumerate()
-            .map(|(column, (cell, &width))| match column {
-                0 => format!("{cell:<width$}"),
-                _ => format!("{cell:>width$}"),
-            })
-            .collect();
-        format!("{}\n", padded.join("  ").trim_end())
-    };
-    let mut text = line(header.to_vec());
-    rows.iter().for_each(|row| text += &line(row.iter().map(String::as_str).collect()));
-    text
-}
+/// Columns of `morph.csv` that say what came out of a motion.
+const RESULT: [(&str, fn(&CaseResult) -> String); 18] = [
+    ("equations", |r| r.equations.to_string()),
+    ("elements", |r| r.after.elements.to_string()),
+    ("worst_before", |r| number(Some(r.before.worst))),
+    ("worst_after", |r| number(Some(r.after.worst))),
+    ("poor_before", |r| r.before.poor.to_string()),
+    ("poor_after", |r| r.after.poor.to_string()),
+    ("fair_before", |r| r.before.fair.to_string()),
+    ("fair_after", |r| r.after.fair.to_string()),
+    ("good_before", |r| r.before.good.to_string()),
+    ("good_after", |r| r.after.good.to_string()),
+    ("inverted", |r| r.inverted.to_string()),
+    ("worst_element", |r| r.worst_element.element.to_string()),
+    ("worst_region", |r| csv_text(&r.worst_element.region)),
+    ("inversion_step", |r| number(r.inversion.step)),
+    ("inversion_element", |r| r.inversion.element.map_or_else(String::new, |e| e.to_string())),
+    ("reached", |r| number(Some(r.reached))),
+    ("increments", |r| r.increments.to_string()),
+    ("rescues", |r| r.fallbacks.to_string()),
+];
 
-/// The columns of `morph.csv`.
-const COLUMNS: [&str; 27] = [
-    "case",
-    "valid",
-    "equations",
-    "elements",
-    "worst_before",
-    "worst_after",
-    "poor_before",
-    "poor_after",
-    "fair_before",
-    "fair_after",
-    "good_before",
-    "good_after",
-    "inverted",
-    "worst_element",
-    "worst_region",
-    "inversion_step",
-    "inversion_element",
-    "reached",
-    "increments",
-    "rescues",
-    "paper_worst_quality",
-    "paper_poor",
-    "paper_share_poor_percent",
-    "paper_share_fair_percent",
-    "paper_share_good_percent",
-    "paper_equations",
-    "error",
+/// Columns of published values.
+const PAPER: [(&str, fn(&Paper) -> String); 6] = [
+    ("paper_worst_quality", |p| number(p.worst_quality)),
+    ("paper_poor", |p| count(p.poor)),
+    ("paper_share_poor_percent", |p| number(p.share_poor_percent)),
+    ("paper_share_fair_percent", |p| number(p.share_fair_percent)),
+    ("paper_share_good_percent", |p| number(p.share_good_percent)),
+    ("paper_equations", |p| count(p.equations)),
 ];
 
 /// The report as CSV, one row for each case; shortest digits that read back as the same number, empty for what is not
 /// known.
 pub fn csv(report: &MorphReport) -> String {
-    let mut text = format!("{}\n", COLUMNS.join(","));
+    let names = RESULT.map(|(name, _)| name).into_iter().chain(PAPER.map(|(name, _)| name));
+    let mut text =
+        ["case", "valid"].into_iter().chain(names).chain(["error"]).collect::<Vec<_>>().join(",") + "\n";
     for case in &report.cases {
         let paper = case.paper.unwrap_or_default();
         let mut cells = vec![csv_text(&case.name), case.valid.to_string()];
-        cells.extend(case.result.as_ref().map_or_else(|| vec![String::new(); 18], result_cells));
-        cells.extend(paper_cells(&paper));
+        cells.extend(RESULT.map(|(_, cell)| case.result.as_ref().map_or_else(String::new, cell)));
+        cells.extend(PAPER.map(|(_, cell)| cell(&paper)));
         cells.push(case.error.as_deref().map_or_else(String::new, csv_text));
         text += &format!("{}\n", cells.join(","));
     }
     text
 }
 
-fn result_cells(result: &CaseResult) -> Vec<String> {
-    let CaseResult { before, after, worst_element: worst, inversion, .. } = result;
-    vec![
-        result.equations.to_string(),
-        after.elements.to_string(),
-        number(Some(before.worst)),
-        number(Some(after.worst)),
-        before.poor.to_string(),
-        after.poor.to_string(),
-        before.fair.to_string(),
-        after.fair.to_string(),
-        before.good.to_string(),
-        after.good.to_string(),
-        result.inverted.to_string(),
-        worst.element.to_string(),
-        csv_text(&worst.region),
-        number(inversion.step),
-        inversion.element.map_or_else(String::new, |e| e.to_string()),
-        number(Some(result.reached)),
-        result.increments.to_string(),
-        result.fallbacks.to_string(),
-    ]
-}
-
-fn paper_cells(paper: &Paper) -> Vec<String> {
-    let count = |value: Option<usize>| value.map_or_else(String::new, |value| value.to_string());
-    vec![
-        number(paper.worst_quality),
-        count(paper.poor),
-        number(paper.share_poor_percent),
-        number(paper.share_fair_percent),
-        number(paper.share_good_percent),
-        count(paper.equations),
-    ]
+fn count(value: Option<usize>) -> String {
+    value.map_or_else(String::new, |value| value.to_string())
 }
 
 fn number(value: Option<f64>) -> String {
@@ -270,8 +211,8 @@ mod tests {
         let report = MorphReport::of(vec![broken(), broken()]);
         let csv = csv(&report);
         let rows: Vec<&str> = csv.lines().collect();
-        assert_eq!(rows[0].split(',').count(), COLUMNS.len());
-        let empty = ",".repeat(18);
+        assert_eq!(rows[0].split(',').count(), rows[1].split(',').count() - 1, "a name has a comma");
+        let empty = ",".repeat(RESULT.len());
         assert_eq!(rows[1], format!("\"b, stiff\",false{empty},,7,,,,360,the matrix is singular"));
         let text = text(&report);
         assert!(text.contains("\nb, stiff: the matrix is singular"), "{text}");

@@ -14,11 +14,11 @@ use fluxmorph_optimizer::nlopt::{Search, maximise};
 use fluxmorph_remesh::{self as remesh, ElasticMap, RemeshSetup, StiffnessPolicy};
 use serde::Serialize;
 
-use super::table::align;
 use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::show::Observer;
+use crate::show::text_table::Table;
 
 /// Gain of worst quality for which another policy is taken: on equal cells the isotropic ones are
 /// the same but for rounding.
@@ -94,21 +94,18 @@ impl TuneReport {
             self.stiffness[1]
         );
         let policies: Vec<String> = self.policies.iter().map(|(name, q)| format!("{name} {q:.4}")).collect();
-        text += &format!("best of every stiffness: {}\n\n", policies.join(", "));
+        text += &format!("best of every stiffness: {}\n", policies.join(", "));
         let force = |f: [f64; 3]| format!("{:.3e} {:.3e} {:.3e}", f[0], f[1], f[2]);
-        let rows: Vec<Vec<String>> = self
-            .regions
-            .iter()
-            .map(|region| {
-                vec![
-                    region.name.clone(),
-                    format!("{:.4e} -> {:.4e}", region.young[0], region.young[1]),
-                    pair(region.poisson),
-                    format!("{} -> {}", force(region.force[0]), force(region.force[1])),
-                ]
-            })
-            .collect();
-        text + &align(&["region", "young", "poisson", "force"], &rows) + "\n"
+        let row = |region: &TunedRegion| {
+            [
+                region.name.clone(),
+                format!("{:.4e} -> {:.4e}", region.young[0], region.young[1]),
+                pair(region.poisson),
+                format!("{} -> {}", force(region.force[0]), force(region.force[1])),
+            ]
+        };
+        let names = ["region", "young", "poisson", "force"];
+        text + &Table::of_numbers(names, self.regions.iter().map(row)).text() + "\n"
     }
 }
 
@@ -129,9 +126,6 @@ pub(super) fn nothing_to_search(settings: &Tune, setup: &MotionSetup) -> Option<
 
 /// Searches elastic parameters for the motion of a set-up, until `interrupted` says so; it is asked before each evaluation
 /// but the first.
-///
-/// # Errors
-/// Whatever the elastic map refuses at the parameters of the configuration.
 pub(super) fn tune(
     config: &Config,
     source: &SourceMap,

@@ -29,7 +29,7 @@ pub struct Comparison {
 }
 
 /// One combination.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Row {
     /// Values of the swept keys.
     pub values: Vec<String>,
@@ -65,7 +65,7 @@ pub struct Row {
     is_feasible: bool,
     /// Which way the objective is better.
     #[serde(skip)]
-    goal: Goal,
+    goal: Option<Goal>,
     /// Whether there is a page about the run.
     #[serde(skip)]
     pub(super) is_reported: bool,
@@ -91,9 +91,6 @@ impl Comparison {
     }
 
     /// Reads one combination again.
-    ///
-    /// # Errors
-    /// As [`Comparison::read`].
     pub fn update(&mut self, sweep: &Sweep, layout: &Layout, index: usize) -> Result<(), Error> {
         self.combinations[index] = Row::read(sweep, layout, &sweep.combinations[index])?;
         self.compare();
@@ -118,9 +115,6 @@ impl Comparison {
     }
 
     /// Writes `sweep.csv` and `sweep.html`.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, sweep: &Sweep, layout: &Layout) -> Result<(), Error> {
         layout.write("sweep.csv", self.csv().as_bytes())?;
         Ok(layout.write("sweep.html", page::page(sweep, self).as_bytes())?)
@@ -151,8 +145,8 @@ impl Comparison {
 
     /// The best of the rows that keep their constraints and want the same.
     fn find_best(&self) -> Option<usize> {
-        let goal = self.combinations.first()?.goal;
-        if self.combinations.iter().any(|row| row.goal != goal) {
+        let goal = self.combinations.first()?.goal?;
+        if self.combinations.iter().any(|row| row.goal != Some(goal)) {
             return None;
         }
         let known = |(index, row): (usize, &Row)| Some((index, row.ratio.filter(|ratio| ratio.is_finite())?));
@@ -226,22 +220,9 @@ impl Row {
     fn blank(planned: &Planned) -> Self {
         Self {
             values: planned.combination.values.clone(),
-            status: None,
-            stop_reason: None,
-            evaluations: None,
-            objective_initial: None,
-            objective_best: None,
-            ratio: None,
-            verified_ratio: None,
-            criteria: Vec::new(),
-            worst_quality: None,
-            seconds: None,
-            peak_memory_bytes: None,
             directory: planned.combination.name.clone(),
-            curve: Vec::new(),
-            is_feasible: false,
-            goal: planned.goal,
-            is_reported: false,
+            goal: Some(planned.goal),
+            ..Self::default()
         }
     }
 }

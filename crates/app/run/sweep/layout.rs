@@ -146,9 +146,6 @@ impl Layout {
     }
 
     /// Writes a whole file of the sweep, replacing an older one.
-    ///
-    /// # Errors
-    /// When the operating system refuses.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
         write_whole(&*self.disk, &self.path.join(name), bytes)
     }

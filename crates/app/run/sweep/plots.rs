@@ -44,13 +44,7 @@ pub(super) fn over_value(comparison: &Comparison) -> Option<(String, Markup)> {
         @for at in &places { (dot("point", *at, 2.6)) }
         @if let Some(best) = best { (dot("best", place(best), 5.0)) }
     };
-    let figure = html! {
-        figure class="chart narrow" data-chart="over-value" {
-            (svg(TOP + HEIGHT + BOTTOM, &caption, &content))
-            figcaption { (caption) }
-        }
-    };
-    Some((format!("F / F₀ over {key}"), figure))
+    Some((format!("F / F₀ over {key}"), figure("over-value", &caption, &content)))
 }
 
 /// Title and figure of two quantities that the runs trade for each other; those on the front are joined, and marked.
@@ -85,13 +79,16 @@ pub(super) fn front(comparison: &Comparison) -> Option<(String, Markup)> {
         @for (_, p) in &points { (dot("point", at(p), 2.6)) }
         @for p in &joined { (dot("best", *p, 4.0)) }
     };
-    let figure = html! {
-        figure class="chart narrow" data-chart="front" {
-            (svg(TOP + HEIGHT + BOTTOM, &caption, &content))
+    Some(("Pareto front".to_owned(), figure("front", &caption, &content)))
+}
+
+fn figure(kind: &str, caption: &str, content: &Markup) -> Markup {
+    html! {
+        figure class="chart narrow" data-chart=(kind) {
+            (svg(TOP + HEIGHT + BOTTOM, caption, content))
             figcaption { (caption) }
         }
-    };
-    Some(("Pareto front".to_owned(), figure))
+    }
 }
 
 /// F / F₀ of every evaluation of every run.

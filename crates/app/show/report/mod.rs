@@ -71,9 +71,6 @@ impl ReportedRun {
     }
 
     /// The same of a directory that is open.
-    ///
-    /// # Errors
-    /// As [`ReportedRun::open`].
     pub(crate) fn of(directory: RunDirectory) -> Result<Self, Error> {
         let manifest = Manifest::read(&directory)?;
         let refused = |cause: String| Error::NoReport { path: directory.path().to_owned(), cause };

@@ -2,8 +2,8 @@
 
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
-    Algorithm, BodyKind, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord,
-    Functional, Goal, Limit, ObjectiveKind, ValueBound, Weighting,
+    Algorithm, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal,
+    Limit, ObjectiveKind, ValueBound, Weighting,
 };
 
 /// What is made small or large.
@@ -147,11 +147,9 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
             let unit = format!(" {}", measured.dimension().si_unit());
             format!("{} {}", functional(measured), within(bound, &unit))
         }
-        Limit::Body { kind: BodyKind::Volume, region, bound } => {
-            format!("the volume of {region} {}", within(bound, " m³"))
-        }
-        Limit::Body { kind: BodyKind::Mass, region, bound } => {
-            format!("the mass of {region} {}", within(bound, " kg"))
+        Limit::Body { kind, region, bound } => {
+            let unit = format!(" {}", kind.dimension().si_unit());
+            format!("the {} of {region} {}", kind.name(), within(bound, &unit))
         }
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::body::BodyForce;
 
 /// One evaluation of objective, constraints and gradients; a row of the history.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evaluation {
     /// Number of the evaluation, from 0.
     pub evaluation: usize,

@@ -8,7 +8,7 @@ use super::evaluation::Evaluation;
 use crate::problem::Timings;
 
 /// One evaluation with everything that a resumed run needs of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// Its row in the history, with objective and round.
     pub row: Evaluation,

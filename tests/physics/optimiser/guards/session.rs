@@ -48,7 +48,7 @@ fn a_panic_leaves_a_failed_manifest_whole_files_and_a_run_that_can_be_gone_on_wi
     let disk = system_disk();
     let limits = RunLimits { max_evaluations: None, max_time: None };
     let resumed =
-        run::resume(SavedRun::open(&disk, &broken).unwrap(), limits, options(&disk), &mut Silent).unwrap();
+        run::resume(&SavedRun::open(&disk, &broken).unwrap(), limits, options(&disk), &mut Silent).unwrap();
     run(&sound, &mut Silent).unwrap();
     let expected = read_json(&sound.join("result.json"));
     assert_eq!(expected["objective"], read_json(&broken.join("result.json"))["objective"]);

@@ -154,16 +154,8 @@ impl Group for Target {
     type Written = TargetKeys;
 
     fn of(written: TargetKeys, section: &Section<'_>) -> Self {
-        let given: Vec<&str> = TARGETS.into_iter().filter(|key| section.has(key)).collect();
-        match given.as_slice() {
-            [] => section.missing(&TARGETS, "surface = \"top\", or line, nodes, box or design"),
-            [_] => {}
-            [first, second, ..] => section.clash(
-                [first, second],
-                format!("`{}` has both `{first}` and `{second}`", section.path()),
-                "one of surface, line, nodes, box and design",
-            ),
-        }
+        let example = "surface = \"top\", or line, nodes, box or design";
+        section.exactly_one(&TARGETS, example, "one of surface, line, nodes, box and design");
         let corners = written.corners.and_then(|corners| flat_box(section, "box", corners));
         let TargetKeys { surface, line, nodes, design, .. } = written;
         let target = design.map(Self::Design).or(line.map(Self::Line)).or(nodes.map(Self::Nodes));

@@ -2,7 +2,7 @@
 
 /// Where the cells of a column stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Align {
+pub(crate) enum Align {
     /// Words.
     Left,
     /// Numbers.
@@ -11,27 +11,35 @@ pub(super) enum Align {
 
 /// A table with a header.
 #[derive(Debug)]
-pub(super) struct Table<const N: usize> {
+pub(crate) struct Table<const N: usize> {
     columns: [Align; N],
     rows: Vec<[String; N]>,
 }
 
 impl<const N: usize> Table<N> {
     /// A table of the columns with these names.
-    pub(super) fn new(columns: [(&str, Align); N]) -> Self {
+    pub(crate) fn new(columns: [(&str, Align); N]) -> Self {
         Self {
             columns: columns.map(|(_, align)| align),
             rows: vec![columns.map(|(name, _)| name.to_owned())],
         }
     }
 
+    /// A name and numbers in every row.
+    pub(crate) fn of_numbers(names: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> Self {
+        let align = |k: usize| if k == 0 { Align::Left } else { Align::Right };
+        let mut table = Self::new(std::array::from_fn(|k| (names[k], align(k))));
+        table.rows.extend(rows);
+        table
+    }
+
     /// A further row.
-    pub(super) fn row(&mut self, cells: [String; N]) {
+    pub(crate) fn row(&mut self, cells: [String; N]) {
         self.rows.push(cells);
     }
 
     /// The lines, each with its break, after an empty one; nothing where the table has no row.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         if self.rows.len() == 1 {
             return String::new();
         }
