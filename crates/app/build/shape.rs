@@ -104,6 +104,8 @@ pub(super) fn shape(
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let Body { full_surface, surface, motion } = body;
     let mut faults = overlap_faults(inputs, config, motion.moving(), models, observed);
+    let moves = |node: NodeId| may_move(&surface, motion.map(), node);
+    faults.extend(models.iter().find_map(|model| model.torn_source(moves)).map(|e| source_fault(inputs, config, e)));
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
     }
@@ -201,7 +203,7 @@ fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
     surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
 }
 
-/// Refuses a remesh region that meets the observation region or a coil: both must stay where they are.
+/// Refuses a remesh region that meets the observation region or the shell of open space: both must stay where they are.
 fn overlap_faults(
     inputs: &Inputs<'_>,
     config: &Config,
@@ -226,8 +228,6 @@ fn overlap_faults(
         let fault = source.diagnostic("open", message);
         faults.push(fault.expected("a remesh region inside the shell, which does not move"));
     }
-    let source = models.iter().flat_map(FieldModel::source_elements).find(moves);
-    faults.extend(source.map(|e| source_fault(inputs, config, e)));
     faults
 }
 
@@ -245,11 +245,14 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
              frequency has the same field, and follows the shape",
         );
     }
-    let fault = fault
-        .expected("coils and their windows outside the remesh region: a coil does not move with the mesh");
+    let fault = fault.expected(
+        "a remesh region that no winding reaches into, and that does not go through the ends of a coil's window: a coil does not \
+         move with the mesh",
+    );
+    let cure = "shrink the remesh region, or move the coil; of a coil that is a region of the mesh only that has to stay";
     fault.help(match plausible::unit_hint(config, inputs.full_mesh) {
-        Some(hint) => format!("{hint}; else shrink the remesh region, or move the coil"),
-        None => "shrink the remesh region, or move the coil".to_owned(),
+        Some(hint) => format!("{hint}; else {cure}"),
+        None => cure.to_owned(),
     })
 }
 

@@ -1,12 +1,12 @@
 //! The right side of the system: coils, currents in regions of the mesh, magnets.
 //!
 //! Sources given by `T` with `J = curl T` enter as `∫T·curl w`, currents of mesh regions as `∫J·w`, magnets as `∫ν B_r·curl w`.
-//! Coils are fixed in space, so elements that meet them must not move; a magnet moves with its elements, and its load
-//! has a derivative with respect to the node positions.
+//! Coils are fixed in space, so elements that windings meet must not move; those in their windows may, and as a whole have the same
+//! load then ([`crate::coil`]). A magnet moves with its elements, and its load has a derivative with respect to the node positions.
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use rayon::prelude::*;
 
 use crate::coil::{Coil, SourceTerms};
@@ -39,9 +39,20 @@ impl Sources {
         Ok(Self { coils: SourceTerms::new(mesh, coils)?, magnets })
     }
 
-    /// Elements that a coil meets: these must not move.
-    pub(crate) fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+    /// Elements that a coil meets, with its window.
+    pub(crate) fn coil_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.coils.elements().into_iter()
+    }
+
+    /// An element with a coil's source that must not move, and has a node that `moves`: one that a winding meets, or one in a
+    /// window where not all elements around that node have the same `T`.
+    pub(crate) fn torn_element(&self, topology: &Topology, moves: &dyn Fn(NodeId) -> bool) -> Option<ElementId> {
+        let moved = |e: ElementId| topology.tet(e).into_iter().filter(|n| moves(*n));
+        let tears = |e: ElementId, t: Complex3| {
+            moved(e).any(|n| topology.elements_around(n).iter().any(|&other| self.coils.window(other) != Some(t)))
+        };
+        let window = || self.coils.windows.iter().find(|(e, t)| tears(*e, *t)).map(|(e, _)| *e);
+        self.coils.fixed_elements().find(|&e| moved(e).next().is_some()).or_else(window)
     }
 
     /// `fᵀu` of the load and the coefficients of a solution: of the load of 1 A, its flux linkage [Wb].
@@ -57,7 +68,7 @@ impl Sources {
 
     /// Whether nothing is excited.
     pub(crate) fn is_empty(&self) -> bool {
-        self.coils.moments.is_empty() && self.coils.currents.is_empty() && self.magnets.is_empty()
+        self.coils.elements().is_empty() && self.magnets.is_empty()
     }
 
     /// The load [A m; of edge elements A m²], added to `load`: element loads in parallel, then added in their order.
@@ -76,15 +87,18 @@ impl Sources {
         let of_coil = |(e, moments): &(ElementId, [Complex3; 4])| {
             (*e, elements.curl_load(&space.cell(mesh, *e), moments))
         };
-        let of_magnet = |(e, source): &(ElementId, Point)| {
-            let cell = space.cell(mesh, *e);
+        let of_constant = |e: ElementId, source: Complex3| {
+            let cell = space.cell(mesh, e);
             let share = 0.25 * cell.tet.volume;
-            (*e, elements.curl_load(&cell, &[source.map(|t| c64::from(share * t)); 4]))
+            (e, elements.curl_load(&cell, &[source.map(|t| share * t); 4]))
         };
+        let of_window = |(e, potential): &(ElementId, Complex3)| of_constant(*e, *potential);
+        let of_magnet = |(e, source): &(ElementId, Point)| of_constant(*e, source.map(c64::from));
         let of_region = |(e, current): &(ElementId, Complex3)| {
             (*e, elements.current_load(&space.cell(mesh, *e), current))
         };
         self.coils.moments.par_iter().map(of_coil).collect::<Vec<_>>().into_iter().for_each(&mut add);
+        self.coils.windows.par_iter().map(of_window).collect::<Vec<_>>().into_iter().for_each(&mut add);
         self.magnets.par_iter().map(of_magnet).collect::<Vec<_>>().into_iter().for_each(&mut add);
         self.coils.currents.par_iter().map(of_region).collect::<Vec<_>>().into_iter().for_each(add);
     }

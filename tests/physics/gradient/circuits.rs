@@ -106,6 +106,25 @@ fn currents_that_voltages_drive_follow_the_shape() {
     all_hold_on(&problem(&kinds, &driven), uneven);
 }
 
+/// A plate in the window of a coil: the load of a patch whose outline stays does not change with the mesh in it.
+#[test]
+fn what_moves_in_the_window_of_a_coil_is_exact() {
+    let around = [
+        ("shape = \"circular\"", "shape = \"rectangular\""),
+        (
+            "center = [\"0 mm\", \"0 mm\", \"3 mm\"]\nradius = \"22 mm\"\nwidth = \"8 mm\"\nheight = \"6 mm\"",
+            "center = [\"0 mm\", \"0 mm\", \"-6 mm\"]\nhalf_window = [\"42 mm\", \"42 mm\"]\nwidth = \"8 mm\"\nheight = \"20 mm\"",
+        ),
+    ];
+    let with = |kinds: &str, changes: &[(&str, &str)]| problem(kinds, &[&around, changes].concat());
+    let kinds = format!("{}{}", static_kinds(), harmonic_kinds());
+    all_hold_on(&with(&kinds, &[]), uneven);
+    all_hold_on(&with(&kinds, &[("elements = \"edge\"", "elements = \"nodal\"\norder = 2")]), uneven);
+    let driven = [("ampere_turns = \"100 A\"", "voltage = \"1 V\"")];
+    let kinds: String = ["current", "flux_linkage", "power"].iter().map(|kind| bound(kind, "\"one\"", 1)).collect();
+    all_hold_on(&with(&kinds, &driven), uneven);
+}
+
 /// A busbar whose own face moves: what it is as a coil, at a current and at a voltage.
 #[test]
 fn what_a_solid_conductor_is_follows_its_own_face() {

@@ -12,7 +12,8 @@ use crate::config::value::choice::choice;
 
 table! {
     /// A source of current: either with a `shape`, of uniform current density and given by it alone, so that the mesh need not
-    /// follow it, or a `region` of the mesh. A coil must lie outside of the part of the mesh that moves.
+    /// follow it, or a `region` of the mesh. A winding must lie outside of the part of the mesh that moves; in its window, up to
+    /// the ends of the coil, the mesh may move.
     ///
     /// Where the outside of the mesh cuts a coil, it must cut straight sides at right angles, on a flux-parallel surface; a
     /// flux-normal plane may halve a coil's height, but no current may cross it. Anything else is an error that says where and

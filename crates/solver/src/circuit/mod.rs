@@ -125,9 +125,9 @@ impl Windings {
         Self { coils: self.coils.iter().map(of).collect() }
     }
 
-    /// Elements that a coil with a winding meets: these must not move.
-    pub(crate) fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.coils.iter().flat_map(|driven| driven.sources.fixed_elements())
+    /// What makes the loads.
+    pub(crate) fn sources(&self) -> impl Iterator<Item = &Sources> {
+        self.coils.iter().map(|driven| &*driven.sources)
     }
 
     /// Whether a voltage or the current of a solid conductor excites a field.

@@ -6,7 +6,8 @@
 //! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), what drives a solid conductor ([`solid`]), all of it summed over coils
 //! ([`terms`]), where a coil may meet the outside of the mesh ([`planes`]), and whether the current of a region goes on there
 //! (`continuity`). `T` and `J` are fixed in space: elements
-//! that meet them must not move; a solid conductor may, above 0 Hz.
+//! that a winding meets must not move. In its window `T` is constant, and the mesh may move there as long as the patch that moves
+//! keeps its outline: `∫T·curl w` is `∮(T × w)·n` on that. A solid conductor may move above 0 Hz.
 
 pub(crate) mod continuity;
 pub mod cut;

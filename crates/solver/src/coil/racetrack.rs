@@ -148,6 +148,13 @@ impl Racetrack {
         (self.width - self.distance(local)).clamp(0.0, self.width) / (self.width * self.height)
     }
 
+    /// Whether a convex body with these vertices is in the window, up to the ends of the coil: `T` is constant in it.
+    pub(super) fn encloses(&self, vertices: &[Point]) -> bool {
+        vertices.iter().map(|x| self.frame.local(*x)).all(|local| {
+            self.distance(local) <= SKIN * self.width && 2.0 * local[2].abs() <= (1.0 + SKIN) * self.height
+        })
+    }
+
     /// Greatest `T_e` [A/m] for one ampere-turn: that of the window.
     pub fn plateau(&self) -> f64 {
         1.0 / self.height

@@ -15,6 +15,8 @@ type Complex3 = [c64; 3];
 pub struct SourceTerms {
     /// `∫_e T λ_b dV` [A m²] of analytic coils, for `∫T·curl w`; ascending by element.
     pub moments: Vec<(ElementId, [Complex3; 4])>,
+    /// `T` [A/m] of elements in windows, where it is constant, and which may move there; ascending by element.
+    pub windows: Vec<(ElementId, Complex3)>,
     /// `J` [A/m²] of coil regions, for `∫J·w`; ascending by element.
     pub currents: Vec<(ElementId, Complex3)>,
 }
@@ -25,7 +27,7 @@ impl SourceTerms {
     /// # Errors
     /// [`SolverError::NoSource`] for an analytic coil that meets no element.
     pub fn new(mesh: &Mesh, coils: &[Coil]) -> Result<Self, SolverError> {
-        let (mut all, mut currents) = (Vec::new(), Vec::new());
+        let (mut all, mut windows, mut cut, mut currents) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for coil in coils {
             let times = |v: &Point| v.map(|c| coil.ampere_turns * c);
             match &coil.shape {
@@ -40,7 +42,14 @@ impl SourceTerms {
                             ),
                         });
                     }
-                    all.extend(moments.iter().map(|(e, m)| (*e, m.each_ref().map(times))));
+                    let potential = times(&racetrack.axis().map(|e| racetrack.plateau() * e));
+                    for (e, moment) in moments {
+                        match racetrack.encloses(&mesh.vertices(e)) {
+                            true => windows.push((e, [potential])),
+                            false => cut.push(e),
+                        }
+                        all.push((e, moment.each_ref().map(times)));
+                    }
                 }
                 shape => {
                     let Some(current) = shape.region_current() else { continue };
@@ -48,17 +57,32 @@ impl SourceTerms {
                 }
             }
         }
-        let currents = merge(currents).into_iter().map(|(e, [j])| (e, j)).collect();
-        Ok(Self { moments: merge(all), currents })
+        cut.sort_unstable();
+        let single = |all| merge(all).into_iter().map(|(e, [sum])| (e, sum));
+        let windows: Vec<_> = single(windows).filter(|(e, _)| cut.binary_search(e).is_err()).collect();
+        let mut moments = merge(all);
+        moments.retain(|(e, _)| windows.binary_search_by_key(e, |(e, _)| *e).is_err());
+        Ok(Self { moments, windows, currents: single(currents).collect() })
     }
 
-    /// Elements with a source, ascending: these must not move.
+    /// Elements with a source, ascending.
     pub fn elements(&self) -> Vec<ElementId> {
-        let mut elements: Vec<ElementId> = self.moments.iter().map(|(e, _)| *e).collect();
-        elements.extend(self.currents.iter().map(|(e, _)| *e));
+        let windows = self.windows.iter().map(|(e, _)| *e);
+        let mut elements: Vec<ElementId> = self.fixed_elements().chain(windows).collect();
         elements.sort_unstable();
         elements.dedup();
         elements
+    }
+
+    /// Elements that a winding meets, some twice: these must not move.
+    pub fn fixed_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.moments.iter().map(|(e, _)| *e).chain(self.currents.iter().map(|(e, _)| *e))
+    }
+
+    /// `T` [A/m] of an element in a window; `None` of all others.
+    pub fn window(&self, element: ElementId) -> Option<Complex3> {
+        let at = self.windows.binary_search_by_key(&element, |(e, _)| *e).ok()?;
+        Some(self.windows[at].1)
     }
 }
 

@@ -52,7 +52,7 @@ impl FieldModel {
         let curl_free = (&fine.space, fine.unknowns.harmonic_fields());
         continuity::check(mesh, &setup.coils, &mut joined, curl_free)?;
         if let Some(shell) = weak_form.shell() {
-            setup::check_open(shell, mesh, &setup, sources.fixed_elements())?;
+            setup::check_open(shell, mesh, &setup, sources.coil_elements())?;
         }
         let shared = Arc::new(SharedParts { fine, solids, analysis: analysis.map(Arc::new) });
         let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
@@ -102,7 +102,7 @@ impl FieldModel {
             Arc::new(Sources::new(mesh, &given, &setup.magnetisation())?)
         };
         if let Some(shell) = weak_form.shell() {
-            setup::check_open(shell, mesh, &setup, sources.fixed_elements())?;
+            setup::check_open(shell, mesh, &setup, sources.coil_elements())?;
         }
         let windings = Arc::new(self.windings.driven_as(&of_coils));
         let distributed = self.distributed.clone().filter(|_| has_same_matrix);

@@ -223,9 +223,19 @@ impl FieldModel {
         self.weak_form.shell().into_iter().flat_map(Shell::elements)
     }
 
-    /// Elements that a coil meets: these must not move.
+    /// Elements that a coil meets, with its window.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.sources.fixed_elements().chain(self.windings().fixed_elements())
+        self.all_sources().flat_map(Sources::coil_elements)
+    }
+
+    /// An element with a node that `moves` although a coil does not allow it: a winding is fixed in space, and in its window all
+    /// that moves around a node must be inside, up to the ends of the coil.
+    pub fn torn_source(&self, moves: impl Fn(NodeId) -> bool) -> Option<ElementId> {
+        self.all_sources().find_map(|sources| sources.torn_element(self.topology(), &moves))
+    }
+
+    fn all_sources(&self) -> impl Iterator<Item = &Sources> {
+        std::iter::once(&self.sources).chain(self.windings().sources())
     }
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
