@@ -103,9 +103,11 @@ pub(super) fn shape(
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let Body { full_surface, surface, motion } = body;
-    let mut faults = overlap_faults(inputs, config, motion.moving(), models, observed);
+    let mut faults = overlap_faults(inputs, motion.moving(), models, observed);
     let moves = |node: NodeId| may_move(&surface, motion.map(), node);
-    faults.extend(models.iter().find_map(|model| model.torn_source(moves)).map(|e| source_fault(inputs, config, e)));
+    faults.extend(
+        models.iter().find_map(|model| model.torn_source(moves)).map(|e| source_fault(inputs, config, e)),
+    );
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
     }
@@ -206,7 +208,6 @@ fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
 /// Refuses a remesh region that meets the observation region or the shell of open space: both must stay where they are.
 fn overlap_faults(
     inputs: &Inputs<'_>,
-    config: &Config,
     moving: &[ElementId],
     models: &[FieldModel],
     observed: &[(String, Vec<ElementId>)],

@@ -46,10 +46,15 @@ impl Sources {
 
     /// An element with a coil's source that must not move, and has a node that `moves`: one that a winding meets, or one in a
     /// window where not all elements around that node have the same `T`.
-    pub(crate) fn torn_element(&self, topology: &Topology, moves: &dyn Fn(NodeId) -> bool) -> Option<ElementId> {
+    pub(crate) fn torn_element(
+        &self,
+        topology: &Topology,
+        moves: &dyn Fn(NodeId) -> bool,
+    ) -> Option<ElementId> {
         let moved = |e: ElementId| topology.tet(e).into_iter().filter(|n| moves(*n));
         let tears = |e: ElementId, t: Complex3| {
-            moved(e).any(|n| topology.elements_around(n).iter().any(|&other| self.coils.window(other) != Some(t)))
+            moved(e)
+                .any(|n| topology.elements_around(n).iter().any(|&other| self.coils.window(other) != Some(t)))
         };
         let window = || self.coils.windows.iter().find(|(e, t)| tears(*e, *t)).map(|(e, _)| *e);
         self.coils.fixed_elements().find(|&e| moved(e).next().is_some()).or_else(window)

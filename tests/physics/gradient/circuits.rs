@@ -113,7 +113,7 @@ fn what_moves_in_the_window_of_a_coil_is_exact() {
         ("shape = \"circular\"", "shape = \"rectangular\""),
         (
             "center = [\"0 mm\", \"0 mm\", \"3 mm\"]\nradius = \"22 mm\"\nwidth = \"8 mm\"\nheight = \"6 mm\"",
-            "center = [\"0 mm\", \"0 mm\", \"-6 mm\"]\nhalf_window = [\"42 mm\", \"42 mm\"]\nwidth = \"8 mm\"\nheight = \"20 mm\"",
+            "center = [\"0 mm\", \"0 mm\", \"-6 mm\"]\nhalf_window = [\"58 mm\", \"58 mm\"]\nwidth = \"8 mm\"\nheight = \"20 mm\"",
         ),
     ];
     let with = |kinds: &str, changes: &[(&str, &str)]| problem(kinds, &[&around, changes].concat());
@@ -121,7 +121,8 @@ fn what_moves_in_the_window_of_a_coil_is_exact() {
     all_hold_on(&with(&kinds, &[]), uneven);
     all_hold_on(&with(&kinds, &[("elements = \"edge\"", "elements = \"nodal\"\norder = 2")]), uneven);
     let driven = [("ampere_turns = \"100 A\"", "voltage = \"1 V\"")];
-    let kinds: String = ["current", "flux_linkage", "power"].iter().map(|kind| bound(kind, "\"one\"", 1)).collect();
+    let kinds: String =
+        ["current", "flux_linkage", "power"].iter().map(|kind| bound(kind, "\"one\"", 1)).collect();
     all_hold_on(&with(&kinds, &driven), uneven);
 }
 

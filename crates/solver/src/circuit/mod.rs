@@ -20,8 +20,8 @@ mod terminals;
 use std::ops::Range;
 use std::sync::Arc;
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::coil::{Coil, CoilShape};
 use crate::error::SolverError;

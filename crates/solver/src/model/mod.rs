@@ -235,7 +235,7 @@ impl FieldModel {
     }
 
     fn all_sources(&self) -> impl Iterator<Item = &Sources> {
-        std::iter::once(&self.sources).chain(self.windings().sources())
+        std::iter::once(&*self.sources).chain(self.windings().sources())
     }
 
     /// Whether nothing excites a field: no coil, magnet or applied field.
