@@ -7,12 +7,23 @@ use fluxmorph::show::Silent;
 use crate::problems::optimised;
 use crate::support::config;
 
+/// No more steel than the flat plate has, and no more ferrite than the flat core.
+const NO_ROOM: [&str; 2] = [
+    "constraints=[{kind='mass', region='plate', upper_ratio=1.0}]",
+    "constraints=[{kind='volume', region='core', upper_ratio=1.0}]",
+];
+
 /// Configuration and overrides; with a filter every node is a variable instead of a control grid.
-const DEVICES: [(&str, &[&str], Option<f64>); 4] = [
+const DEVICES: [(&str, &[&str], Option<f64>); 9] = [
     ("shield_quick.toml", &[], None),
     ("shield_quick.toml", &[], Some(0.03)),
     ("pole.toml", &["mesh.boxes.refinement=0.7"], None),
     ("inductor.toml", &["analysis.order=1"], None),
+    ("inductor.toml", &["analysis.order=1", NO_ROOM[1]], None),
+    ("shield_mass_limit.toml", &[], None),
+    ("shield_mass_limit.toml", &[NO_ROOM[0]], None),
+    ("shield_two_loads.toml", &[], None),
+    ("busbar.toml", &[], None),
 ];
 
 #[test]

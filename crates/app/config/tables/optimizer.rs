@@ -39,11 +39,13 @@ table! {
         /// design at its bounds get there long before the rest has settled.
         xtol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.xtol_rel;
         /// How far a variable may move in the first step of a search, as a share of the range that it may search; less where
-        /// the gradient promises more than half of the objective. The steps after it are the method's own.
+        /// the gradient promises more than half of the objective, or where constraints leave less room. The steps after it are the
+        /// method's own.
         first_step: f64 = number(FIRST_STEPS) => Settings::DEFAULT.first_step;
         /// Least quality (Eq. 4) of an element that a design may have, and so of the reference mesh that a round starts from. A
-        /// design below it is not evaluated: a round ends. Default: a twentieth of the worst quality of the undeformed mesh,
-        /// since layered meshes start with a low one.
+        /// design below it is not evaluated: a round ends. Default: with the law `linear` a twentieth of the worst quality of the
+        /// undeformed mesh, since layered meshes start with a low one; none with `rails` and `hyperelastic`, where elements push
+        /// back and their room is held instead: a flat element of a thin layer may then have a quality of 1e-4.
         minimum_quality: Option<f64> = number(FRACTIONS);
     }
 }

@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use fluxmorph_remesh::Motion;
 
 use crate::constraint::Bound;
-use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
+use crate::nlopt::Sample;
 use crate::objective::Goal;
 use crate::problem::{Analysis, SolverCache};
 
@@ -70,7 +70,7 @@ impl Incumbent {
     /// How a design with this objective and sample compares.
     pub(super) fn compare(&self, goal: Goal, objective: f64, sample: &Sample) -> Comparison {
         let sign = goal.sign();
-        let order = violation(sample).total_cmp(&self.violation);
+        let order = sample.violation().total_cmp(&self.violation);
         match order.then((sign * objective).total_cmp(&(sign * self.objective))) {
             Ordering::Less => Comparison::Better,
             _ => Comparison::Worse,
@@ -82,10 +82,4 @@ impl Incumbent {
         self.violation < (1.0 - least) * violation
             || (self.objective - objective).abs() > least * objective.abs()
     }
-}
-
-/// Largest excess of a constraint; zero where all are kept but for rounding.
-pub(super) fn violation(sample: &Sample) -> f64 {
-    let worst = sample.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);
-    if worst <= CONSTRAINT_TOLERANCE { 0.0 } else { worst }
 }

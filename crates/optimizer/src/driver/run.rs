@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 
-use super::incumbent::{BestField, Comparison, Incumbent, Initial, violation};
+use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::promised_gain::promised_gain;
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
@@ -303,7 +303,7 @@ impl<'a> Run<'a> {
                 evaluation: record.row.evaluation,
                 values: record.design,
                 objective: record.row.objective,
-                violation: violation(&sample),
+                violation: sample.violation(),
                 sample,
                 round: record.row.round,
                 starts: self.starts.len(),

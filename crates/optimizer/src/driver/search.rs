@@ -47,7 +47,7 @@ pub(super) struct Ended {
 pub(super) enum NextStep {
     Stop(StopReason),
     TightenTolerance,
-    /// From the best design, where the mesh leaves little room.
+    /// From the best design, where the mesh leaves little room or the search has come from outside the constraints.
     SearchOn,
     /// Around the best design, on the same reference mesh.
     MoveTrustRegion,
@@ -146,6 +146,10 @@ impl<'a> Search<'a> {
 
     /// After a method that ended by itself.
     fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
+        let has_entered = ending == Ending::Entered;
+        if has_entered && run.incumbent_values().is_some_and(|(violation, _)| violation == 0.0) {
+            return NextStep::SearchOn;
+        }
         // A method that was given nothing new will not be at its next start either.
         let is_stuck = run.is_held_back && evaluations == 0;
         let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS && !is_stuck;
@@ -164,7 +168,7 @@ impl<'a> Search<'a> {
             _ => NextStep::Stop(match ending {
                 Ending::Roundoff => StopReason::RoundoffLimited,
                 _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
-                Ending::Objective => StopReason::ObjectiveConverged,
+                Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),
         }

@@ -18,6 +18,19 @@
 //! CCSAQ   move = σ r ≤ σ
 //! others  move = s |g|         (the identity as Hessian, a whole step)
 //! ```
+//!
+//! MMA and CCSAQ begin with the same `ρ` for every constraint. What they assume of its curvature, summed over all variables, is
+//!
+//! ```text
+//! MMA     ρ/2 Σ d²/(σ² − d²)
+//! CCSAQ   ρ/2 Σ d²/σ²
+//! ```
+//!
+//! after moves `d`, beside its value `c` and the change `Σ |∂c/∂p| d` that its derivatives speak of. A mass of a hundred
+//! variables changes by little with each: unscaled, what is assumed is many times what is known, and a search with little room
+//! creeps until its tolerance takes it for converged. A factor on the constraint makes what is assumed after the first moves at
+//! most a share [`ASSUMED`] of what is known. It is never below one. A method multiplies its penalty by up to ten where a
+//! constraint proves to be more curved, at an evaluation each time.
 
 use super::Algorithm;
 
@@ -27,6 +40,14 @@ const PROMISE: f64 = 0.5;
 
 /// Shortest first step, as a share of that asked for: an objective that passes through zero promises nothing by its size.
 const LEAST: f64 = 1e-2;
+
+/// What may be assumed of a constraint's curvature in the first step, beside what is known of it. With a tenth a trade between a
+/// hundred variables under a full mass begins as if there were no curvature; less makes the steps no longer, and calls for more
+/// evaluations where a constraint is curved.
+const ASSUMED: f64 = 0.1;
+
+/// Largest factor on a constraint: one that is active and flat.
+const LARGEST_FACTOR: f64 = 1e4;
 
 /// Halvings of the factor's exponent: to the last digits that matter to a length.
 const HALVINGS: usize = 60;
@@ -66,10 +87,37 @@ impl Start<'_> {
         cautious.max(within(LEAST * share, f64::INFINITY))
     }
 
+    /// The factor on a constraint of this value and gradient, where the objective has `objective_factor`.
+    pub(super) fn constraint_factor(
+        &self,
+        algorithm: Algorithm,
+        objective_factor: f64,
+        (value, gradient): (f64, &[f64]),
+    ) -> f64 {
+        let penalty = |square: f64| match algorithm {
+            Algorithm::Mma => square / (1.0 - square),
+            Algorithm::Ccsaq => square,
+            Algorithm::Slsqp | Algorithm::Lbfgs | Algorithm::Tnewton | Algorithm::Var2 => 0.0,
+        };
+        let (mut assumed, mut known) = (0.0, (-value).max(0.0));
+        for (step, g) in self.steps(algorithm, objective_factor).zip(gradient) {
+            assumed += 0.5 * penalty((step / (0.5 * self.span)).powi(2));
+            known += g.abs() * step;
+        }
+        if assumed > ASSUMED * known { (assumed / (ASSUMED * known)).min(LARGEST_FACTOR) } else { 1.0 }
+    }
+
     /// Largest first move of a variable with a factor, and how much the gradient promises of all.
     fn moves(&self, algorithm: Algorithm, factor: f64) -> [f64; 2] {
+        self.gradient.iter().zip(self.steps(algorithm, factor)).fold([0.0, 0.0], |[largest, promised], (g, step)| {
+            [largest.max(step), promised + g.abs() * step]
+        })
+    }
+
+    /// Length of the first move of every variable with a factor on the objective.
+    fn steps(&self, algorithm: Algorithm, factor: f64) -> impl Iterator<Item = f64> {
         let half = 0.5 * self.span;
-        let free = |slope: f64| match algorithm {
+        let free = move |slope: f64| match algorithm {
             Algorithm::Mma => {
                 let twice = 2.0 * slope * half;
                 let share = twice / (twice + 1.0);
@@ -78,9 +126,6 @@ impl Start<'_> {
             Algorithm::Ccsaq => half * (slope * half).min(1.0),
             Algorithm::Slsqp | Algorithm::Lbfgs | Algorithm::Tnewton | Algorithm::Var2 => slope,
         };
-        self.gradient.iter().zip(self.room).fold([0.0, 0.0], |[largest, promised], (g, room)| {
-            let step = free(factor * g.abs()).min(*room);
-            [largest.max(step), promised + g.abs() * step]
-        })
+        self.gradient.iter().zip(self.room).map(move |(g, room)| free(factor * g.abs()).min(*room))
     }
 }

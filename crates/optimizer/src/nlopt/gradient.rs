@@ -5,7 +5,8 @@
 //! memory. It never sees a value that is not the design's: a closure that cannot evaluate returns an error, NLopt is
 //! stopped by a feasible value below its stop value (which all its methods check at once), and what it then believes is
 //! thrown away. The worst of several terms is minimised as a bound `t` on all of them, a further variable that only NLopt knows:
-//! `t` is the objective, and `f_i − t ≤ 0` are constraints (epigraph form; Boyd and Vandenberghe, Convex Optimization, 4.1.3). A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
+//! `t` is the objective, and `f_i − t ≤ 0` are constraints (epigraph form; Boyd and Vandenberghe, Convex Optimization, 4.1.3).
+//! A sample that is not finite, is beyond every range or has other lengths than were announced, and a design of
 //! NLopt's that is not finite, are such errors too. A panic inside the closure would abort the process at the C boundary: it is
 //! caught here and resumed after NLopt has returned.
 
@@ -42,6 +43,12 @@ pub struct Sample {
 }
 
 impl Sample {
+    /// Largest excess of a constraint; zero where all are kept but for rounding.
+    pub fn violation(&self) -> f64 {
+        let worst = self.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);
+        if worst <= CONSTRAINT_TOLERANCE { 0.0 } else { worst }
+    }
+
     /// Whether an optimiser may see it.
     ///
     /// # Errors
@@ -118,6 +125,10 @@ pub struct Minimisation {
 pub enum Ending {
     /// The objective changes by less than its tolerance.
     Objective,
+    /// From a start that violates constraints it has come to designs that keep them: it is to begin anew from the best one.
+    ///
+    /// MMA and CCSAQ weight what is violated by up to 10⁴⁰, and keep the weight once nothing is: they stop moving.
+    Entered,
     /// Rounding allows no further step.
     Roundoff,
     /// The variables change by less than their tolerance.
@@ -201,36 +212,28 @@ pub fn minimise<E: From<Error>>(
     let Some(scaling) = Scaling::new(settings, start) else {
         return Outcome::Failed("a bound or the first design is not finite, or the bounds cross");
     };
-    let bridge = RefCell::new(Bridge {
-        evaluate,
-        settings,
-        scaling: &scaling,
-        factor: None,
-        level: None,
-        start: (start, scaling.scale(start)),
-        last: None,
-        asked: 0,
-        guard: PanicGuard::default(),
-        interruption: None,
-    });
+    let [mut lower, mut upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
+    let mut x = scaling.scale(start);
+    for (k, x) in x.iter_mut().enumerate() {
+        *x = x.clamp(lower[k], upper[k]);
+    }
+    let mut bridge = Bridge::new(evaluate, settings, &scaling, start);
+    if !bridge.begin(&x) {
+        return bridge.outcome(None);
+    }
+    if let Some(level) = bridge.level {
+        lower.push(level.lower());
+        upper.push(level.upper());
+        x.push(level.start());
+    }
+    let tolerances: Vec<f64> = bridge.factors.constraints.iter().map(|f| f * CONSTRAINT_TOLERANCE).collect();
+    let bridge = RefCell::new(bridge);
     let objective = |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| -> f64 {
         bridge.borrow_mut().objective(x, gradient)
     };
     let constraints = |values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>, (): &mut ()| {
         bridge.borrow_mut().constraints(values, x, gradients);
     };
-    let [mut lower, mut upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
-    let mut x = scaling.scale(start);
-    for (k, x) in x.iter_mut().enumerate() {
-        *x = x.clamp(lower[k], upper[k]);
-    }
-    if settings.members > 0
-        && let Some(level) = bridge.borrow_mut().begin_level(&x)
-    {
-        lower.push(level.lower());
-        upper.push(level.upper());
-        x.push(level.start());
-    }
     let mut library =
         ::nlopt::Nlopt::new(settings.algorithm.library(), x.len(), &objective, Target::Minimize, ());
     let mut accepted = library
@@ -239,24 +242,16 @@ pub fn minimise<E: From<Error>>(
         .and_then(|_| library.set_stopval(STOP_VALUE))
         .and_then(|_| library.set_ftol_rel(settings.ftol_rel))
         .and_then(|_| library.set_xtol_rel(settings.xtol_rel));
-    let count = settings.constraints + settings.members;
-    if count > 0 {
-        let tolerance = vec![CONSTRAINT_TOLERANCE; count];
-        accepted =
-            accepted.and_then(|_| library.add_inequality_mconstraint(count, constraints, (), &tolerance));
+    if !tolerances.is_empty() {
+        accepted = accepted
+            .and_then(|_| library.add_inequality_mconstraint(tolerances.len(), constraints, (), &tolerances));
     }
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
     }
     let ended = library.optimize(&mut x);
     drop(library);
-    let bridge = bridge.into_inner();
-    bridge.guard.resume();
-    match bridge.interruption {
-        Some(Interruption::Settled) => Outcome::Ended(Ending::Step),
-        Some(Interruption::Error(error)) => Outcome::Interrupted(error),
-        None => outcome(ended),
-    }
+    bridge.into_inner().outcome(Some(ended))
 }
 
 /// What NLopt's own word on its end means.
@@ -296,15 +291,31 @@ impl Scaling {
         values.iter().zip(&self.unit).map(|(v, unit)| v / unit).collect()
     }
 
-    /// The factor on the objective that makes the first step from a scaled design as long as asked for.
-    fn first_factor(&self, settings: &Minimisation, x: &[f64], sample: &Sample) -> f64 {
-        let mut gradient = vec![0.0; x.len()];
-        self.fill(&mut gradient, 1.0, &sample.gradient);
+    /// The factors with which the first step from a scaled design is as long as asked for.
+    fn factors(&self, settings: &Minimisation, x: &[f64], sample: &Sample) -> Factors {
+        let scaled = |derivative: &[f64], factor: f64| {
+            let mut gradient = vec![0.0; x.len()];
+            self.fill(&mut gradient, factor, derivative);
+            gradient
+        };
+        let gradient = scaled(&sample.gradient, 1.0);
         let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| self.scale(bounds));
         let against = |k: usize| if gradient[k] > 0.0 { x[k] - lower[k] } else { upper[k] - x[k] };
         let room: Vec<f64> = (0..x.len()).map(against).collect();
         let start = Start { value: sample.value, gradient: &gradient, room: &room, span: SCALED_SPAN };
-        start.objective_factor(settings.algorithm, settings.first_step)
+        let objective = start.objective_factor(settings.algorithm, settings.first_step);
+        let factor_on = |value: f64, gradient: &[f64]| {
+            start.constraint_factor(settings.algorithm, objective, (value, gradient))
+        };
+        let own = sample.constraints.iter().map(|(value, own)| factor_on(*value, &scaled(own, 1.0)));
+        let mut constraints: Vec<f64> = own.collect();
+        // One factor on all terms of a worst case, which are compared with each other.
+        let terms = sample.members.iter().map(|(value, own)| {
+            objective * factor_on(objective * (value - sample.value), &scaled(own, objective))
+        });
+        let largest = terms.fold(0.0, f64::max);
+        constraints.resize(constraints.len() + sample.members.len(), largest);
+        Factors { objective, constraints }
     }
 
     /// Derivatives by the scaled variables.
@@ -313,6 +324,14 @@ impl Scaling {
             *g = factor * d * unit;
         }
     }
+}
+
+/// Factors on what NLopt is shown.
+#[derive(Default)]
+struct Factors {
+    objective: f64,
+    /// On the constraints, and behind them on the terms of a worst case.
+    constraints: Vec<f64>,
 }
 
 /// Questions for one design after which the method counts as settled there: MMA and CCSAQ, without a tolerance, ask for
@@ -331,8 +350,8 @@ struct Bridge<'a, F, E> {
     evaluate: F,
     settings: &'a Minimisation,
     scaling: &'a Scaling,
-    /// On the objective; known with the first answer.
-    factor: Option<f64>,
+    /// Known with the first answer.
+    factors: Factors,
     /// The bound on the terms of a worst case.
     level: Option<Level>,
     /// The start, in metres and as NLopt sees it.
@@ -341,23 +360,58 @@ struct Bridge<'a, F, E> {
     last: Option<(Vec<f64>, Sample)>,
     /// How often it has been asked for in a row.
     asked: usize,
+    /// Whether the start violates constraints.
+    began_outside: Option<bool>,
+    /// From such a start, whether a design has kept all.
+    has_entered: bool,
     guard: PanicGuard,
     interruption: Option<Interruption<E>>,
 }
 
-impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
-    /// Evaluates the start of a worst case, whose value its bound begins with; `None` once the closure has been interrupted.
-    fn begin_level(&mut self, x: &[f64]) -> Option<Level> {
-        let value = self.at(x)?.value;
-        self.level = Some(Level::around(value));
-        self.level
+impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E> {
+    fn new(evaluate: F, settings: &'a Minimisation, scaling: &'a Scaling, start: &'a [f64]) -> Self {
+        Self {
+            evaluate,
+            settings,
+            scaling,
+            factors: Factors::default(),
+            level: None,
+            start: (start, scaling.scale(start)),
+            last: None,
+            asked: 0,
+            began_outside: None,
+            has_entered: false,
+            guard: PanicGuard::default(),
+            interruption: None,
+        }
+    }
+
+    /// Evaluates the start, which fixes the factors and the bound on a worst case; whether the closure has not been interrupted.
+    fn begin(&mut self, x: &[f64]) -> bool {
+        let Self { scaling, settings, .. } = *self;
+        let Some(sample) = self.at(x) else { return false };
+        let (factors, value) = (scaling.factors(settings, x, sample), sample.value);
+        self.factors = factors;
+        self.level = (settings.members > 0).then(|| Level::around(value));
+        true
+    }
+
+    /// How a minimisation ended, of which NLopt says `ended`.
+    fn outcome(self, ended: Option<Result<(SuccessState, f64), (FailState, f64)>>) -> Outcome<E> {
+        self.guard.resume();
+        match (self.interruption, ended) {
+            (Some(Interruption::Settled), _) => Outcome::Ended(Ending::Step),
+            (Some(Interruption::Error(error)), _) => Outcome::Interrupted(error),
+            (None, Some(Ok(_))) if self.has_entered => Outcome::Ended(Ending::Entered),
+            (None, Some(ended)) => outcome(ended),
+            (None, None) => Outcome::Failed("the first design was not evaluated"),
+        }
     }
 
     /// The objective and its gradient at a design of NLopt's; below the stop value once the closure has been interrupted.
     fn objective(&mut self, x: &[f64], gradient: Option<&mut [f64]>) -> f64 {
-        let (level, variables) = (self.level, self.start.0.len());
-        let Some(factor) = self.factor_at(&x[..variables]) else { return 2.0 * STOP_VALUE };
-        let scaling = self.scaling;
+        let (level, scaling, variables) = (self.level, self.scaling, self.start.0.len());
+        let factor = self.factors.objective;
         let Some(sample) = self.at(&x[..variables]) else { return 2.0 * STOP_VALUE };
         match level {
             None => {
@@ -376,21 +430,11 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
         }
     }
 
-    /// The factor on the objective, which the first design fixes.
-    fn factor_at(&mut self, x: &[f64]) -> Option<f64> {
-        if self.factor.is_none() {
-            let Self { scaling, settings, .. } = *self;
-            let sample = self.at(x)?;
-            self.factor = Some(scaling.first_factor(settings, x, sample));
-        }
-        self.factor
-    }
-
     /// The constraints and their gradients.
     fn constraints(&mut self, values: &mut [f64], x: &[f64], gradients: Option<&mut [f64]>) {
-        let (scaling, level, variables) = (self.scaling, self.level, self.start.0.len());
-        let factor = self.factor_at(&x[..variables]).unwrap_or(1.0);
-        let Some(sample) = self.at(&x[..variables]) else {
+        let (scaling, variables) = (self.scaling, self.start.0.len());
+        let is_known = self.at(&x[..variables]).is_some();
+        let Some((_, sample)) = self.last.as_ref().filter(|_| is_known) else {
             // Feasible: NLopt heeds its stop value at feasible designs alone.
             values.fill(-1.0);
             if let Some(gradients) = gradients {
@@ -398,26 +442,16 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
             }
             return;
         };
-        for (value, (own, _)) in values.iter_mut().zip(&sample.constraints) {
-            *value = *own;
+        let (level, unit) = (x[variables..].iter().sum::<f64>(), self.level.map_or(0.0, |level| level.unit));
+        let own = sample.constraints.iter().map(|of| (of, 0.0));
+        let all = own.chain(sample.members.iter().map(|of| (of, unit))).zip(&self.factors.constraints);
+        for (value, (((own, _), unit), factor)) in values.iter_mut().zip(all.clone()) {
+            *value = factor * (own - unit * level);
         }
-        let bounded = &mut values[sample.constraints.len()..];
-        if let Some(level) = level {
-            for (value, (own, _)) in bounded.iter_mut().zip(&sample.members) {
-                *value = factor * (own - level.unit * x[variables]);
-            }
-        }
-        if let Some(gradients) = gradients {
-            gradients.fill(0.0);
-            let constraints = sample.constraints.iter().map(|(_, own)| (1.0, own, 0.0));
-            let by_level = level.map_or(0.0, |level| -factor * level.unit);
-            let members = sample.members.iter().map(|(_, own)| (factor, own, by_level));
-            for (row, (factor, own, by_level)) in
-                gradients.chunks_exact_mut(x.len()).zip(constraints.chain(members))
-            {
-                scaling.fill(row, factor, own);
-                row[variables..].fill(by_level);
-            }
+        let Some(gradients) = gradients else { return };
+        for (row, (((_, own), unit), factor)) in gradients.chunks_exact_mut(x.len()).zip(all) {
+            scaling.fill(row, *factor, own);
+            row[variables..].fill(-factor * unit);
         }
     }
 
@@ -430,7 +464,12 @@ impl<F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'_, F, E> {
         if self.last.as_ref().is_none_or(|(design, _)| design != x) {
             self.asked = 1;
             match self.ask(x)? {
-                Ok(sample) => self.last = Some((x.to_vec(), sample)),
+                Ok(sample) => {
+                    let keeps_all = sample.violation() == 0.0;
+                    let began_outside = *self.began_outside.get_or_insert(!keeps_all);
+                    self.has_entered |= began_outside && keeps_all;
+                    self.last = Some((x.to_vec(), sample));
+                }
                 Err(error) => self.interruption = Some(Interruption::Error(error)),
             }
         }
