@@ -109,9 +109,10 @@ impl Start<'_> {
 
     /// Largest first move of a variable with a factor, and how much the gradient promises of all.
     fn moves(&self, algorithm: Algorithm, factor: f64) -> [f64; 2] {
-        self.gradient.iter().zip(self.steps(algorithm, factor)).fold([0.0, 0.0], |[largest, promised], (g, step)| {
-            [largest.max(step), promised + g.abs() * step]
-        })
+        self.gradient
+            .iter()
+            .zip(self.steps(algorithm, factor))
+            .fold([0.0, 0.0], |[largest, promised], (g, step)| [largest.max(step), promised + g.abs() * step])
     }
 
     /// Length of the first move of every variable with a factor on the objective.
