@@ -203,18 +203,21 @@ fn a_thicker_plate_shields_better_in_both_models() {
 #[test]
 fn nodal_elements_beside_iron_are_refused_or_warned_of_with_the_cure() {
     let pole = repository("configs/pole.toml");
-    let iron = |elements: &str, order: u8, permeability: u32| {
+    let command = |command: &str, elements: &str, order: u8, permeability: u32| {
         let elements = format!("analysis.elements={elements}");
         let order = format!("analysis.order={order}");
         let iron = format!("materials.iron.relative_permeability={permeability}");
-        fluxmorph(&[&"check", &pole, &"--set", &elements, &"--set", &order, &"--set", &iron])
+        fluxmorph(&[&command, &pole, &"--set", &elements, &"--set", &order, &"--set", &iron])
     };
+    let iron = |elements: &str, order: u8, permeability: u32| command("check", elements, order, permeability);
     let doubtful = ["region `iron`", "analysis.elements = \"edge\""];
     iron("nodal", 1, 8).with(0, &[&doubtful[..], &["wrong by factors"]].concat());
     iron("nodal", 2, 1000).with(0, &[&doubtful[..], &["most of its flux"]].concat());
     for (order, permeability) in [(1, 12), (2, 2000)] {
         let says = ["lose more than a tenth of the flux beside iron", "(`iron`)", "elements = \"edge\""];
-        iron("nodal", order, permeability).with(3, &says);
+        for what in ["check", "solve", "run"] {
+            command(what, "nodal", order, permeability).with(3, &says);
+        }
     }
     iron("edge", 1, 2000).with(0, &["region `iron`", "analysis.order = 2"]);
     for order in [1, 2] {

@@ -8,6 +8,7 @@ mod curves;
 mod design;
 mod divided_mesh;
 mod elastic_body;
+mod elements;
 mod entries;
 mod field;
 mod functional;
@@ -154,7 +155,7 @@ fn problem_on(
     let mut faults = probe_faults(config, source, &full_mesh, &mesh);
     faults.extend(open::probe_faults(config, source, &full_mesh));
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
-    faults.extend(plausible::element_faults(config, source, &full_mesh, &audits));
+    faults.extend(elements::faults(config, source, &full_mesh, &audits));
     let mut sink = DiagnosticSink::new(config, source, faults);
     if conductors.is_empty() && !motion_alone {
         sink.take(check_conditions(config, source))?;
@@ -169,6 +170,7 @@ fn problem_on(
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);
         sink.take(source.check(faults).map_err(Error::from))?;
         warnings.extend(plausible::warnings(config, &full_mesh));
+        warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());
     let design = config.design.as_ref().zip(config.remesh.as_ref()).map(|(design, remesh)| shape::Inputs {

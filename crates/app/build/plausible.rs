@@ -8,10 +8,7 @@ use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
-use super::skin::Audited;
-use crate::config::{
-    Coil, CoilShape, Config, Diagnostic, ElementOrder, Elements, MeshConfig, RegionModel, SourceMap,
-};
+use crate::config::{Coil, CoilShape, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
 use crate::place::millimetres;
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -20,10 +17,6 @@ const THINNEST: f64 = 1e-6;
 
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
-
-/// Relative permeability above which edge elements of first order are coarse beside iron: 15 % in the energy norm at 1e5, 0.2 %
-/// in the gap of a C-core of 2000.
-const EDGE_DOUBTFUL: f64 = 1e3;
 
 /// Weights of the vertices at which an element is looked at: its middle, near every vertex, and on every edge.
 const NEAR: f64 = 0.85;
@@ -85,101 +78,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         );
     }
     warnings.extend(unit_hint(config, mesh));
-    warnings.extend(beside_iron(config, mesh));
     warnings
-}
-
-/// What the elements cannot represent: a field that would be off by more than a tenth, or none at all.
-pub(super) fn element_faults(
-    config: &Config,
-    source: &SourceMap,
-    mesh: &Mesh,
-    audits: &[Audited],
-) -> Vec<Diagnostic> {
-    let weak = audits.iter().filter(|audited| {
-        let is_meshed = audited.model == RegionModel::Volume;
-        is_meshed && config.analysis.elements == Elements::Edge && audited.audit.is_too_weak_for_edges()
-    });
-    let weak = weak.map(|Audited { audit, .. }| {
-        let message = format!(
-            "eddy currents in `{}` are too weak for edge elements: an element takes {:.1e} of the skin depth of {:.3} m",
-            audit.region,
-            1.0 / audit.median_elements_per_skin_depth,
-            audit.skin_depth
-        );
-        source.diagnostic(&format!("regions.{}.material", audit.region), message).expected(
-            "a material without conductivity, for these currents change no field, or analysis.elements = \"nodal\" for \
-             their loss",
-        )
-    });
-    let iron = nodal_iron(config, mesh).filter(|(_, mu, limits)| *mu > limits.refused);
-    let iron = iron.map(|(name, mu, limits)| {
-        let message = format!(
-            "nodal elements of order {} lose more than a tenth of the flux beside iron of the relative permeability {mu} \
-             (`{name}`): {}",
-            u8::from(config.analysis.order),
-            limits.wrong
-        );
-        source.diagnostic("analysis.elements", message).expected("elements = \"edge\" in [analysis]")
-    });
-    weak.chain(iron).collect()
-}
-
-/// Relative permeabilities without eddy currents above which nodal elements of an order are doubtful, and off by more than
-/// a tenth (docs/verification.md, 2.8), and what is wrong then.
-struct Limits {
-    doubtful: f64,
-    refused: f64,
-    wrong: &'static str,
-}
-
-/// Region, permeability and limits of the strongest iron that nodal elements are to carry.
-fn nodal_iron<'a>(config: &Config, mesh: &'a Mesh) -> Option<(&'a String, f64, Limits)> {
-    let limits = match (config.analysis.elements, config.analysis.order) {
-        (Elements::Edge, _) => return None,
-        (Elements::Nodal, ElementOrder::Linear) => Limits {
-            doubtful: 4.0,
-            refused: 10.0,
-            wrong: "circuits of it and weak fields beside it may be wrong by factors",
-        },
-        (Elements::Nodal, ElementOrder::Quadratic) => {
-            Limits { doubtful: 100.0, refused: 1000.0, wrong: "a circuit of it may lose most of its flux" }
-        }
-    };
-    let (name, mu) = strongest_iron(config, mesh)?;
-    Some((name, mu, limits))
-}
-
-/// The region of the highest relative permeability in which no eddy currents flow.
-fn strongest_iron<'a>(config: &Config, mesh: &'a Mesh) -> Option<(&'a String, f64)> {
-    let is_static = config.frequencies().contains(&0.0);
-    let names = mesh.topology().region_names().iter();
-    let iron = names.map(|name| (name, material(config, name)));
-    iron.filter(|(_, m)| is_static || m.conductivity == 0.0)
-        .map(|(name, m)| (name, m.relative_permeability))
-        .max_by(|(_, a), (_, b)| a.total_cmp(b))
-}
-
-/// What is doubtful beside iron without eddy currents.
-fn beside_iron(config: &Config, mesh: &Mesh) -> Option<String> {
-    if let Some((name, mu, limits)) = nodal_iron(config, mesh) {
-        return (mu > limits.doubtful).then(|| {
-            format!(
-                "region `{name}` has the relative permeability {mu}, and nodal elements of order {}: {}. Set \
-                 analysis.elements = \"edge\"",
-                u8::from(config.analysis.order),
-                limits.wrong
-            )
-        });
-    }
-    let (name, mu) = strongest_iron(config, mesh)?;
-    (config.analysis.order == ElementOrder::Linear && mu > EDGE_DOUBTFUL).then(|| {
-        format!(
-            "region `{name}` has the relative permeability {mu}, and edge elements of order 1 have one B an element: in \
-             slits and thin walls of it that one or two elements cross B may be off by 10 to 20 %. Refine them, or set \
-             analysis.order = 2"
-        )
-    })
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.

@@ -18,6 +18,9 @@ fn square() -> Polygon {
     Polygon::rectangle(LOWER, UPPER)
 }
 
+/// Its lower right quarter.
+pub(super) const QUARTER: [Place; 2] = [[0.0, -1.0], [1.0, 0.0]];
+
 /// A coil around (0.5, 0.5), half a metre across.
 fn source() -> Source {
     Source::new([0.5, 0.5], [0.15, 0.15], 0.1)
@@ -30,7 +33,7 @@ fn part(name: &'static str, lower: Place, upper: Place, kind: Kind) -> Part {
 
 /// The lower right quarter of the square.
 fn quarter(kind: Kind) -> Part {
-    part("block", [0.0, -1.0], [1.0, 0.0], kind)
+    part("block", QUARTER[0], QUARTER[1], kind)
 }
 
 /// An impedance surface without iron.
@@ -91,8 +94,17 @@ pub(super) fn perfect_quarter() -> Prism {
 
 /// The same, meshed.
 pub(super) fn meshed_quarter(skin_depth: f64) -> Prism {
-    let kind = Kind::Meshed { skin_depth, relative_permeability: 1.0 };
-    prism(&format!("meshed quarter, δ {skin_depth} m"), square(), vec![quarter(kind)])
+    meshed(QUARTER, skin_depth, 1.0)
+}
+
+/// A square with a meshed conductor between these corners.
+pub(super) fn meshed([lower, upper]: [Place; 2], skin_depth: f64, relative_permeability: f64) -> Prism {
+    let kind = Kind::Meshed { skin_depth, relative_permeability };
+    let name = format!("meshed {lower:?} to {upper:?}, δ {skin_depth} m, μr {relative_permeability}");
+    let block = part("block", lower, upper, kind);
+    // The coil beside the conductor.
+    let centre = if lower[1] < 0.5 && upper[0] > 0.5 && upper[1] > 0.5 { [0.2, 0.5] } else { [0.5, 0.5] };
+    Prism { source: Source::new(centre, [0.15, 0.15], 0.1), ..prism(&name, square(), vec![block]) }
 }
 
 /// A block in the middle, all around which the field is.

@@ -11,8 +11,9 @@ use crate::orders::Study;
 const SIZES: [f64; 3] = [0.1, 0.07, 0.05];
 
 /// Around corners at which `A` is singular: iron, an impedance surface, a perfect conductor.
-fn corners() -> [Prism; 3] {
-    [cases::iron_corner(1e3), cases::impedance_quarter(0.1, 1.0), cases::perfect_quarter()]
+fn corners() -> [Prism; 4] {
+    let [strong, stronger] = [1e3, 1e5].map(cases::iron_corner);
+    [strong, stronger, cases::impedance_quarter(0.1, 1.0), cases::perfect_quarter()]
 }
 
 /// In the energy norm off the winding: of first order B is constant in an element, of second linear. The exact H is constant there,

@@ -8,7 +8,7 @@ use fluxmorph_geometry::tet4::{centroid, volume};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_solver::{
-    Boundary, Conductor, FieldModel, FieldModelSetup, FieldSolution, Material, SurfaceLaw,
+    Boundary, Conductor, FieldModel, FieldModelSetup, FieldSolution, Material, SolverError, SurfaceLaw,
 };
 
 use super::boxed::{OBSERVATION, with_surface};
@@ -107,13 +107,22 @@ fn outer_faces(
 
 /// Solves a prism on a mesh.
 pub(super) fn solve(prism: &Prism, mesh: &Mesh, discretisation: Discretisation, penalty: f64) -> Solved {
+    try_solve(prism, mesh, discretisation, penalty).unwrap_or_else(|e| panic!("{}: {e}", prism.name))
+}
+
+/// Solves it, where the system has a solution in double precision.
+pub(super) fn try_solve(
+    prism: &Prism,
+    mesh: &Mesh,
+    discretisation: Discretisation,
+    penalty: f64,
+) -> Result<Solved, SolverError> {
     let (mesh, setup) = set_up(prism, mesh, penalty);
     let clock = ProcessTime::now();
-    let model =
-        FieldModel::new(&mesh, discretisation.of(setup)).unwrap_or_else(|e| panic!("{}: {e}", prism.name));
-    let (solution, _) = model.solve(&mesh).unwrap_or_else(|e| panic!("{}: {e}", prism.name));
+    let model = FieldModel::new(&mesh, discretisation.of(setup))?;
+    let (solution, _) = model.solve(&mesh)?;
     let cpu_seconds = clock.elapsed().as_secs_f64();
-    Solved { model, mesh, solution, cpu_seconds }
+    Ok(Solved { model, mesh, solution, cpu_seconds })
 }
 
 impl Solved {

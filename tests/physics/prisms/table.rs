@@ -6,7 +6,7 @@ use super::boxed::{Cells, boxed};
 use super::discretisation::ALL;
 use super::exact::Prism;
 use super::gradient::square_derivative;
-use super::problem::{Errors, solve};
+use super::problem::{Errors, try_solve};
 use super::refine::refined;
 use super::{cases, iron_circuit, unstructured};
 
@@ -72,7 +72,13 @@ fn of_gradients() {
 /// The rows of a prism on a mesh.
 fn rows(prism: &Prism, mesh: &Mesh) {
     for discretisation in ALL {
-        let solved = solve(prism, mesh, discretisation, 1.0);
+        let solved = match try_solve(prism, mesh, discretisation, 1.0) {
+            Ok(solved) => solved,
+            Err(fault) => {
+                println!("{:<44} {}: {fault}", prism.name, discretisation.name);
+                continue;
+            }
+        };
         let Errors { observed, energy, loss } = solved.errors(prism);
         println!(
             "{:<44} {:>4} {:>7} {:<8} {:>8} {:>7.2} {:>9} {:>9} {:>9}",

@@ -6,10 +6,13 @@
 //! to three depths (`layers`).
 
 mod layers;
+mod nodal;
 
 pub use layers::CoarseLayers;
+pub use nodal::NodalErrors;
 
-use fluxmorph_geometry::tet4::{area_vector, norm, volume};
+use fluxmorph_geometry::box_tree::AxisBox;
+use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use crate::elements::Order;
@@ -43,6 +46,12 @@ pub struct SkinAudit {
     pub coarse_layers: Option<CoarseLayers>,
     /// Mean thickness `2 V/S` over the skin depth.
     pub thickness_in_skin_depths: f64,
+    /// Diagonal of the box around it [m].
+    pub extent: f64,
+    /// Root of the mean square of its elements' edges, by volume [m].
+    pub edge_length: f64,
+    /// `μr`.
+    pub relative_permeability: f64,
 }
 
 impl SkinAudit {
@@ -120,7 +129,11 @@ pub fn skin_audit(
     let skin_depth = material.skin_depth(2.0 * std::f64::consts::PI * frequency)?;
     let topology = mesh.topology();
     let region_at = |e: ElementId| topology.region_of()[e.index()];
-    let volume_sum: f64 = topology.elements_of(region).into_iter().map(|e| volume(mesh.vertices(e))).sum();
+    let elements: Vec<[Point; 4]> =
+        topology.elements_of(region).into_iter().map(|e| mesh.vertices(e)).collect();
+    let volume_sum: f64 = elements.iter().map(|&vertices| volume(vertices)).sum();
+    let around = AxisBox::around(elements.as_flattened());
+    let squares: f64 = elements.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
 
     // (elements per skin depth, area) of every face towards another region; symmetry planes are no faces.
     let (mut layers, mut faces) = (Vec::new(), Vec::new());
@@ -156,5 +169,14 @@ pub fn skin_audit(
         coarse_share: coarse / surface,
         coarse_layers: layers::coarse_layers(mesh, region, &faces, skin_depth, order),
         thickness_in_skin_depths: 2.0 * volume_sum / surface / skin_depth,
+        extent: norm(sub(around.upper, around.lower)),
+        edge_length: (squares / volume_sum).sqrt(),
+        relative_permeability: material.relative_permeability,
     })
+}
+
+/// Mean square of the lengths of an element's edges [m²].
+fn mean_square_edge(vertices: [Point; 4]) -> f64 {
+    let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+    pairs.into_iter().map(|(a, b)| norm(sub(vertices[a], vertices[b])).powi(2)).sum::<f64>() / 6.0
 }
