@@ -55,10 +55,10 @@ pub(super) fn faults(
         );
         nodal_fault(source, message)
     });
-    let conductors = nodal_conductors(config, audits).filter(|(_, errors)| {
-        errors.field > FIELD[1] || (!errors.is_filled && errors.losses > LOSSES[1])
-    });
-    let conductors = conductors.map(|(audited, errors)| nodal_fault(source, coarse(config, audited, &errors)));
+    let conductors = nodal_conductors(config, audits)
+        .filter(|(_, errors)| errors.field > FIELD[1] || (!errors.is_filled && errors.losses > LOSSES[1]));
+    let conductors =
+        conductors.map(|(audited, errors)| nodal_fault(source, coarse(config, audited, &errors)));
     weak.chain(iron).chain(conductors).collect()
 }
 
@@ -132,7 +132,10 @@ impl Iron<'_> {
     /// What there is to say beside the permeability.
     fn shielding(&self) -> String {
         if self.carrying < self.relative_permeability {
-            format!(", {:.1} of it along the region, for eddy currents keep the flux in the skin", self.carrying)
+            format!(
+                ", {:.1} of it along the region, for eddy currents keep the flux in the skin",
+                self.carrying
+            )
         } else {
             String::new()
         }
