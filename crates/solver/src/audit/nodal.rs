@@ -1,7 +1,7 @@
 //! What nodal elements lose in a meshed conductor, before anything is solved.
 //!
-//! Below the skin `A + ∇ψ = 0`, and `A` is none: it goes on through the conductor. With both of one degree `∇ψ` is of a degree
-//! less than `A`, so that in an element of size `h` the sum vanishes for an `A` of that degree alone. Of first order it leaves
+//! Below the skin `A + ∇ψ = 0`, though `A` is not zero: it goes on through the conductor. With both of one degree `∇ψ` is of a
+//! degree less than `A`, so that in an element of size `h` the sum vanishes for an `A` of that degree alone. Of first order it leaves
 //! `h|∇A|`, which the eddy term weighs with `2ν/δ²`. That has two ends:
 //!
 //! * `A` is held constant as if its reluctivity there were `ν (h/δ)²`. Where that is more than what the field has outside,
