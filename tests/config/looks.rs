@@ -1,7 +1,5 @@
 //! Colours, lines too long to be shown, faults found later, and that nothing is written for a wrong input.
 
-use std::fs;
-
 use fluxmorph::config::{Config, ConfigError, DiagnosticReport};
 use fluxmorph::diagnostics::{Style, render};
 
@@ -83,44 +81,15 @@ fn a_later_fault_points_at_its_key() {
 
 #[test]
 fn nothing_is_written_for_a_wrong_input() {
-    // One of each kind: no TOML, a wrong value, a name that the mesh does not have, a bound that breaks the mesh.
-    let bound = |case: &&crate::case::Case| case.expected[0].contains("the mesh breaks");
+    // One of each kind: no TOML, a wrong value, a name that the mesh does not have.
     let places = read("wrong/names_and_places");
     let of = |group: &str| read(&format!("wrong/{group}")).swap_remove(0);
-    let cases =
-        [of("syntax"), of("design"), places[0].clone(), places.iter().find(bound).expect("one").clone()];
+    let cases = [of("syntax"), of("design"), places[0].clone()];
     for (case, command) in cases.iter().flat_map(|case| ["run", "solve", "gradient"].map(|c| (case, c))) {
-        // A solution does not move the mesh.
-        if command == "solve" && bound(&case) {
-            continue;
-        }
         let home = folder();
         case.write(home.path());
         let ended = limited(home.path(), None, &[command, "device.toml", "--out", "out"]);
         ended.refuses(3, &[&case.expected[0]]);
         assert_holds(home.path(), &["device.toml"]);
     }
-}
-
-#[test]
-fn the_bound_that_a_message_offers_can_be_used() {
-    let home = folder();
-    let config = repository_text("configs/shield_quick.toml");
-    write(
-        home.path(),
-        "device.toml",
-        config.replacen("[remesh]\n", "[remesh]\nlaw = \"linear\"\nrounds = 0\n", 1),
-    );
-    let check = |millimetres: f64, further: &[&str]| {
-        let bound = format!("design.upper={millimetres:?} mm");
-        limited(home.path(), None, &[&["check", "device.toml", "--set", &bound], further].concat())
-    };
-    let refused = check(40.0, &[]);
-    let (_, rest) = refused.stderr.split_once("nearer to zero than ").expect("an offer");
-    let offered: f64 = rest.split(' ').next().and_then(|word| word.parse().ok()).expect("a number");
-    // A micrometre to either side of the offer, which is rounded to a micrometre; up to the inversion itself.
-    let to_inversion = ["--set", "optimizer.minimum_quality=0"];
-    check(offered - 1e-3, &to_inversion).succeeds();
-    check(offered + 1e-3, &to_inversion).refuses(3, &["the mesh breaks"]);
-    assert!(fs::read_dir(home.path()).expect("a folder").count() == 1);
 }

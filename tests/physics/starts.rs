@@ -36,7 +36,6 @@ enum Start {
 struct End {
     stop_reason: StopReason,
     evaluations: usize,
-    rounds: usize,
     /// F at the best design.
     objective: f64,
     worst_quality: f64,
@@ -59,7 +58,6 @@ fn run(name: &str, overrides: &[&str], start: Start) -> End {
     End {
         stop_reason: optimised.stop_reason,
         evaluations: optimised.evaluations,
-        rounds: setup.problem.shape().expect("a shape").motion().round(),
         objective: optimised.best.objective,
         worst_quality: rows.iter().map(|row| row.worst_quality).fold(f64::INFINITY, f64::min),
     }
@@ -75,13 +73,13 @@ fn flat(name: &str, overrides: &[&str]) -> f64 {
 fn all_end_alike(name: &str, overrides: &[&str], starts: &[Start]) {
     let flat = flat(name, overrides);
     let mut ratios = Vec::new();
-    println!("{name}: start, how it ended, evaluations, rounds, F/F of the flat plate, worst quality");
+    println!("{name}: start, how it ended, evaluations, F/F of the flat plate, worst quality");
     for &start in starts {
         let end = run(name, overrides, start);
         let ratio = end.objective / flat;
         println!(
-            "{start:?}: {:?}, {}, {}, {ratio:.4}, {:.4}",
-            end.stop_reason, end.evaluations, end.rounds, end.worst_quality
+            "{start:?}: {:?}, {}, {ratio:.4}, {:.4}",
+            end.stop_reason, end.evaluations, end.worst_quality
         );
         // The last digit may take long; a mesh that gives up, or a field, would be another status.
         let ended = [StopReason::ObjectiveConverged, StopReason::StepConverged, StopReason::MaxEvaluations];

@@ -1,6 +1,6 @@
 //! What stands on the page.
 
-use crate::support::device::{CONSTRAINT, ROUNDS};
+use crate::support::device::CONSTRAINT;
 use crate::support::folder::read_text as read;
 use crate::support::markup::{Element, elements};
 use crate::support::program::{fluxmorph, fluxmorph_in, folder};
@@ -96,16 +96,15 @@ fn another_file_has_links_that_lead_to_the_run() {
 }
 
 #[test]
-fn constraints_and_rounds_are_drawn() {
+fn constraints_are_drawn() {
     let home = folder();
-    let changes = [CONSTRAINT, ROUNDS, ("max_evaluations = 6", "max_evaluations = 8")];
+    let changes = [CONSTRAINT, ("max_evaluations = 6", "max_evaluations = 8")];
     let out = block("run", home.path(), &changes);
     let page = read(&out.join("report.html"));
     let elements = elements(&page);
     figures_are_described(&elements);
     assert!(elements.iter().any(|e| e.get("data-chart") == Some("constraint")));
-    assert!(elements.iter().any(|e| e.get("class") == Some("round")), "a new reference is a dotted line");
-    assert!(page.contains("Constraints at the best design") && page.contains("Rounds and fallbacks"));
+    assert!(page.contains("Constraints at the best design"));
 }
 
 #[test]

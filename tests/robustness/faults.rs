@@ -10,7 +10,8 @@ use fluxmorph::{Error, ExitCode};
 use rayon::prelude::*;
 
 use crate::disk::{Fault, SimulatedDisk};
-use crate::in_memory::{FOLDER, block, constrained, resume, run, with_rounds};
+use crate::in_memory::{FOLDER, block, constrained, moved_by, resume, run};
+use crate::support::device::LINEAR;
 use crate::support::essence::{Essence, assert_same, essence};
 use crate::support::whole::{Logs, torn};
 
@@ -141,7 +142,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
     };
     let tallies =
-        [start(&block(&[])), again(&block(&[]), 2), replaced(&constrained()), again(&with_rounds(), 4)];
+        [start(&block(&[])), again(&block(&[]), 2), replaced(&constrained()), again(&moved_by(LINEAR), 4)];
     println!("{tallies:?}");
     let total = tallies.into_iter().fold(Tally::default(), |sum, tally| sum + tally);
     println!("together: {total:?}");

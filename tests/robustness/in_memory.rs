@@ -9,7 +9,7 @@ use fluxmorph::files::{Disk, OverwritePolicy, RunResult};
 use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::Silent;
 
-use crate::support::device::{BLOCK, CONSTRAINT, ROUNDS, THROUGH_THE_GAP};
+use crate::support::device::{BLOCK, CONSTRAINT, THROUGH_THE_GAP};
 use crate::support::{self, changed, parsed};
 
 /// Where the runs write.
@@ -30,12 +30,12 @@ pub(crate) fn constrained() -> (Config, SourceMap) {
     block(&[CONSTRAINT])
 }
 
-/// The block with steps so cautious that the mesh has several references.
-pub(crate) fn with_rounds() -> (Config, SourceMap) {
+/// The block on one of the laws that are not the default, with a face that the mesh does not carry to its bound.
+pub(crate) fn moved_by(law: (&str, &str)) -> (Config, SourceMap) {
     block(&[
-        ROUNDS,
+        law,
+        THROUGH_THE_GAP,
         ("max_evaluations = 6", "max_evaluations = 12"),
-        ("ftol_rel = 0", "ftol_rel = 1e-4"),
         ("verify_refinement = 0", "verify_refinement = 0\nfields = \"improved\""),
     ])
 }

@@ -8,8 +8,8 @@ use fluxmorph::files::{Disk, Refinements};
 use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
-use crate::in_memory::{FOLDER, block, constrained, resume, run, shipped, throttled, with_rounds};
-use crate::support::device::{ROUNDS, SATURATED};
+use crate::in_memory::{FOLDER, block, constrained, moved_by, resume, run, shipped, throttled};
+use crate::support::device::{HYPERELASTIC, LINEAR, SATURATED};
 use crate::support::essence::{Essence, assert_same, essence};
 
 /// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
@@ -63,9 +63,9 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
     for (name, device) in [
         ("plain", block(&[])),
         ("constrained", constrained()),
-        ("rounds", with_rounds()),
+        ("linear", moved_by(LINEAR)),
+        ("hyperelastic", moved_by(HYPERELASTIC)),
         ("saturated", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3]])),
-        ("saturated, with rounds", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3], ROUNDS])),
         ("saturated at 50 Hz", block(&SATURATED[..3])),
         ("throttled", throttled()),
         ("last", kept("first_last")),
@@ -93,16 +93,8 @@ fn shipped_with(name: &str, evaluations: usize) -> (Config, SourceMap) {
 }
 
 #[test]
-fn the_rounds_of_the_device_are_there_to_be_tested() {
-    let (files, _) = whole_run(&with_rounds());
-    let records = journal::parse(&files[Path::new("journal.jsonl")]).expect("a journal").records;
-    let rounds: Vec<usize> = records.iter().map(|record| record.row.round).collect();
-    assert!(rounds.last() > Some(&1), "{rounds:?}");
-}
-
-#[test]
 fn a_run_may_be_cut_again_and_again() {
-    for device in [constrained(), with_rounds(), throttled(), shipped_with("shield_quick.toml", 8)] {
+    for device in [constrained(), moved_by(HYPERELASTIC), throttled(), shipped_with("shield_quick.toml", 8)] {
         let (files, expected) = whole_run(&device);
         let count = count(&files[Path::new("journal.jsonl")]);
         let mut disk = cut_behind(&files, 0);

@@ -1,4 +1,4 @@
-//! `fluxmorph morph`: one motion, sweeps, increments, the tuner, and what it refuses.
+//! `fluxmorph morph`: one motion, sweeps, laws, the tuner, and what it refuses.
 
 use std::path::Path;
 
@@ -10,11 +10,9 @@ use crate::support::folder::{count, files_below, number, read_json, read_text, s
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 use crate::support::repository;
 
-/// Pressed in by three quarters of the height: no single increment survives that.
-fn pressed(increments: &str) -> String {
-    BLOCK
-        .replace("\"5 mm\"", "\"-30 mm\"")
-        .replace("[[morph.motion]]", &format!("[morph]\n{increments}\n[[morph.motion]]"))
+/// Pressed in by three quarters of the height: no linear map survives that.
+fn pressed(law: &str) -> String {
+    BLOCK.replace("\"5 mm\"", "\"-30 mm\"").replace("free =", &format!("law = \"{law}\"\nfree ="))
 }
 
 fn morph(home: &Path, text: &str, further: &[&str]) -> Finished {
@@ -34,7 +32,7 @@ fn one_motion_leaves_both_meshes_and_a_result() {
     assert_eq!(finished.json()["cases"], result["cases"]);
     assert_eq!((&result["command"], &result["status"]), (&"morph".into(), &"done".into()));
     let case = &result["cases"][0];
-    assert_eq!((count(case, "/tets"), count(case, "/moved_nodes"), count(case, "/increments")), (384, 1, 1));
+    assert_eq!((count(case, "/tets"), count(case, "/moved_nodes"), count(case, "/newton_steps")), (384, 1, 0));
     // Interior nodes of 3 × 3 × 4, top free, without the node that is moved.
     assert_eq!(count(case, "/equations"), 3 * (36 - 1));
     assert_eq!(case["valid"], true);
@@ -56,13 +54,13 @@ fn one_motion_leaves_both_meshes_and_a_result() {
 }
 
 #[test]
-fn a_motion_that_breaks_the_mesh_is_a_result_or_goes_on_in_increments() {
+fn a_motion_that_breaks_the_mesh_is_a_result_or_goes_by_another_law() {
     let home = folder();
-    let run = |increments: &str, code: i32| -> Value {
-        let finished = morph(home.path(), &pressed(increments), &["--json", "--force"]).exits_with(code);
+    let run = |law: &str, code: i32| -> Value {
+        let finished = morph(home.path(), &pressed(law), &["--json", "--force"]).exits_with(code);
         finished.json()["cases"][0].clone()
     };
-    let once = run("increments = 1", 4);
+    let once = run("linear", 4);
     let ended = |file: &str| read_json(&home.path().join("out").join(file))["status"].clone();
     assert_eq!((ended("result.json"), ended("manifest.json")), ("failed".into(), "failed".into()));
     assert!(number(&once, "/after/worst") < 0.0 && count(&once, "/inverted") > 0 && once["valid"] == false);
@@ -72,31 +70,40 @@ fn a_motion_that_breaks_the_mesh_is_a_result_or_goes_on_in_increments() {
     let after = read_vtu(&home.path().join("out/after.vtu")).expect("a VTU file");
     assert!(scalars(&after.cell_data["quality"]).iter().any(|&q| q < 0.0));
 
-    let auto = run("", 0);
-    assert!(count(&auto, "/increments") > 1 && count(&auto, "/inverted") == 0, "{auto}");
-    assert!(number(&auto, "/after/worst") > 0.0 && number(&auto, "/reached") == 1.0);
-    // The first inversion is that of the whole motion in one step, whatever way was taken.
-    assert_eq!(number(&auto, "/inversion/step"), step);
+    let own = run("hyperelastic", 0);
+    assert!(count(&own, "/newton_steps") > 1 && count(&own, "/inverted") == 0, "{own}");
+    assert!(number(&own, "/after/worst") > 0.0 && number(&own, "/reached") == 1.0);
 }
 
 #[test]
 fn a_motion_that_stops_short_on_a_valid_mesh_has_stopped_and_not_failed() {
     let home = folder();
-    // As increments of its own choice, and as equal ones: none of those before the last may fall below the quality.
-    for increments in ["", "increments = 10\n"] {
-        let text = pressed(&format!("{increments}least_quality = 0.3"));
-        let result = morph(home.path(), &text, &["--json", "--force"]).exits_with(1).json();
+    let stopped = |text: &str| {
+        let result = morph(home.path(), text, &["--json", "--force"]).exits_with(1).json();
         assert_eq!((&result["status"], &result["stop_reason"]), (&"stopped".into(), &"mesh_limited".into()));
-        let case = &result["cases"][0];
-        assert!(number(case, "/reached") < 1.0 && count(case, "/inverted") == 0, "{case}");
-        assert!(case["valid"] == false, "{case}");
-        // The fallback that repeats the whole motion does not check the least quality; equal increments have no fallbacks.
-        assert!(increments.is_empty() || number(case, "/after/worst") >= 0.3, "{case}");
+        result["cases"][0].clone()
+    };
+    // Through the bottom.
+    let case = stopped(&pressed("rails").replace("\"-30 mm\"", "\"-45 mm\""));
+    let reached = number(&case, "/reached");
+    assert!((0.5..40.0 / 45.0).contains(&reached) && count(&case, "/inverted") == 0, "{case}");
+    assert!(case["valid"] == false, "{case}");
+    // What is worse than asked for is a result, and not valid.
+    let least = "[morph]\nleast_quality = 0.3\n[[morph.motion]]";
+    let case = stopped(&BLOCK.replace("\"5 mm\"", "\"-12 mm\"").replace("[[morph.motion]]", least));
+    assert!(number(&case, "/after/worst") < 0.3 && number(&case, "/reached") == 1.0);
+}
+
+#[test]
+fn keys_of_earlier_versions_are_passed_over_and_said() {
+    let home = folder();
+    let text = BLOCK.replace("free =", "rounds = 3\nfree =");
+    let text = text.replace("[[morph.motion]]", "[morph]\nincrements = \"auto\"\n[[morph.motion]]");
+    let finished = morph(home.path(), &text, &[]).exits_with(0);
+    for key in ["remesh.rounds", "morph.increments"] {
+        let said = format!("`{key}` is of an earlier version, and has no effect");
+        assert!(finished.stderr.contains(&said), "{}", finished.stderr);
     }
-    // A single increment is a result, however it leaves the mesh.
-    let text = pressed("increments = 1\nleast_quality = 0.3").replace("-30 mm", "-12 mm");
-    let result = morph(home.path(), &text, &["--json", "--force"]).exits_with(1).json();
-    assert!(number(&result, "/cases/0/after/worst") < 0.3 && number(&result, "/cases/0/reached") == 1.0);
 }
 
 #[test]
@@ -120,7 +127,7 @@ fn a_sweep_is_one_table_with_published_values_beside() {
     let cases = "[[morph.case]]\nname = \"soft, uniform\"\nremesh = { poisson = 0.1, stiffness = \"uniform\" }\n\
                  paper = { worst_quality = 0.25, poor = 7 }\n\
                  [[morph.case]]\nname = \"fine\"\nmesh.block.cells = [8, 8, 8]\n\
-                 [[morph.case]]\nname = \"broken\"\nincrements = 1\n\
+                 [[morph.case]]\nname = \"broken\"\n\
                  motion = [{ nodes = [[0.02, 0.02, 0.04]], displacement = [0, 0, \"-30 mm\"] }]\n";
     let text = format!("{BLOCK}{cases}");
     let finished = morph(home.path(), &text, &[]).with(1, &["(3 of 3)"]);
@@ -150,7 +157,7 @@ fn a_sweep_is_one_table_with_published_values_beside() {
 #[test]
 fn resolved_configurations_repeat_the_motion_bit_for_bit_on_any_number_of_threads() {
     let home = folder();
-    morph(home.path(), &pressed(""), &["--threads", "1"]).exits_with(0);
+    morph(home.path(), &pressed("hyperelastic"), &["--threads", "1"]).exits_with(0);
     let first = std::fs::read(home.path().join("out/after.vtu")).expect("read");
     let resolved = read_text(&home.path().join("out/resolved.toml"));
     morph(home.path(), &resolved, &["--threads", "3", "--force"]).exits_with(0);

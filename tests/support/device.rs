@@ -16,9 +16,11 @@ pub(crate) const BLOCK: &str = include_str!("block.toml");
 pub(crate) const CONSTRAINT: (&str, &str) =
     ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]");
 
-/// Steps of the block so cautious that the mesh has several references.
-pub(crate) const ROUNDS: (&str, &str) =
-    ("slide = [", "law = \"linear\"\nrounds = 4\ninversion_share = 0.1\nslide = [");
+/// The block's mesh by the paper's law.
+pub(crate) const LINEAR: (&str, &str) = ("slide = [", "law = \"linear\"\nslide = [");
+
+/// The block's mesh by the law that moves nodes in all directions.
+pub(crate) const HYPERELASTIC: (&str, &str) = ("slide = [", "law = \"hyperelastic\"\nslide = [");
 
 /// The block of steel, in a field that saturates it, with the force on it; with the last change at rest.
 pub(crate) const SATURATED: [(&str, &str); 4] = [
@@ -64,7 +66,7 @@ pub(crate) fn written(name: &'static str, folder: &Path, changes: &[(&str, &str)
 /// The block with a constraint and several references of its mesh.
 pub(crate) fn block(folder: &Path, evaluations: usize) -> Device {
     let evaluations = format!("max_evaluations = {evaluations}");
-    written("block", folder, &[CONSTRAINT, ROUNDS, ("max_evaluations = 6", &evaluations)])
+    written("block", folder, &[CONSTRAINT, LINEAR, ("max_evaluations = 6", &evaluations)])
 }
 
 /// The block on elements so small that an evaluation takes about a second.

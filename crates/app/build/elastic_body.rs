@@ -173,7 +173,7 @@ pub(super) fn motion_law(
 }
 
 /// Keys of `[remesh]` that only the linear law knows.
-const LINEAR_ONLY: [&str; 4] = ["poisson", "motion", "rounds", "inversion_share"];
+const LINEAR_ONLY: [&str; 2] = ["poisson", "motion"];
 
 /// What is said where keys are written that the law has no use for.
 pub(super) fn unused_keys(source: &SourceMap, remesh: &Remesh, law: MotionLaw) -> Option<String> {
@@ -207,7 +207,7 @@ pub(crate) fn motion_in_words(remesh: &Remesh, motion: &Motion) -> String {
         MotionLaw::Hyperelastic => format!("hyperelastic, one mesh a design{}", why(several)),
         MotionLaw::Linear => {
             let reason = if has_force(remesh) { "a force acts" } else { several };
-            format!("linear elasticity, at most {} rounds{}", remesh.rounds, why(reason))
+            format!("linear elasticity, one mesh a design{}", why(reason))
         }
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn attribute_error(error: Error, config: &Config, source: &SourceMap)
         OptimizerError::Geometric(error) => blame.geometric(error),
         OptimizerError::Mesh(error) => blame.mesh(error),
         OptimizerError::Constraint { name, .. } => blame.constraint(name, cause),
-        OptimizerError::FirstDesign { .. } | OptimizerError::DesignUnreached { .. } => {
+        OptimizerError::FirstDesign { .. } => {
             Some(source.diagnostic("design.initial", error.to_string()).with_advice_apart())
         }
         _ => None,

@@ -1,14 +1,14 @@
-//! The design surface and the elastic map of a configuration, and whether its bounds leave the mesh whole.
+//! The design surface and the elastic map of a configuration.
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::parallel::{Ownership, Role};
+use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{add, centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::Shape;
-use fluxmorph_remesh::{ElasticMap, Motion, RemeshError, RemeshSetup, StepLimits};
+use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup};
 use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup, unused_keys};
@@ -17,9 +17,6 @@ use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
 use crate::error::Error;
 use crate::place::millimetres;
-
-/// Without `optimizer.minimum_quality`, the least quality over the worst one of the undeformed mesh.
-const LEAST_QUALITY_SHARE: f64 = 0.05;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
@@ -133,17 +130,10 @@ pub(super) fn shape(
         faults.extend(vanishing_faults(source, design, mesh, &surface, thickness));
     }
     source.check(faults)?;
-    // Where elements push back it is their room that is held.
-    let least_quality = if motion.is_one_function() { 0.0 } else { LEAST_QUALITY_SHARE * quality };
-    let limits = StepLimits {
-        inversion_share: inputs.remesh.inversion_share,
-        least_quality: config.optimizer.minimum_quality.unwrap_or(least_quality),
-        rounds: inputs.remesh.rounds,
-        ..StepLimits::default()
-    };
+    // Unless more is asked for, it is the room of elements that is held.
+    let least_quality = config.optimizer.minimum_quality.unwrap_or(0.0);
     let bounds = [vec![design.lower; n], vec![design.upper; n]];
-    let shape = Shape::new(surface, motion, limits, bounds).with_thickness(thickness).starting_at(initial);
-    check_bounds(source, &shape, inputs.share)?;
+    let shape = Shape::new(surface, motion, least_quality, bounds).with_thickness(thickness).starting_at(initial);
     Ok(shape)
 }
 
@@ -312,65 +302,4 @@ fn held_node_fault(
     );
     let fault = inputs.source.diagnostic("remesh", message);
     Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
-}
-
-/// Without rounds, tries the two extreme designs, all variables at their lower and at their upper bound, before anything is
-/// solved.
-fn check_bounds(source: &SourceMap, shape: &Shape, share: Option<&Ownership>) -> Result<(), Error> {
-    // A rank that follows gives no orders: the first one checks.
-    let is_worker = share.is_some_and(|share| share.group.role() == Role::Worker);
-    if shape.limits.rounds > 0 || shape.motion().is_one_function() || is_worker {
-        return Ok(());
-    }
-    let mut faults = Vec::new();
-    if let Err(error @ RemeshError::Inverted { .. }) =
-        shape.motion().moved(&shape.displacement(shape.initial()))
-    {
-        faults.push(
-            source
-                .diagnostic("design.initial", format!("the first design breaks the mesh: {error}"))
-                .help("allow remesh.rounds, or start nearer to the undeformed shape"),
-        );
-    }
-    for (key, bound) in [("design.lower", shape.lower()), ("design.upper", shape.upper())] {
-        let at = bound[0] * 1e3;
-        match shape.motion().moved(&shape.displacement(bound)) {
-            Ok(moved) => {
-                let quality = shape.motion().quality(&moved.mesh);
-                let least = shape.limits.least_quality;
-                if quality.worst < least {
-                    let message = format!(
-                        "`{key}`: at {at:.3} mm element {} has the quality {:.2e}",
-                        quality.worst_element, quality.worst
-                    );
-                    faults.push(
-                        source
-                            .diagnostic(key, message)
-                            .expected(format!("at least {least:.2e} (optimizer.minimum_quality)"))
-                            .help(
-                                "narrow the bound, lower optimizer.minimum_quality, or allow remesh.rounds",
-                            ),
-                    );
-                }
-            }
-            Err(RemeshError::Inverted { element, region, centroid, fraction }) => {
-                let message = format!(
-                    "`{key}`: the mesh breaks at {at:.3} mm: element {element} of region `{region}` at {} is inverted",
-                    millimetres(centroid)
-                );
-                faults.push(
-                    source
-                        .diagnostic(key, message)
-                        .expected(format!("a bound nearer to zero than {:.3} mm", at * fraction))
-                        .help(
-                            "allow remesh.rounds, narrow the bound, enlarge the remesh region, take another \
-                             remesh.stiffness, or let faces between regions beside the design follow it: they are held \
-                             unless remesh.slide or remesh.free lists them",
-                        ),
-                );
-            }
-            Err(other) => return Err(other.into()),
-        }
-    }
-    Ok(source.check(faults)?)
 }

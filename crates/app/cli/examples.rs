@@ -48,7 +48,7 @@ Examples:
 pub(super) const MORPH: &str = "\
 Examples:
   fluxmorph init block && fluxmorph morph block.toml
-  fluxmorph morph block.toml --set morph.increments=8 --force
+  fluxmorph morph block.toml --set remesh.law=hyperelastic --force
   fluxmorph morph block.toml --tune --out runs/tuned";
 
 pub(super) const CHECK: &str = "\

@@ -22,7 +22,7 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
         let interrupted = options.interrupted;
         observer.phase("setting up mesh and matrices");
         let progress = &mut |stage| observer.stage(stage);
-        let mut setup = set_up_watched(&config, &source, Mode::Optimisation, options.ranks, progress)?;
+        let setup = set_up_watched(&config, &source, Mode::Optimisation, options.ranks, progress)?;
         memory_limit::check_problem(&setup.problem, &source, options.overwrite_policy)?;
         for warning in &setup.warnings {
             observer.warning(warning);
@@ -36,7 +36,6 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             }
             None => shape.initial().to_vec(),
         };
-        setup.problem.continue_to(&p, interrupted)?;
         let settings = Settings::default();
         let certificates =
             certify(&setup.problem, &p, &settings, interrupted, |constraint, index, direction| {

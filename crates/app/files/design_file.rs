@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::open_regular;
 use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::problem::RoundStart;
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -83,8 +82,6 @@ pub struct DesignFile {
     path: PathBuf,
     /// The variables [m].
     pub values: Vec<f64>,
-    /// The rounds through which a run came to it; empty where the file does not say.
-    pub rounds: Vec<RoundStart>,
     /// Where the variables act [m]; `None` where the file does not say.
     points: Option<Vec<[f64; 3]>>,
 }
@@ -166,16 +163,7 @@ pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFil
             Some(points).filter(|points| points.len() == expected)
         }
     };
-    let rounds = match value.pointer("/design/rounds") {
-        None | Some(Value::Null) => Vec::new(),
-        Some(rounds) => Vec::<RoundStart>::deserialize(rounds)
-            .map_err(|error| content(format!("`design.rounds` is no list of rounds: {error}")))?,
-    };
-    if let Some(start) = rounds.iter().find(|start| start.design().len() != expected) {
-        let found = start.design().len();
-        return Err(content(format!("a design of `design.rounds` has {found} values, expected {expected}")));
-    }
-    Ok(DesignFile { path: path.to_owned(), values, rounds, points })
+    Ok(DesignFile { path: path.to_owned(), values, points })
 }
 
 #[cfg(test)]
@@ -201,11 +189,6 @@ mod tests {
             ("[1e999, 0]", "number out of range"),
             ("[1, ", "line 1"),
             (r#"{"design": {"values_m": [1, 2], "points_m": [[1, 2]]}}"#, "no list of points"),
-            (r#"{"design": {"values_m": [1, 2], "rounds": [{"kind": "dance"}]}}"#, "no list of rounds"),
-            (
-                r#"{"design": {"values_m": [1, 2], "rounds": [{"kind": "reference", "design_m": [1]}]}}"#,
-                "a design of `design.rounds` has 1 values, expected 2",
-            ),
         ];
         for (text, fragment) in cases {
             let message = read(text).expect_err(text);

@@ -80,7 +80,6 @@ mod tests {
             step_to_inversion: Some(1.25),
             inversion_element: Some(17),
             inversion_region: Some("air, \"near\"".to_owned()),
-            round: 0,
             level: 0,
             forces: vec![BodyForce {
                 name: "pole".to_owned(),
@@ -103,7 +102,7 @@ mod tests {
         let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,0,-0.5,0.5,0.0,-1.25,0.0,0.0,0.0\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
                       min_thickness_m,max_thickness_m,linear_iterations,seconds,step_to_inversion,inversion_element,inversion_region,\
-                      round,level,c_volume,force_pole_x_n,force_pole_y_n,force_pole_z_n,torque_pole_x_nm,torque_pole_y_nm,\
+                      level,c_volume,force_pole_x_n,force_pole_y_n,force_pole_z_n,torque_pole_x_nm,torque_pole_y_nm,\
                       torque_pole_z_nm\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));

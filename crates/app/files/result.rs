@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use fluxmorph_optimizer::body::BodyForce;
 use fluxmorph_optimizer::driver::StopReason;
-use fluxmorph_optimizer::problem::{RoundEvent, RoundStart};
 use serde::{Deserialize, Serialize};
 
 use super::accuracy::Accuracy;
@@ -40,9 +39,6 @@ pub struct RunResult {
     pub design: Option<DesignResult>,
     /// The mesh.
     pub mesh: MeshResult,
-    /// Rounds and fallbacks of the mesh motion, in their order; empty where one reference mesh was enough.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub rounds: Vec<RoundEvent>,
     /// The frequencies [Hz] of the field problems, in the order of the configuration.
     #[serde(default)]
     pub frequencies_hz: Vec<f64>,
@@ -300,9 +296,6 @@ pub struct DesignResult {
     pub upper_m: Vec<f64>,
     /// Where they act on the undeformed mesh [m].
     pub points_m: Vec<[f64; 3]>,
-    /// The rounds through which the mesh came to it, for `solve --design`; empty where one reference mesh was enough.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub rounds: Vec<RoundStart>,
 }
 
 /// The mesh of a run.
@@ -411,22 +404,11 @@ pub(crate) mod tests {
                 bound: 1e-3,
                 satisfied: true,
             }],
-            rounds: vec![fluxmorph_optimizer::problem::RoundEvent {
-                round: 1,
-                kind: fluxmorph_optimizer::problem::RoundKind::Round,
-                evaluation: Some(4),
-                worst_quality: [0.1; 2],
-                admitted: None,
-                stiffness: "inverse_size".to_owned(),
-                reach: [0.5, 0.75],
-                cause: "the search stopped at the trust-region boundary".to_owned(),
-            }],
             design: Some(DesignResult {
                 values_m: vec![0.02],
                 lower_m: vec![-0.005],
                 upper_m: vec![0.02],
                 points_m: vec![[0.0, 0.0, -0.01]],
-                rounds: vec![RoundStart::Reference { design_m: vec![0.01] }],
             }),
             mesh: MeshResult {
                 nodes: 100,

@@ -15,7 +15,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{
-    Analysis, Derivatives, ErrorEstimate, NoProgress, RoundEvent, SolverCache,
+    Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache,
 };
 use fluxmorph_remesh::Moved;
 
@@ -105,7 +105,6 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<Searched, Error> {
         let settings = self.config.optimizer.settings();
-        self.continuation.iter().for_each(|event| observer.round(event));
         let mut levels = Levels::of(self)?;
         let is_shared_out = self.setup.problem.share().is_some();
         let is_second_order = self.config.analysis.order == ElementOrder::Quadratic;
@@ -142,8 +141,7 @@ impl Session<'_> {
                 let refinements = levels.map(|levels| levels.kept);
                 return Ok(Searched { optimised, first, at_best, refinements });
             }
-            self.continuation.iter().for_each(|event| observer.round(event));
-            start = Start {
+                start = Start {
                 level: start.level + 1,
                 evaluations: optimised.evaluations,
                 iterations: optimised.iterations,
@@ -269,7 +267,6 @@ impl Session<'_> {
             levels.made,
             levels.mesh.mesh().topology().tets().len()
         ));
-        self.continue_to_initial()?;
         Ok(true)
     }
 
@@ -291,7 +288,7 @@ impl Session<'_> {
         }
         self.setup = self.set_up(&mesh)?;
         (levels.mesh, levels.made) = (mesh, levels.made + 1);
-        self.continue_to_initial()
+        Ok(())
     }
 
     /// A finer mesh, and the problem on it; else why there is none.
@@ -317,17 +314,6 @@ impl Session<'_> {
         let finer = (mesh.mesh().clone(), mesh.surface(self.config)?);
         set_up_on(finer, self.config, self.source, Mode::Optimisation)
     }
-
-    /// Takes the new mesh near the initial design.
-    fn continue_to_initial(&mut self) -> Result<(), Error> {
-        let initial = self.initial_design().to_vec();
-        let continued = self.setup.problem.continue_to(&initial, self.interrupted);
-        self.continuation = continued.map_err(|error| match error {
-            OptimizerError::Interrupted => OptimizerError::InterruptedRun,
-            other => other,
-        })?;
-        Ok(())
-    }
 }
 
 /// The last search, with what those before it took.
@@ -335,6 +321,5 @@ fn sum(before: Option<Optimised>, last: Optimised) -> Optimised {
     let Some(before) = before else { return last };
     let mut timings = before.timings;
     timings += last.timings;
-    let rounds: Vec<RoundEvent> = before.rounds.into_iter().chain(last.rounds).collect();
-    Optimised { timings, rounds, worst_residual: before.worst_residual.max(last.worst_residual), ..last }
+    Optimised { timings, worst_residual: before.worst_residual.max(last.worst_residual), ..last }
 }

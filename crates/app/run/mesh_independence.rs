@@ -30,10 +30,6 @@ use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
 use crate::show::Observer;
 
-/// Rounds that the fresh mesh may take to a shape, at least. A run may be held to its first reference mesh; here the shape
-/// alone counts, and not the way to it.
-const LEAST_ROUNDS: usize = 20;
-
 /// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
@@ -203,7 +199,7 @@ impl MeshIndependence<'_> {
             return Ok(Outcome::CutShort);
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
-        let mut problem = setup.problem;
+        let problem = setup.problem;
         let tets = problem.original().topology().tets().len();
         let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());
         let mut cache = SolverCache::default();
@@ -211,10 +207,7 @@ impl MeshIndependence<'_> {
             if interrupted() {
                 return Ok(Outcome::CutShort);
             }
-            let analysis = match analysis_at(&mut problem, &mut cache, displacement, interrupted) {
-                Err(Error::Optimizer(OptimizerError::Interrupted)) => return Ok(Outcome::CutShort),
-                analysis => analysis?,
-            };
+            let analysis = analysis_at(&problem, &mut cache, &displacement)?;
             if values.is_empty() {
                 bounds = bounds_at(&problem, &analysis)?;
             }
@@ -252,30 +245,20 @@ fn fresh_configuration(config: &Config) -> Config {
         // The old surface's displacements are taken over as they are.
         design.filter_radius = design.grid.is_none().then_some(0.0);
     }
-    if let Some(remesh) = &mut fresh.remesh {
-        remesh.rounds = remesh.rounds.max(LEAST_ROUNDS);
-    }
     fresh
 }
 
-/// The analysis of a shape, reached from the undeformed mesh.
+/// The analysis of a shape.
 fn analysis_at(
-    problem: &mut Problem,
+    problem: &Problem,
     cache: &mut SolverCache,
-    displacement: Vec<Point>,
-    interrupted: &dyn Fn() -> bool,
+    displacement: &[Point],
 ) -> Result<Analysis, Error> {
-    let undeformed = problem.shape().map(|shape| shape.motion().clone());
-    problem.continue_to_displacement(displacement.clone(), interrupted)?;
     let moved = match problem.shape() {
-        Some(shape) => shape.motion().moved(&displacement)?,
+        Some(shape) => shape.motion().moved(displacement)?,
         None => problem.moved(&[])?,
     };
-    let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
-    if let (Some(shape), Some(motion)) = (problem.shape_mut(), undeformed) {
-        shape.set_motion(motion);
-    }
-    Ok(analysis)
+    Ok(problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?)
 }
 
 #[cfg(test)]

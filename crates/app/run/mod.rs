@@ -35,7 +35,6 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::memory_estimate::Sizes;
-use fluxmorph_optimizer::problem::RoundEvent;
 use journal::{Identity, Journal};
 use levels::Searched;
 use mesh_independence::{Check, FreshMesh, MeshIndependence};
@@ -101,7 +100,7 @@ pub(crate) fn run_held(
     observer: &mut dyn RunObserver,
 ) -> Result<Concluded, Error> {
     let prepared = Prepared::new(config, source, Mode::Optimisation, options, observer)?;
-    let session = prepared.continue_to_initial()?.begin("run", observer)?;
+    let session = prepared.begin("run", observer)?;
     session.conclude(observer, |session, observer| {
         let journal = Journal::create(&session.directory, session.identity())?;
         let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;
@@ -128,8 +127,6 @@ struct Session<'a> {
     config: &'a Config,
     source: &'a SourceMap,
     setup: Setup,
-    /// Continuation steps that took the mesh near the first design.
-    continuation: Vec<RoundEvent>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
@@ -215,12 +212,11 @@ impl Session<'_> {
             accuracy: None,
             initial,
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            rounds: self.continuation.iter().chain(&optimised.rounds).cloned().collect(),
             linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
             ..self.result(
                 optimised.stop_reason,
                 &best.analysis,
-                Some((&best.values, &best.starts)),
+                Some(&best.values),
                 optimised.initial_quality,
                 &optimised.timings,
                 observer,

@@ -1,14 +1,11 @@
-//! What `run`, `solve` and `resume` begin with: a problem that is set up and brought near its first design, before
-//! anything is written.
+//! What `run`, `solve` and `resume` begin with: a problem that is set up before anything is written.
 
 use std::time::Instant;
 
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::problem::RoundEvent;
 
 use super::{Options, Session, mesh_hash, table_hashes};
-use crate::build::locate_error::attribute_error;
 use crate::build::{Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
@@ -18,8 +15,6 @@ use crate::show::RunObserver;
 /// A problem that is set up, and what its set-up was given.
 pub(super) struct Prepared<'a> {
     pub(super) setup: Setup,
-    /// Continuation steps that took the mesh near the first design.
-    pub(super) continuation: Vec<RoundEvent>,
     config: &'a Config,
     source: &'a SourceMap,
     options: Options<'a>,
@@ -41,20 +36,7 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
-        Ok(Self { setup, continuation: Vec::new(), config, source, options, clock })
-    }
-
-    /// Takes the mesh near the initial design. One that it cannot reach is a fault of the configuration, and is refused
-    /// before an earlier run is replaced.
-    pub(super) fn continue_to_initial(mut self) -> Result<Self, Error> {
-        let problem = &mut self.setup.problem;
-        let initial = problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-        let continuation = problem.continue_to(&initial, self.options.interrupted);
-        self.continuation = continuation.map_err(|error| match error {
-            OptimizerError::DesignUnreached { .. } => attribute_error(error.into(), self.config, self.source),
-            other => other.into(),
-        })?;
-        Ok(self)
+        Ok(Self { setup, config, source, options, clock })
     }
 
     /// Takes the output directory, and writes the manifest.
@@ -85,14 +67,13 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, continuation, config, source, options, clock } = self;
+        let Self { setup, config, source, options, clock } = self;
         let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
         Session {
             command,
             config,
             source,
             setup,
-            continuation,
             directory,
             manifest,
             clock,

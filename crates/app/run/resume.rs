@@ -99,7 +99,6 @@ pub(crate) fn resume_held(
         return Ok(Concluded { result, directory });
     }
     let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer)
-        .and_then(Prepared::continue_to_initial)
         .map_err(|error| match error {
             Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
             other => other,

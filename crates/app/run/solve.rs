@@ -1,8 +1,7 @@
 //! One analysis with its directory: the field of a single design.
 
-use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::Watching;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, RoundStart, SolverCache, Stage};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 
 use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
@@ -29,17 +28,12 @@ pub fn solve(
     if let (Some(shape), Some(design)) = (problem.shape(), &design) {
         design.check_places(shape.surface(), problem.original().bounding_box())?;
     }
-    let rounds = design.as_ref().map(|design| design.rounds.clone()).unwrap_or_default();
     let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    let rounds = follow(problem, rounds, options.interrupted, observer)?;
-    if rounds.is_empty() {
-        prepared.continuation = problem.continue_to(p, options.interrupted)?;
-    }
     let problem = &prepared.setup.problem;
     let mut moved = problem.moved(p)?;
-    let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p, &rounds));
+    let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
         let cut = Cut::Halvings(halvings);
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
@@ -51,7 +45,6 @@ pub fn solve(
     let session = prepared.begin("solve", observer)?;
     let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
-        session.continuation.iter().for_each(|event| observer.round(event));
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
         let analysis = problem.analyse(moved, Derivatives::First, cache, stages)?;
@@ -59,35 +52,6 @@ pub fn solve(
         Ok(RunResult { design: design.take(), ..result })
     })?;
     Ok(concluded.result)
-}
-
-/// Takes the mesh through the rounds in which a run came to its design; those that were followed.
-///
-/// # Errors
-/// [`OptimizerError::Interrupted`], and what the elastic system fails with.
-fn follow(
-    problem: &mut Problem,
-    rounds: Vec<RoundStart>,
-    interrupted: &dyn Fn() -> bool,
-    observer: &mut dyn RunObserver,
-) -> Result<Vec<RoundStart>, Error> {
-    let initial = problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-    if rounds.is_empty() {
-        return Ok(rounds);
-    }
-    observer.phase(&format!("following the {} rounds in which the design was found", rounds.len()));
-    let followed = problem.continue_to(&initial, interrupted);
-    match followed.and_then(|_| problem.follow(&rounds, interrupted)) {
-        Ok(()) => Ok(rounds),
-        Err(error @ OptimizerError::Interrupted) => Err(error.into()),
-        // Under another configuration the mesh may go another way.
-        Err(error) => {
-            observer
-                .warning(&format!("the rounds in which the design was found cannot be followed: {error}"));
-            problem.restart()?;
-            Ok(Vec::new())
-        }
-    }
 }
 
 /// The design to analyse: the one given, or the initial one; `None` without a design surface.
@@ -148,7 +112,6 @@ impl Session<'_> {
                 ..Accuracy::of_analysis(value, estimate.objective)
             }),
             constraints: constraints(problem, analysis, &bounds),
-            rounds: self.continuation.clone(),
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })
     }

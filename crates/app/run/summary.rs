@@ -9,7 +9,7 @@ use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{
-    Analysis, Derivatives, Measured, NoProgress, Problem, RoundStart, Shape, SolverCache, Timings,
+    Analysis, Derivatives, Measured, NoProgress, Problem, Shape, SolverCache, Timings,
 };
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
@@ -34,7 +34,7 @@ impl Session<'_> {
         &self,
         stop_reason: StopReason,
         analysis: &Analysis,
-        design: Option<(&[f64], &[RoundStart])>,
+        design: Option<&[f64]>,
         initial_quality: f64,
         timings: &Timings,
         observer: &mut dyn RunObserver,
@@ -48,7 +48,7 @@ impl Session<'_> {
         }
         let StateResult { probes, losses_w, forces, saturation, coils, multipoles, .. } = states[0].clone();
         let design =
-            problem.shape().zip(design).map(|(shape, (values, rounds))| design_result(shape, values, rounds));
+            problem.shape().zip(design).map(|(shape, values)| design_result(shape, values));
         let topology = mesh.topology();
         let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
         let warnings = reservations(self.config, &self.setup, analysis);
@@ -63,7 +63,6 @@ impl Session<'_> {
             objective: None,
             accuracy: None,
             constraints: Vec::new(),
-            rounds: Vec::new(),
             design,
             mesh: MeshResult {
                 nodes: topology.node_count(),
@@ -306,13 +305,12 @@ fn open(problem: &Problem, analysis: &Analysis) -> Result<Option<OpenResult>, Er
 }
 
 /// A design with what it means.
-pub(super) fn design_result(shape: &Shape, values: &[f64], rounds: &[RoundStart]) -> DesignResult {
+pub(super) fn design_result(shape: &Shape, values: &[f64]) -> DesignResult {
     DesignResult {
         values_m: values.to_vec(),
         lower_m: shape.lower().to_vec(),
         upper_m: shape.upper().to_vec(),
         points_m: shape.surface().points().to_vec(),
-        rounds: rounds.to_vec(),
     }
 }
 

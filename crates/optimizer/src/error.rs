@@ -58,16 +58,6 @@ pub enum Error {
         /// Why.
         cause: String,
     },
-    /// The mesh cannot be taken to a design.
-    #[error(
-        "the mesh can be taken {:.1} % of the way to the design only; take one nearer to the undeformed shape, enlarge the \
-         remesh region or change its stiffness",
-        100.0 * reached
-    )]
-    DesignUnreached {
-        /// Share of the way that can be taken.
-        reached: f64,
-    },
     /// A constraint that cannot be what the configuration says.
     #[error("the constraint `{name}` has the value {value:e} at the initial design: expected {expected}")]
     Constraint {
@@ -111,7 +101,7 @@ impl Error {
 
     /// Whether the mesh is what a design is out of reach of.
     pub fn is_unreached(&self) -> bool {
-        matches!(self, Self::DesignUnreached { .. } | Self::Remesh(_))
+        matches!(self, Self::Remesh(_))
     }
 
     /// Whether a computation failed on sound input: a best design found before is still worth keeping.

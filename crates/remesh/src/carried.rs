@@ -1,4 +1,4 @@
-//! How far the mesh follows a design by a law of least energy, and how much room is left there.
+//! How far the mesh follows a design, and how much room is left there.
 //!
 //! Where a design is not carried, the way there from one that is is cut short. The designs that motion along one axis can carry
 //! form a convex set, since stretches are linear in all displacements: on rails everything up to the cut is carried. The
@@ -12,7 +12,6 @@ use fluxmorph_geometry::tet4::{Point, dot, sub};
 use crate::deform::ElasticMap;
 use crate::equilibrium::{EnergyLaw, Equilibrium};
 use crate::error::RemeshError;
-use crate::guard::{StepToInversion, check_step};
 use crate::motion::{Motion, Moved};
 
 /// Least room of a design that is carried: flatter elements are valid, and next to useless.
@@ -65,8 +64,8 @@ pub struct Shortfall {
 }
 
 impl Motion {
-    /// How much is missing for design displacements [m] to be carried; `None` by the linear law, and where the nodes do not come
-    /// to rest. `near` is that of a design near it.
+    /// How much is missing for design displacements [m] to be carried; `None` where the nodes do not come to rest. `near` is that
+    /// of a design near it.
     ///
     /// # Errors
     /// [`RemeshError::NotFinite`].
@@ -75,7 +74,7 @@ impl Motion {
         design: &[Point],
         near: Option<&Shortfall>,
     ) -> Result<Option<Shortfall>, RemeshError> {
-        let Some(law) = self.energy_law() else { return Ok(None) };
+        let law = self.energy_law();
         let own = match near.and_then(|near| near.equilibrium.as_ref()) {
             Some(near) => law.near(near, design),
             None => law.equilibrium(design),
@@ -97,14 +96,13 @@ impl Motion {
         Ok(Some(Shortfall { value, gradient, equilibrium: Some(equilibrium) }))
     }
 
-    /// How far the mesh follows a path `t → Δx_b(t)` of design displacements [m], `0 ≤ t ≤ 1`, whose beginning it carries;
-    /// `None` by the linear law.
+    /// How far the mesh follows a path `t → Δx_b(t)` of design displacements [m], `0 ≤ t ≤ 1`, whose beginning it carries.
     ///
     /// # Errors
     /// [`RemeshError::NotFinite`]; [`RemeshError::Inverted`] and [`RemeshError::NotSettled`] where not even the beginning is
     /// carried.
-    pub fn carried_along(&self, path: &dyn Fn(f64) -> Vec<Point>) -> Result<Option<Carried>, RemeshError> {
-        let Some(law) = self.energy_law() else { return Ok(None) };
+    pub fn carried_along(&self, path: &dyn Fn(f64) -> Vec<Point>) -> Result<Carried, RemeshError> {
+        let law = self.energy_law();
         let goal = path(1.0);
         let asked = settled(law.equilibrium(&goal))?;
         let room = asked.as_ref().map(|own| room_of(law, &own.displacement, &own.tangent)).transpose()?;
@@ -112,7 +110,7 @@ impl Motion {
             && room.value >= LEAST_ROOM
             && let Ok(moved) = self.at(asked.clone())
         {
-            return Ok(Some(Carried { share: 1.0, moved, room: room.clone() }));
+            return Ok(Carried { share: 1.0, moved, room: room.clone() });
         }
         let (share, moved) = self.longest_part(law, path, asked)?;
         let room = match (room, &moved.tangent) {
@@ -122,7 +120,7 @@ impl Motion {
             }
             (room, _) => room.expect("an equilibrium has a tangent"),
         };
-        Ok(Some(Carried { share, moved, room }))
+        Ok(Carried { share, moved, room })
     }
 
     /// The longest part of a path that is carried, and the mesh there; `near` is an equilibrium near the path.
@@ -166,23 +164,6 @@ impl Motion {
             None | Some(Err(RemeshError::Inverted { .. })) => Ok(None),
             Some(moved) => moved.map(Some),
         }
-    }
-
-    /// The mesh of an equilibrium.
-    ///
-    /// # Errors
-    /// [`RemeshError::Inverted`].
-    pub(crate) fn at(&self, equilibrium: Equilibrium) -> Result<Moved, RemeshError> {
-        let Equilibrium { displacement, least: (stretch, element), tangent, steps } = equilibrium;
-        let mesh = check_step(self.original(), &displacement)?;
-        // Stretches are linear along the straight motion on rails; else it is what they are to first order.
-        let inversion = match stretch {
-            stretch if stretch < 1.0 => {
-                StepToInversion { step: 1.0 / (1.0 - stretch), element: Some(element) }
-            }
-            _ => StepToInversion::NEVER,
-        };
-        Ok(Moved { mesh, displacement, inversion, tangent: Some(tangent), newton_steps: steps })
     }
 }
 

@@ -48,14 +48,14 @@ impl KinematicConstraint {
 /// How the mesh follows the design.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MotionLaw {
-    /// By linear elasticity (Eq. 3), frozen on the reference mesh of a round.
+    /// By linear elasticity (Eq. 3), frozen on the undeformed mesh.
     #[default]
     Linear,
     /// All nodes along one coordinate axis (0, 1, 2), by a convex energy on the undeformed mesh (`rails`): for
-    /// designs that move along that axis. There are no rounds, and all in one process.
+    /// designs that move along that axis. All in one process.
     Rails(usize),
-    /// All nodes in all directions, by a hyperelastic energy on the undeformed mesh (`hyperelastic`). There are no rounds,
-    /// and all in one process.
+    /// All nodes in all directions, by a hyperelastic energy on the undeformed mesh (`hyperelastic`). All in one
+    /// process.
     Hyperelastic,
 }
 
@@ -64,7 +64,7 @@ pub enum MotionLaw {
 pub struct RemeshSetup {
     /// The parts of the remesh region; their elements together are the region, and they do not overlap.
     pub subregions: Vec<Subregion>,
-    /// How stiffness follows element size, over the whole region, on the first reference mesh; a rebase may take another.
+    /// How stiffness follows element size, over the whole region.
     pub policy: StiffnessPolicy,
     /// Which way nodes may move; design nodes move as the design says.
     pub kinematic_constraint: KinematicConstraint,
@@ -82,7 +82,7 @@ pub struct RemeshSetup {
     pub ownership: Option<Ownership>,
 }
 
-/// What follows from topology and set-up alone, and outlives a new reference mesh.
+/// What follows from topology and set-up alone; tangents share it.
 #[derive(Debug)]
 struct Plan {
     setup: RemeshSetup,
@@ -105,7 +105,6 @@ struct Plan {
 #[derive(Debug)]
 pub struct ElasticMap {
     plan: Arc<Plan>,
-    policy: StiffnessPolicy,
     solver: ElasticSolver,
     /// `K_db`, shape `(n_unknowns, 3 n_design)`.
     coupling: CsrMatrix<f64>,
@@ -120,29 +119,13 @@ impl ElasticMap {
     /// [`RemeshError::NotConverged`] for a fictitious force.
     pub fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let policy = setup.policy;
-        Self::assemble(reference, Arc::new(Plan::new(reference, setup)?), policy)
-    }
-
-    /// The map of the same set-up on a moved mesh of the same topology, a new reference, with this or another stiffness
-    /// policy. Pattern and symbolic factor are kept, stiffness and numeric factor are new.
-    ///
-    /// # Errors
-    /// [`fluxmorph_geometry::MeshError::Factorisation`], and [`RemeshError::NotConverged`] for a fictitious force.
-    ///
-    /// # Panics
-    /// If the mesh has another topology.
-    pub fn rebased(&self, reference: &Mesh, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
-        assert!(Arc::ptr_eq(reference.topology(), self.plan.topology()), "a rebase keeps the topology");
-        Self::assemble(reference, Arc::clone(&self.plan), policy)
-    }
-
-    fn assemble(reference: &Mesh, plan: Arc<Plan>, policy: StiffnessPolicy) -> Result<Self, RemeshError> {
+        let plan = Arc::new(Plan::new(reference, setup)?);
         let body = &plan.body;
         let weighting = policy.weighting(reference, &body.elements);
         let of = |position: usize| body.stiffness(reference, &weighting, position);
         let coupling = plan.coupling_matrix(of);
         let solver = ElasticSolver::new(&plan.analysis, || plan.matrix(of), (reference, policy))?;
-        let mut map = Self { plan, policy, solver, coupling, offset: Vec::new() };
+        let mut map = Self { plan, solver, coupling, offset: Vec::new() };
         map.offset = match map.plan.force.clone() {
             Some(force) => map.solve(force)?,
             None => vec![[0.0; 3]; map.plan.topology().node_count()],
@@ -166,14 +149,14 @@ impl ElasticMap {
         let coupling = plan.coupling_matrix(&of);
         let solver = ElasticSolver::of_matrix(&plan.analysis, plan.matrix(&of))?;
         let offset = vec![[0.0; 3]; plan.topology().node_count()];
-        Ok(Self { plan, policy: self.policy, solver, coupling, offset })
+        Ok(Self { plan, solver, coupling, offset })
     }
 
     /// Weight a volume of every element of the body on a mesh, for motion along an axis, or in all directions: Young's modulus of its subregion by the
     /// stiffness policy.
     pub(crate) fn weights(&self, mesh: &Mesh, axis: Option<usize>) -> Vec<f64> {
         let body = &self.plan.body;
-        let weighting = self.policy.weighting(mesh, &body.elements);
+        let weighting = self.plan.setup.policy.weighting(mesh, &body.elements);
         (0..body.elements.len()).map(|position| body.weight(mesh, &weighting, position, axis)).collect()
     }
 
@@ -272,11 +255,6 @@ impl ElasticMap {
         &self.plan.prescribed
     }
 
-    /// The stiffness policy of this reference.
-    pub fn policy(&self) -> StiffnessPolicy {
-        self.policy
-    }
-
     /// What is remeshed and how, as given.
     pub fn setup(&self) -> &RemeshSetup {
         &self.plan.setup
@@ -324,14 +302,6 @@ impl ElasticMap {
             }
             _ => own(),
         }
-    }
-
-    /// The map of the same set-up on its first reference, the undeformed mesh.
-    ///
-    /// # Errors
-    /// As [`ElasticMap::rebased`].
-    pub fn restarted(&self, original: &Mesh) -> Result<Self, RemeshError> {
-        self.rebased(original, self.plan.setup.policy)
     }
 
     /// Whether a displacement component at a node is an unknown of Eq. 3.

@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::LocalMatrix;
 use fluxmorph_geometry::fem::scalar::ordered_sum;
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::{Point, Tet4, add, dot};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use rayon::prelude::*;
 
 use crate::deform::ElasticMap;
+use crate::elasticity::Tensor;
 use crate::error::RemeshError;
+use crate::neo_hooke::Deformation;
 
 /// Share of the predicted decrease of the energy that a step has to reach (Armijo).
 const SUFFICIENT: f64 = 1e-4;
@@ -42,12 +45,41 @@ pub(crate) trait EnergyLaw: std::fmt::Debug + Send + Sync {
         true
     }
 
+    /// The elements of the body, by their position in it.
+    fn elements(&self) -> &[Element];
+
     /// `J` of every element of the body, the ratio of its volumes after and before, for displacements of all nodes [m], shape
     /// `(n_nodes, 3)`.
-    fn stretches(&self, displacement: &[Point]) -> Vec<f64>;
+    fn stretches(&self, displacement: &[Point]) -> Vec<f64> {
+        self.elements().par_iter().map(|element| element.deformation(displacement).volume).collect()
+    }
 
     /// `Σ_e s_e ∂J_e/∂x` at every node, shape `(n_nodes, 3)`, of shares `s_e` by the position of the element.
-    fn stretch_derivative(&self, displacement: &[Point], shares: &[f64]) -> Vec<Point>;
+    fn stretch_derivative(&self, displacement: &[Point], shares: &[f64]) -> Vec<Point> {
+        let scaled = |(element, share): (&Element, &f64)| {
+            element.deformation(displacement).cofactor().map(|row| row.map(|c| share * c))
+        };
+        let tensors: Vec<Tensor> = self.elements().par_iter().zip(shares).map(scaled).collect();
+        gathered(self.elements(), &tensors, |_| 1.0, displacement.len())
+    }
+}
+
+/// `Σ_e s_e T_e ∇N_a` at every node `a`.
+pub(crate) fn gathered(
+    elements: &[Element],
+    tensors: &[Tensor],
+    share: impl Fn(&Element) -> f64,
+    nodes: usize,
+) -> Vec<Point> {
+    let mut nodal = vec![[0.0; 3]; nodes];
+    for (element, tensor) in elements.iter().zip(tensors) {
+        let share = share(element);
+        for (node, gradient) in element.nodes.iter().zip(&element.gradients) {
+            let own = tensor.map(|row| share * dot(row, *gradient));
+            nodal[node.index()] = add(nodal[node.index()], own);
+        }
+    }
+    nodal
 }
 
 /// Where the nodes of a design come to rest.
@@ -88,6 +120,22 @@ pub(crate) struct Element {
 }
 
 impl Element {
+    /// `Σ_a u_a ⊗ ∇N_a`, constant on the element.
+    pub(crate) fn displacement_gradient(&self, u: &[Point]) -> Tensor {
+        let [a, b, c, d] = self.nodes.map(|node| u[node.index()]);
+        let g = &self.gradients;
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| a[i] * g[0][j] + b[i] * g[1][j] + c[i] * g[2][j] + d[i] * g[3][j])
+        })
+    }
+
+    /// How displacements of all nodes [m] deform the element.
+    pub(crate) fn deformation(&self, u: &[Point]) -> Deformation {
+        let mut gradient = self.displacement_gradient(u);
+        (0..3).for_each(|i| gradient[i][i] += 1.0);
+        Deformation::new(gradient)
+    }
+
     /// The elements of the body of a map on the undeformed mesh, weighted along an axis, or alike in all directions.
     pub(crate) fn of_body(mesh: &Mesh, map: &ElasticMap, axis: Option<usize>) -> Vec<Self> {
         let weights = map.weights(mesh, axis);

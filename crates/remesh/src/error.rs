@@ -160,37 +160,6 @@ pub enum RemeshError {
         /// Its value.
         value: f64,
     },
-    /// A smoothing asks for a quality that is no quality.
-    #[error(
-        "the target {target} of the smoothing: expected a positive, finite quality; 1 is the best there is"
-    )]
-    SmoothingTarget {
-        /// The target given.
-        target: f64,
-    },
-    /// An element to be smoothed does not exist.
-    #[error("the smoothing names element {element}, but the mesh has {elements} elements")]
-    DanglingSmoothed {
-        /// The element named.
-        element: ElementId,
-        /// Elements of the mesh.
-        elements: usize,
-    },
-    /// The reference mesh of a smoothing has another topology.
-    #[error(
-        "the reference mesh of the smoothing has {reference_nodes} nodes and {reference_elements} elements, and is not \
-         of the topology of the mesh ({nodes} nodes, {elements} elements): give a mesh moved from the same one"
-    )]
-    ReferenceTopology {
-        /// Nodes of the reference mesh.
-        reference_nodes: usize,
-        /// Elements of the reference mesh.
-        reference_elements: usize,
-        /// Nodes of the mesh.
-        nodes: usize,
-        /// Elements of the mesh.
-        elements: usize,
-    },
     /// The mesh or the linear algebra failed.
     #[error(transparent)]
     Mesh(#[from] MeshError),

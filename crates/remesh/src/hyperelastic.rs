@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::deform::ElasticMap;
 use crate::elasticity::{ISOTROPIC, Tensor};
-use crate::equilibrium::{Element, EnergyLaw, Equilibrium, Scalars, line_search};
+use crate::equilibrium::{Element, EnergyLaw, Equilibrium, Scalars, gathered, line_search};
 use crate::error::RemeshError;
 use crate::neo_hooke::{Curvature, Deformation, Tangent};
 
@@ -45,23 +45,6 @@ pub(crate) struct Hyperelastic {
     rest: Arc<ElasticMap>,
     /// Where Newton's method starts: the map of `½ Σ_e w_e |∇u_e|²`.
     harmonic: ElasticMap,
-}
-
-impl Element {
-    /// `Σ_a u_a ⊗ ∇N_a`, constant on the element.
-    fn displacement_gradient(&self, u: &[Point]) -> Tensor {
-        let [a, b, c, d] = self.nodes.map(|node| u[node.index()]);
-        let g = &self.gradients;
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| a[i] * g[0][j] + b[i] * g[1][j] + c[i] * g[2][j] + d[i] * g[3][j])
-        })
-    }
-
-    fn deformation(&self, u: &[Point]) -> Deformation {
-        let mut gradient = self.displacement_gradient(u);
-        (0..3).for_each(|i| gradient[i][i] += 1.0);
-        Deformation::new(gradient)
-    }
 }
 
 impl Hyperelastic {
@@ -120,20 +103,7 @@ impl Hyperelastic {
     /// `∂E/∂u` at every node.
     fn residual(&self, deformations: &[Deformation], nodes: usize) -> Vec<Point> {
         let stresses: Vec<Tensor> = deformations.par_iter().map(Deformation::stress).collect();
-        self.gathered(&stresses, |element| element.weight, nodes)
-    }
-
-    /// `Σ_e s_e T_e ∇N_a` at every node `a`.
-    fn gathered(&self, tensors: &[Tensor], share: impl Fn(&Element) -> f64, nodes: usize) -> Vec<Point> {
-        let mut nodal = vec![[0.0; 3]; nodes];
-        for (element, tensor) in self.elements.iter().zip(tensors) {
-            let share = share(element);
-            for (node, gradient) in element.nodes.iter().zip(&element.gradients) {
-                let own = tensor.map(|row| share * dot(row, *gradient));
-                nodal[node.index()] = add(nodal[node.index()], own);
-            }
-        }
-        nodal
+        gathered(&self.elements, &stresses, |element| element.weight, nodes)
     }
 
     /// Newton's method from displacements that are those of the design at its nodes.
@@ -223,6 +193,10 @@ impl EnergyLaw for Hyperelastic {
         &self.rest
     }
 
+    fn elements(&self) -> &[Element] {
+        &self.elements
+    }
+
     fn equilibrium(&self, design: &[Point]) -> Result<Equilibrium, RemeshError> {
         match self.settle(self.harmonic.linear(design)?) {
             Ok(own) if own.least.0 > 0.0 => Ok(own),
@@ -239,17 +213,5 @@ impl EnergyLaw for Hyperelastic {
 
     fn has_one_equilibrium(&self) -> bool {
         false
-    }
-
-    fn stretches(&self, displacement: &[Point]) -> Vec<f64> {
-        self.elements.par_iter().map(|element| element.deformation(displacement).volume).collect()
-    }
-
-    fn stretch_derivative(&self, displacement: &[Point], shares: &[f64]) -> Vec<Point> {
-        let scaled = |(element, share): (&Element, &f64)| {
-            element.deformation(displacement).cofactor().map(|row| row.map(|c| share * c))
-        };
-        let tensors: Vec<Tensor> = self.elements.par_iter().zip(shares).map(scaled).collect();
-        self.gathered(&tensors, |_| 1.0, displacement.len())
     }
 }

@@ -2,12 +2,11 @@
 //!
 //! The design nodes move by `Δx_b`; a fictitious elastic body, frozen on the reference mesh, carries the motion to all
 //! other nodes of the remesh region: `K_dd Δx_d = f_d − K_db Δx_b`. [`ElasticMap`] is that affine map and its
-//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Two other laws are one function of the design however
-//! far it goes (`equilibrium`): `rails` for designs along one axis, with the energy of `barrier`, and `hyperelastic` for all
-//! others, with that of `neo_hooke`; `carried` says how far that is. Who moves freely, slides or stays is decided in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in [`force`]. [`guard`] says
-//! how far a motion may go before the first element inverts, and refuses an inverted mesh. [`motion`] holds the rounds,
-//! each frozen on its own reference mesh, [`load_stepping`] takes a given motion in as many of them as needed, and
-//! [`fallback`] is what is tried when a step is refused; [`smoothing`] is one of its levels.
+//! transpose, which takes `∂F/∂x` at the nodes back to the design nodes. Two other laws are one function of the design as well,
+//! and go further (`equilibrium`): `rails` for designs along one axis, with the energy of `barrier`, and `hyperelastic` for all
+//! others, with that of `neo_hooke`. [`motion`] is the mesh of a design by one of them, and `carried` how far it goes. Who moves
+//! freely, slides or stays is decided in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in
+//! [`force`]. [`guard`] says how far a motion may go before the first element inverts, and refuses an inverted mesh.
 
 mod barrier;
 mod body;
@@ -18,11 +17,10 @@ mod distributed;
 pub mod elasticity;
 mod equilibrium;
 pub mod error;
-pub mod fallback;
 pub mod force;
 pub mod guard;
 mod hyperelastic;
-pub mod load_stepping;
+mod linear;
 pub mod motion;
 mod neo_hooke;
 pub mod policy;
@@ -30,7 +28,6 @@ mod rails;
 mod restraint;
 mod sensitivity;
 mod singular_values;
-pub mod smoothing;
 mod solver;
 pub mod subregion;
 
@@ -39,11 +36,8 @@ pub use carried::{Carried, LEAST_ROOM, Room, Shortfall};
 pub use deform::{ElasticMap, KinematicConstraint, MotionLaw, RemeshSetup};
 pub use elasticity::Isotropic;
 pub use error::RemeshError;
-pub use fallback::{Fallback, FallbackLevel, FallbackReport};
 pub use guard::{StepToInversion, check_step, step_to_inversion};
-pub use load_stepping::{OnStepEvent, StepEvent, StepLimits, SteppingOutcome};
 pub use motion::{Motion, Moved};
 pub use policy::StiffnessPolicy;
-pub use smoothing::{Smoothed, SmoothingSettings, least_shape, smooth, smooth_points};
 pub use solver::SolverChoice;
 pub use subregion::Subregion;

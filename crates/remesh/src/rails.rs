@@ -124,6 +124,10 @@ impl EnergyLaw for Rails {
         &self.rest
     }
 
+    fn elements(&self) -> &[Element] {
+        &self.elements
+    }
+
     fn equilibrium(&self, design: &[Point]) -> Result<Equilibrium, RemeshError> {
         let mut u: Vec<f64> = self.rest.linear(design)?.iter().map(|u| u[self.axis]).collect();
         for steps in 1..=MAX_STEPS {

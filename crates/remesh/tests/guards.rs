@@ -4,7 +4,7 @@
 use crate::support::{Point, at, nodes_where, shaken, unit_cells, whole};
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_remesh::{
-    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StepLimits, StiffnessPolicy, Subregion,
+    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion,
     check_step, step_to_inversion,
 };
 
@@ -138,7 +138,7 @@ fn a_body_that_is_nearly_incompressible_is_solved_or_said_not_to_converge() {
         let mesh = mesh();
         let subregions = vec![Subregion { poisson, ..whole(&mesh).remove(0) }];
         let made = Motion::new(mesh.clone(), setup(&mesh, SolverChoice::ComponentBlocks, subregions));
-        match made.and_then(|motion| motion.step(&top(&motion, [0.0, 0.0, -0.1]))) {
+        match made.and_then(|motion| motion.displacement(&top(&motion, [0.0, 0.0, -0.1]))) {
             Ok(step) => assert!(step.iter().flatten().all(|u| u.is_finite())),
             Err(RemeshError::NotConverged { residual, tolerance, iterations, .. }) => {
                 assert!(residual.is_finite() && residual > tolerance && iterations > 0);
@@ -184,9 +184,7 @@ fn a_path_that_is_no_number_ends_with_an_error() {
     let motion = motion(SolverChoice::Direct);
     let nodes = motion.map().design_nodes().len();
     let path = |t: f64| vec![[0.0, 0.0, if t > 0.5 { f64::NAN } else { 0.0 }]; nodes];
-    let ended =
-        motion.step_along(&path, &StepLimits::default(), &mut |_| std::ops::ControlFlow::Continue(()));
-    assert!(matches!(ended, Err(RemeshError::NotFinite { .. })));
+    assert!(matches!(motion.carried_along(&path), Err(RemeshError::NotFinite { .. })));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Tests of the crate from outside: the elastic map, boundaries, motion on rails, rounds and fallbacks, smoothing, steps to inversion.
+//! Tests of the crate from outside: the elastic map, boundaries, the laws of motion, steps to inversion.
 #![allow(clippy::unwrap_used)]
 
 mod boundaries;
@@ -7,9 +7,7 @@ mod hyperelastic;
 mod inversion;
 mod mapping;
 mod rails;
-mod rounds;
 mod skin;
-mod smoothing;
 mod support;
 mod torture;
 mod trends;

@@ -15,7 +15,7 @@ use crate::support;
 
 const CONFIG: &str = "shield_quick.toml";
 
-/// A run that takes a few rounds, all its fields, and no fresh mesh.
+/// A run with all its fields, and no fresh mesh.
 const SETTINGS: [&str; 4] = [
     "mesh.shield.refinement=0.3",
     "optimizer.max_evaluations=6",

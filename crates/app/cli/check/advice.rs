@@ -84,7 +84,7 @@ mod tests {
     #[test]
     fn shipped_devices_are_as_meant_and_sizes_without_units_are_told() {
         assert_eq!(of("shield_quick.toml", &[]), Vec::<String>::new());
-        let advice = of("shield_quick.toml", &["design.upper=10", "remesh.rounds=50"]);
+        let advice = of("shield_quick.toml", &["design.upper=10"]);
         assert!(advice.len() == 1 && advice[0].contains("design.upper is 10 m"), "{advice:?}");
     }
 

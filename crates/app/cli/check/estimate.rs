@@ -52,9 +52,8 @@ pub(super) fn of_initial_design(
 ) -> Result<EstimateSummary, Error> {
     let config =
         Config { accuracy: Accuracy { estimate: Some(true), ..config.accuracy.clone() }, ..config.clone() };
-    let mut setup = set_up(&config, source, Mode::Analysis)?;
+    let setup = set_up(&config, source, Mode::Analysis)?;
     let initial = setup.problem.shape().map(|shape| shape.initial().to_vec()).unwrap_or_default();
-    setup.problem.continue_to(&initial, &|| false)?;
     observer.phase("solving the field of the initial design");
     let moved = setup.problem.moved(&initial)?;
     let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));

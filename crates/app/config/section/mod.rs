@@ -22,6 +22,8 @@ pub(super) struct Section<'a> {
     asked: RefCell<Vec<&'static str>>,
     /// The keys that have no use beside the values of others.
     hidden: RefCell<Vec<&'static str>>,
+    /// The keys of earlier versions.
+    former: RefCell<Vec<&'static str>>,
     /// Whether nothing is said of unknown keys.
     silent: Cell<bool>,
 }
@@ -30,7 +32,8 @@ impl<'a> Section<'a> {
     /// A table at a key path.
     pub(super) fn new(path: String, table: &'a Table, span: Span, context: &'a Context) -> Self {
         let silent = Cell::new(false);
-        Self { path, table, span, context, asked: RefCell::default(), hidden: RefCell::default(), silent }
+        let (asked, hidden, former) = Default::default();
+        Self { path, table, span, context, asked, hidden, former, silent }
     }
 
     /// Key path of the table.
@@ -62,6 +65,17 @@ impl<'a> Section<'a> {
     /// Keys that have no use beside the values of others: they are not read, and unknown.
     pub(super) fn hide(&self, keys: Vec<&'static str>) {
         self.hidden.borrow_mut().extend(keys);
+    }
+
+    /// Keys of earlier versions, which have no effect: a notice says so, and why.
+    pub(super) fn pass_over(&self, keys: &[(&'static str, &str)]) {
+        for (key, why) in keys {
+            self.former.borrow_mut().push(key);
+            if self.has(key) {
+                let notice = format!("`{}` is of an earlier version, and has no effect: {why}", join(&self.path, key));
+                self.context.notices.borrow_mut().push(notice);
+            }
+        }
     }
 
     /// Record what is wrong with a key that is known and not read.

@@ -26,6 +26,7 @@
 //!         extent: Extent = KEYS;
 //!     }
 //!     unused = |section| …;       // keys that have no use beside others
+//!     former = [("old", "why")];  // keys of earlier versions, which have no effect
 //!     check = |table, section| …; // what is wrong with several keys together
 //!     rules = |rules| …;          // the same for the schema
 //! }
@@ -57,6 +58,7 @@ macro_rules! table {
             )*
         }
         $(unused = $unused:expr;)?
+        $(former = $former:expr;)?
         $(check = $check:expr;)?
         $(rules = $rules:expr;)?
     ) => {
@@ -82,6 +84,7 @@ macro_rules! table {
                     let unused: fn(&$crate::config::section::Section<'_>) -> Vec<&'static str> = $unused;
                     section.hide(unused(section));
                 )?
+                $(section.pass_over(&$former);)?
                 $(
                     let $field: $type = table!(
                         @read section, table!(@name $field $($key)?), $kind;

@@ -50,7 +50,7 @@ pub use mesh::{
     SphereMesh,
 };
 pub use morph::{
-    AutoWord, Case, DesignMotion, DesignWord, Increments, Morph, Paper, PrescribedMotion, Rotation, Scale,
+    Case, DesignMotion, DesignWord, Morph, Paper, PrescribedMotion, Rotation, Scale,
     Target, Tune, TunedParameter,
 };
 pub use multipole::{ExpansionShape, MultipoleSet};

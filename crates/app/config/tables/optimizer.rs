@@ -42,10 +42,9 @@ table! {
         /// the gradient promises more than half of the objective, or where constraints leave less room. The steps after it are the
         /// method's own.
         first_step: f64 = number(FIRST_STEPS) => Settings::DEFAULT.first_step;
-        /// Least quality (Eq. 4) of an element that a design may have, and so of the reference mesh that a round starts from. A
-        /// design below it is not evaluated: a round ends. Default: with the law `linear` a twentieth of the worst quality of the
-        /// undeformed mesh, since layered meshes start with a low one; none with `rails` and `hyperelastic`, where elements push
-        /// back and their room is held instead: a flat element of a thin layer may then have a quality of 1e-4.
+        /// Least quality (Eq. 4) of an element that a design may have. A design below it is not evaluated: the search goes on
+        /// nearer to the best one. Without it the room that elements keep is what limits a design:
+        /// a flat element of a thin layer may then have a quality of 1e-4.
         minimum_quality: Option<f64> = number(FRACTIONS);
     }
 }

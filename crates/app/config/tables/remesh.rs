@@ -41,11 +41,6 @@ table! {
         stiffness: Option<StiffnessLaw> = WORD;
         /// Which way nodes may move. The default is the paper's elasticity.
         motion: Motion = WORD => Motion::Free;
-        /// Most rounds of an optimisation: in each the mesh moves from a reference mesh of its own (`docs/theory.md`, section
-        /// 5.5). 0: all designs move from the undeformed mesh, and bounds that it does not reach in one step are refused.
-        rounds: usize = integer(0, 1000) => 20;
-        /// How far a design may lie from the reference of its round: largest share of the way to the first inverted element.
-        inversion_share: f64 = number(Range::open(0.0, 1.0)) => 0.9;
         /// Surfaces whose nodes stay in their plane.
         slide: Vec<String> = NAMES => Vec::new();
         /// Surfaces whose nodes stay. The body's outside, and faces between two regions inside it, are fixed where nothing else
@@ -56,6 +51,10 @@ table! {
         /// Regions of the body with their own constants.
         subregions: Vec<Subregion> = TABLES => Vec::new();
     }
+    former = [
+        ("rounds", "a design has one mesh, and no rounds"),
+        ("inversion_share", "how far the mesh goes is measured by the room that elements keep"),
+    ];
     check = Remesh::check;
 }
 
@@ -98,14 +97,13 @@ choice! {
 choice! {
     /// How the mesh follows the design.
     pub enum MotionLaw {
-        /// All nodes move along the axis of the design, by a convex energy that keeps elements from being squeezed: the mesh is one
-        /// function of the design, without rounds. `poisson`, `motion`, `rounds` and `inversion_share` have no meaning.
+        /// All nodes move along the axis of the design, by a convex energy that keeps elements from being squeezed. `poisson`
+        /// and `motion` have no meaning.
         Rails = "rails",
         /// All nodes move in all directions, by a hyperelastic energy that knows finite rotations and keeps elements from being
-        /// squeezed: the mesh is one function of the design, without rounds. `poisson`, `motion`, `rounds` and
-        /// `inversion_share` have no meaning.
+        /// squeezed. `poisson` and `motion` have no meaning.
         Hyperelastic = "hyperelastic",
-        /// Linear elasticity on a reference mesh (Eq. 3), in rounds where that does not reach far enough.
+        /// Linear elasticity on the undeformed mesh (Eq. 3). Nothing keeps elements from being squeezed but their stiffness.
         Linear = "linear",
     }
 }

@@ -7,7 +7,7 @@ use super::tree::{self, Content, Node, Table};
 /// The tables of the configuration that a case may change.
 const OVERLAID: [&str; 3] = ["mesh", "remesh", "design"];
 /// The keys of `[morph]` that a case may change.
-const OWN: [&str; 3] = ["motion", "increments", "least_quality"];
+const OWN: [&str; 2] = ["motion", "least_quality"];
 
 /// The number of cases as written.
 pub(in crate::config) fn case_count(root: &Table) -> usize {

@@ -7,7 +7,7 @@ use fluxmorph_geometry::tet4::{Point, centroid};
 use fluxmorph_optimizer::driver::StopReason;
 use serde::Serialize;
 
-use super::{LoadStepping, TuneReport};
+use super::{MovedMesh, TuneReport};
 use crate::build::MotionSetup;
 use crate::config::Paper;
 use crate::error::Error;
@@ -80,11 +80,8 @@ pub struct CaseResult {
     pub inversion: Inversion,
     /// Share of the motion that was reached.
     pub reached: f64,
-    /// Increments taken.
-    pub increments: usize,
-    /// Fallbacks of the mesh motion.
-    #[serde(rename = "rescues")]
-    pub fallbacks: usize,
+    /// Newton steps taken; none by the linear law.
+    pub newton_steps: usize,
 }
 
 /// How the quality of the body's elements is distributed.
@@ -169,7 +166,7 @@ impl MorphReport {
 
 impl CaseReport {
     /// A motion with its result.
-    pub fn with_result(name: &str, setup: &MotionSetup, motion: &LoadStepping, least_quality: f64) -> Self {
+    pub fn with_result(name: &str, setup: &MotionSetup, motion: &MovedMesh, least_quality: f64) -> Self {
         let result = CaseResult::new(motion);
         let valid = motion.reached >= 1.0 && motion.inverted == 0 && result.after.worst >= least_quality;
         Self { valid, result: Some(result), ..Self::of(name, setup) }
@@ -203,7 +200,7 @@ impl CaseReport {
 
 impl CaseResult {
     /// Measures a motion.
-    fn new(motion: &LoadStepping) -> Self {
+    fn new(motion: &MovedMesh) -> Self {
         let topology = &motion.topology;
         let quality = |points: &[Point]| {
             QualityReport::of_points(topology, points, &motion.body).expect("an elastic body has elements")
@@ -228,8 +225,7 @@ impl CaseResult {
             before: QualityShares::new(&before),
             after: QualityShares::new(&after),
             reached: motion.reached,
-            increments: motion.increments,
-            fallbacks: motion.fallbacks,
+            newton_steps: motion.newton_steps,
         }
     }
 }

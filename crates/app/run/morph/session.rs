@@ -4,7 +4,6 @@
 //! case are written when it is done, the report at the end, whatever became of the cases.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 use fluxmorph_geometry::io::{ArrayData, Field, vtu_bytes_at};
@@ -14,7 +13,7 @@ use fluxmorph_remesh::{ElasticMap, RemeshSetup, SolverChoice};
 use serde::Serialize;
 
 use super::tune::{Found, nothing_to_search, tune};
-use super::{CaseReport, LoadStepping, MorphReport, Parameters, csv, step_along};
+use super::{CaseReport, MorphReport, MovedMesh, Parameters, csv, move_mesh};
 use crate::build::{MotionSetup, set_up_motion};
 use crate::config::{Config, Morph, Paper, SourceMap, resolved_toml};
 use crate::error::Error;
@@ -176,7 +175,7 @@ impl Session<'_> {
         directory.write(&directory.config(), self.source.text().as_bytes())?;
         directory.write(&directory.resolved(), resolved_toml(self.config).as_bytes())?;
         let tuned = self.tune(observer)?;
-        let (mut cases, mut cut_short) = (Vec::new(), None);
+        let mut cases = Vec::new();
         for (index, job) in self.jobs.iter().enumerate() {
             let first = index == 0 && tuned.is_none();
             let left_out = tuned.as_ref().is_some_and(|found| !found.left_out.is_empty());
@@ -188,10 +187,7 @@ impl Session<'_> {
                 Some(found) => (&found.setup, found.config.morph.as_ref().unwrap_or(job.morph)),
                 None => (&job.setup, job.morph),
             };
-            let moved = self.run_motion(index, setup, morph, observer);
-            if moved.as_ref().is_ok_and(|motion| motion.reached < 1.0) && (self.options.interrupted)() {
-                cut_short = Some(job.name);
-            }
+            let moved = self.run_motion(index, setup);
             let case = match moved {
                 Ok(motion) => CaseReport::with_result(job.name, setup, &motion, morph.least_quality),
                 // The others of a sweep are worth having; without files there is no place for them.
@@ -202,11 +198,8 @@ impl Session<'_> {
                 Err(error) => return Err(error),
             };
             cases.push(case.with_paper(job.paper));
-            if cut_short.is_some() {
-                break;
-            }
         }
-        let left_out = self.left_out(&cases, tuned.as_ref(), cut_short);
+        let left_out = self.left_out(&cases, tuned.as_ref());
         let mut report = MorphReport {
             tuned: tuned.map(|found| found.report),
             timings_s: BTreeMap::from([("total".to_owned(), self.clock.elapsed().as_secs_f64())]),
@@ -237,33 +230,20 @@ impl Session<'_> {
         &self,
         index: usize,
         setup: &MotionSetup,
-        morph: &Morph,
-        observer: &mut dyn RunObserver,
-    ) -> Result<LoadStepping, Error> {
+    ) -> Result<MovedMesh, Error> {
         let number = (self.jobs.len() > 1).then_some(index);
-        let interrupted = self.options.interrupted;
-        let mut report = |line: &str| {
-            observer.note(line);
-            if interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let stepped = step_along(setup, morph.increments, morph.least_quality, &mut report)?;
-        self.directory.write(&self.directory.before(number), &vtu(&stepped, &stepped.before)?)?;
-        self.directory.write(&self.directory.after(number), &vtu(&stepped, &stepped.after)?)?;
-        Ok(stepped)
+        let moved = move_mesh(setup)?;
+        self.directory.write(&self.directory.before(number), &vtu(&moved, &moved.before)?)?;
+        self.directory.write(&self.directory.after(number), &vtu(&moved, &moved.after)?)?;
+        Ok(moved)
     }
 
     /// What a signal left out, in words.
-    fn left_out(
-        &self,
-        cases: &[CaseReport],
-        tuned: Option<&Found>,
-        cut_short: Option<&str>,
-    ) -> Option<String> {
+    fn left_out(&self, cases: &[CaseReport], tuned: Option<&Found>) -> Option<String> {
         let mut parts = Vec::new();
         if let Some(found) = tuned.filter(|found| !found.left_out.is_empty()) {
             parts.push(format!("the search with the stiffness {}", found.left_out.join(", ")));
         }
-        parts.extend(cut_short.map(|name| format!("the rest of the motion `{name}`")));
         let jobs = &self.jobs[cases.len()..];
         if tuned.is_some() && !jobs.is_empty() {
             parts.push("the motion with what was found".to_owned());
@@ -276,7 +256,7 @@ impl Session<'_> {
 }
 
 /// The mesh with its nodes at `points`, with the displacement of the whole motion, region and quality.
-fn vtu(motion: &LoadStepping, points: &[Point]) -> Result<Vec<u8>, Error> {
+fn vtu(motion: &MovedMesh, points: &[Point]) -> Result<Vec<u8>, Error> {
     let topology = &motion.topology;
     let region: Vec<i32> = topology.region_of().iter().map(|r| r.0 as i32).collect();
     let qualities: Vec<f64> =

@@ -6,7 +6,7 @@ use crate::files::csv_text;
 use crate::show::text_table::Table;
 
 /// The columns of the first table.
-const ROW: [&str; 9] = [
+const ROW: [&str; 8] = [
     "case",
     "equations",
     "elements",
@@ -14,8 +14,7 @@ const ROW: [&str; 9] = [
     "q <= 0.3",
     "inverted",
     "motion %",
-    "increments",
-    "fallbacks",
+    "Newton steps",
 ];
 /// The columns of the table of shares.
 const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
@@ -48,8 +47,7 @@ fn trouble(case: &CaseReport) -> String {
     let Some(case) = &case.result else { return case.error.clone().unwrap_or_default() };
     if case.inverted > 0 {
         return format!(
-            "{} inverted elements: take more increments or increments = \"auto\", another remesh.stiffness, or a \
-             larger remesh region",
+            "{} inverted elements: take remesh.law = \"hyperelastic\", another remesh.stiffness, or a larger remesh region",
             case.inverted
         );
     }
@@ -74,8 +72,7 @@ fn row(case: &CaseReport) -> [String; ROW.len()] {
         beside(format!("{} -> {}", before.poor, after.poor), paper.poor.map(|n| n.to_string())),
         result.inverted.to_string(),
         format!("{:.1}", result.reached * 100.0),
-        result.increments.to_string(),
-        result.fallbacks.to_string(),
+        result.newton_steps.to_string(),
     ]
 }
 
@@ -131,7 +128,7 @@ fn places(case: &CaseReport) -> [String; PLACES.len()] {
 }
 
 /// Columns of `morph.csv` that say what came out of a motion.
-const RESULT: [(&str, fn(&CaseResult) -> String); 18] = [
+const RESULT: [(&str, fn(&CaseResult) -> String); 17] = [
     ("equations", |r| r.equations.to_string()),
     ("elements", |r| r.after.elements.to_string()),
     ("worst_before", |r| number(Some(r.before.worst))),
@@ -148,8 +145,7 @@ const RESULT: [(&str, fn(&CaseResult) -> String); 18] = [
     ("inversion_step", |r| number(r.inversion.step)),
     ("inversion_element", |r| r.inversion.element.map_or_else(String::new, |e| e.to_string())),
     ("reached", |r| number(Some(r.reached))),
-    ("increments", |r| r.increments.to_string()),
-    ("rescues", |r| r.fallbacks.to_string()),
+    ("newton_steps", |r| r.newton_steps.to_string()),
 ];
 
 /// Columns of published values.

@@ -1,6 +1,6 @@
 //! The tuner: elastic parameters that keep the worst element of one motion as good as possible.
 //!
-//! For every stiffness policy the worst quality after the motion in a single increment, negative while elements are
+//! For every stiffness policy the worst quality after the motion by the linear law, negative while elements are
 //! inverted, is made large over the parameters of the subregions: `log10 E` relative to the first, `ν`, and the force
 //! along the mean motion of the moved nodes. The unit of force is `E_1 u V / (N L²)`, with `u` the longest prescribed
 //! displacement, `V / N` the body's volume per node and `L` its largest extent: a uniform load of that size displaces a
@@ -15,7 +15,7 @@ use fluxmorph_remesh::{self as remesh, ElasticMap, RemeshSetup, StiffnessPolicy}
 use serde::Serialize;
 
 use crate::build::{MotionSetup, set_up_motion};
-use crate::config::{Config, Increments, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
+use crate::config::{Config, Remesh, SourceMap, StiffnessLaw, Subregion, Tune, TunedParameter};
 use crate::error::Error;
 use crate::show::Observer;
 use crate::show::text_table::Table;
@@ -48,7 +48,7 @@ pub(super) struct Found {
 pub struct TuneReport {
     /// Evaluations of the worst quality.
     pub evaluations: usize,
-    /// Worst quality with the parameters of the configuration and with the best found, in one increment.
+    /// Worst quality with the parameters of the configuration and with the best found.
     pub worst_quality: [f64; 2],
     /// Stiffness policy of the configuration and of the best.
     pub stiffness: [&'static str; 2],
@@ -268,7 +268,7 @@ fn force_unit(setup: &MotionSetup, design: &[Point]) -> Point {
     direction.map(|c| size * c)
 }
 
-/// Worst quality of the body after the whole motion in one increment; negative where elements are inverted.
+/// Worst quality of the body after the whole motion by the linear law; negative where elements are inverted.
 fn worst_quality(setup: &MotionSetup, remesh: &RemeshSetup, design: &[Point]) -> Result<f64, Error> {
     let map = ElasticMap::new(&setup.mesh, remesh.clone())?;
     let displacement = map.displacement(design)?;
@@ -278,7 +278,7 @@ fn worst_quality(setup: &MotionSetup, remesh: &RemeshSetup, design: &[Point]) ->
     Ok(report.map_or(f64::NAN, |report| report.worst))
 }
 
-/// The configuration with the values of a set-up, of a single increment and without cases. It writes into a directory of
+/// The configuration with the values of a set-up and without cases. It writes into a directory of
 /// its own: that of the search holds the file it is read from.
 fn tuned_config(config: &Config, setup: &RemeshSetup) -> Config {
     let mut config = config.clone();
@@ -297,7 +297,6 @@ fn tuned_config(config: &Config, setup: &RemeshSetup) -> Config {
             .collect();
     }
     if let Some(morph) = &mut config.morph {
-        morph.increments = Increments::Count(1);
         morph.cases.clear();
     }
     let mut name = config.output.directory.file_name().unwrap_or_default().to_owned();

@@ -17,9 +17,6 @@ const MOST_CONSTRAINTS: usize = 12;
 /// Bodies whose force has a figure; result.json and history.csv have all.
 const MOST_BODIES: usize = 4;
 
-/// Lines at new rounds.
-const MOST_ROUNDS: usize = 100;
-
 /// Points of a curve that are drawn one by one.
 const MOST_DOTS: usize = 60;
 
@@ -96,17 +93,11 @@ impl Series<'_> {
         let points: Vec<[f64; 2]> = self.known().map(point).collect();
         let pairs = || self.rows.windows(2).map(|pair| (&pair[0], &pair[1]));
         let before = |row: &Evaluation| x.at(row.evaluation as f64 - 0.5);
-        let rounds = pairs().filter(|(a, b)| a.level == b.level && b.round > a.round).map(|(_, b)| b);
-        let rounds = labelled(rounds.take(MOST_ROUNDS).map(|row| (row.round, before(row))));
         let levels = pairs().filter(|(a, b)| b.level > a.level).map(|(_, b)| (b.level, before(b)));
         let best = self.known().find(|(row, _)| Some(row.evaluation) == self.best);
         let content = html! {
             (grid(&x, &y, 5))
             (axes(&x, &y, ["evaluation", &self.title], [last.min(8), 5]))
-            @for (round, at, is_labelled) in &rounds {
-                (line("round", [*at, y.pixels[0]], [*at, y.pixels[1]]))
-                @if *is_labelled { (text("tick", at + 3.0, TOP + 9.0, &format!("round {round}"))) }
-            }
             @for (level, at) in levels {
                 (line("bound", [at, y.pixels[0]], [at, y.pixels[1]]))
                 (text("tick", at + 3.0, TOP + 21.0, &format!("mesh {level}")))
@@ -158,42 +149,9 @@ impl Series<'_> {
         if self.bound.is_some() {
             text += "; satisfied where it is not above zero (dashed line)";
         }
-        if self.rows.iter().any(|row| row.round > 0) {
-            text += "; dotted lines: the mesh got a new reference";
-        }
         if self.rows.windows(2).any(|pair| pair[1].level > pair[0].level) {
             text += "; dashed upright lines: the mesh was refined, and the search goes on from the best design on it";
         }
         text + "."
-    }
-}
-
-/// Width of a label such as `round 12`.
-const LABEL: f64 = 44.0;
-
-/// Rounds with their places, and whether there is room for a label behind the one before.
-fn labelled(rounds: impl Iterator<Item = (usize, f64)>) -> Vec<(usize, f64, bool)> {
-    let mut free = f64::NEG_INFINITY;
-    let mut label = |(round, at): (usize, f64)| {
-        let has_room = at >= free;
-        if has_room {
-            free = at + LABEL;
-        }
-        (round, at, has_room)
-    };
-    rounds.map(&mut label).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::labelled;
-
-    #[test]
-    fn labels_of_rounds_do_not_pile_up() {
-        let shown = |places: &[f64]| -> Vec<bool> {
-            labelled(places.iter().copied().enumerate()).into_iter().map(|(.., shown)| shown).collect()
-        };
-        assert_eq!(shown(&[60.0, 160.0, 260.0]), [true; 3]);
-        assert_eq!(shown(&[60.0, 70.0, 100.0, 105.0, 150.0]), [true, false, false, true, true]);
     }
 }

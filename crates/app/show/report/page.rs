@@ -104,7 +104,6 @@ fn mesh(data: &RunData) -> Markup {
             div { (facts::mesh(data)) }
             div { (or_missing("the histogram of quality", of_outline(data, histogram::figure))) }
         }
-        @if let Some(result) = &data.result { (tables::rounds(result)) }
         h3 { "Skin depth" }
         (or_missing("the skin-depth audit", skin))
     }

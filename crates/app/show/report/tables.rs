@@ -23,9 +23,6 @@ const MOST_POINTS: usize = 200;
 /// Rows that a table holds; of the evaluations the first and the last half of so many.
 pub(super) const MOST_ROWS: usize = 800;
 
-/// Events of the mesh motion that are listed.
-const MOST_EVENTS: usize = 160;
-
 /// A table under its title, nothing where it is empty; of a very long one the beginning.
 pub(super) fn titled_table(title: &str, head: &[&str], rows: &[Vec<String>], most: usize) -> Markup {
     let shown = rows.len().min(most);
@@ -67,7 +64,6 @@ fn columns<'a>(rows: &'a [Evaluation], objective: &'a str) -> Vec<(&'a str, Cell
             row.step_to_inversion.map_or("never".to_owned(), |step| format!("{} ×", number(step, 3)))
         }),
         column("solver iterations", |row| row.linear_iterations.to_string()),
-        column("round", |row| row.round.to_string()),
         column("time [s]", |row| number(row.seconds, 3)),
     ]);
     for name in rows.iter().take(1).flat_map(|row| row.constraints.keys()) {
@@ -330,19 +326,5 @@ pub(super) fn skin(outline: &Outline) -> Markup {
         (table(&head, &rows, None))
         @if warnings.is_empty() { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
         @for warning in warnings { p class="warning" { (warning) } }
-    }
-}
-
-/// Rounds and fallbacks of the mesh motion; nothing where there were none.
-pub(super) fn rounds(result: &RunResult) -> Markup {
-    let listed = result.rounds.len().min(MOST_EVENTS);
-    html! {
-        @if listed > 0 {
-            h3 { "Rounds and fallbacks of the mesh motion" }
-            ul {
-                @for event in &result.rounds[..listed] { li { (event.describe()) } }
-                @if listed < result.rounds.len() { li { "and " (result.rounds.len() - listed) " more" } }
-            }
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! A design that the mesh does not carry: the step to it is cut short, and the method sees one smooth problem.
 //!
-//! Where the mesh is one function of the design, the *room* of a design ([`fluxmorph_remesh::Room`]) is smooth on both sides of the
+//! The mesh is one function of the design, and the *room* of a design ([`fluxmorph_remesh::Room`]) is smooth on both sides of the
 //! boundary of the carried ones, which are a convex set on rails. Where a design that is asked for is not carried, a carried one
 //! near it is evaluated in its place, and counts: squeezed elements push the variables around them back, and what is missing then
 //! is cut off the way from the best design. Where that is a gain, the method searches on from there. Else it is given the linear
@@ -73,36 +73,32 @@ pub(super) struct Standing {
 }
 
 impl Run<'_> {
-    /// The mesh of a design, or of the one that is evaluated in its place; `None` where it moves in rounds.
-    pub(super) fn carry(&mut self, p: &[f64]) -> Result<Option<Carriage>, Stop> {
-        if !self.shape().motion().is_one_function() {
-            return Ok(None);
-        }
+    /// The mesh of a design, or of the one that is evaluated in its place.
+    pub(super) fn carry(&mut self, p: &[f64]) -> Result<Carriage, Stop> {
         let clock = Instant::now();
         self.observer.stage(Stage::Moving);
         // Before a first design, from no displacement at all.
         let from = self.best.as_ref().map_or_else(|| vec![0.0; p.len()], |best| best.values.clone());
         let shape = self.shape();
         let carried_to = |p: &[f64]| shape.carried(&from, p).map_err(Error::from);
-        let Some(carried) = carried_to(p)? else { return Ok(None) };
-        let Carried { mut share, mut moved, room } = carried;
+        let Carried { mut share, mut moved, room } = carried_to(p)?;
         let room_gradient = shape.surface().gradient(&room.gradient);
         let (mut goal, mut cut) = (p.to_vec(), None);
         if share < 1.0 {
             cut = Some(self.why_cut(p, room.element));
             let pushed = shape.pushed_back(p).map_err(Error::from)?;
-            let nearer = carried_to(&pushed)?.expect("one law carries all designs");
+            let nearer = carried_to(&pushed)?;
             let distance = |other: &[f64]| p.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
             if distance(&between(&from, &pushed, nearer.share)) < distance(&between(&from, p, share)) {
                 (goal, share, moved) = (pushed, nearer.share, nearer.moved);
             }
         }
         if let Some(cause) = self.poor_element(&moved) {
-            return Err(Stop::Mesh(Refusal { cause, wanted: p.to_vec() }));
+            return Err(Stop::Mesh(Refusal { cause }));
         }
         let design = between(&from, &goal, share);
         let seconds = clock.elapsed().as_secs_f64();
-        Ok(Some(Carriage { design, moved, cut, room: room.value, room_gradient, seconds }))
+        Ok(Carriage { design, moved, cut, room: room.value, room_gradient, seconds })
     }
 
     /// What the method is given for the design `p` that it asked for, from the sample of the one that was evaluated; `before`
@@ -124,7 +120,7 @@ impl Run<'_> {
                 self.observer.note(cause);
             }
             if !self.takes_constraints() {
-                return Err(Stop::Mesh(Refusal { cause: cause.clone(), wanted: p.to_vec() }));
+                return Err(Stop::Mesh(Refusal { cause: cause.clone() }));
             }
             if has_gained {
                 return Err(Stop::CutShort);

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use fluxmorph_geometry::ElementId;
-use fluxmorph_remesh::{Moved, RemeshError};
+use fluxmorph_remesh::Moved;
 
 use super::carry::Standing;
 use super::incumbent::{BestField, Comparison, Initial};
 use super::run::Run;
-use super::stop::{Refusal, Stop};
-use super::{Evaluation, Record, StopReason, Watching, column, reference_hash};
+use super::stop::Stop;
+use super::{Evaluation, Record, StopReason, Watching, column};
 use crate::error::Error;
 use crate::geometric::WallThickness;
 use crate::nlopt::Sample;
@@ -24,18 +24,18 @@ impl Run<'_> {
         if self.known(p).is_none() && !self.is_replaying() {
             self.check_limits()?;
         }
-        let Some(carried) = self.carry(p)? else { return self.sample_of(p, None) };
+        let carried = self.carry(p)?;
         let before =
             Standing { best: self.best_evaluation(), values: (self.evaluations, self.incumbent_values()) };
-        let sample = self.sample_of(&carried.design, Some((&carried.moved, carried.seconds)))?;
+        let sample = self.sample_of(&carried.design, (&carried.moved, carried.seconds))?;
         self.answer(p, (&carried, before), sample)
     }
 
-    /// ±F/|F0| and the constraints of a design, on its mesh where that is known, and the seconds that it took.
+    /// ±F/|F0| and the constraints of a design, on its mesh, which took so many seconds.
     ///
-    /// What is known of the best design in this round is not computed again, nor what was computed before the run was
+    /// What is known of the best design is not computed again, nor what was computed before the run was
     /// interrupted.
-    fn sample_of(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
+    fn sample_of(&mut self, p: &[f64], moved: (&Moved, f64)) -> Result<Sample, Stop> {
         if let Some(sample) = self.known(p) {
             return Ok(sample.clone());
         }
@@ -45,39 +45,26 @@ impl Run<'_> {
         match self.next.take() {
             Some(record) if self.is_of(&record, p) => self.replay(record),
             Some(record) => {
-                // A design that the mesh refused has left no record.
                 let difference = self.difference(&record, p);
                 self.next = Some(record);
-                if moved.is_none() {
-                    self.mesh(p)?;
-                }
                 Err(Stop::Error(Box::new(difference)))
             }
             None => self.compute(p, moved),
         }
     }
 
-    /// What is known of the best design, in this round.
+    /// What is known of the best design.
     fn known(&self, p: &[f64]) -> Option<&Sample> {
-        let round = self.shape().motion().round();
-        self.best.as_ref().filter(|best| best.round == round && best.values == p).map(|best| &best.sample)
+        self.best.as_ref().filter(|best| best.values == p).map(|best| &best.sample)
     }
 
-    /// Computes a design, on its mesh where that is known, and the seconds that it took.
-    fn compute(&mut self, p: &[f64], moved: Option<(&Moved, f64)>) -> Result<Sample, Stop> {
+    /// Computes a design on its mesh, which took so many seconds.
+    fn compute(&mut self, p: &[f64], (moved, before): (&Moved, f64)) -> Result<Sample, Stop> {
         let clock = Instant::now();
-        let (moved, before) = match moved {
-            Some((moved, seconds)) => (moved.clone(), seconds),
-            None => {
-                self.observer.stage(Stage::Moving);
-                (self.mesh(p)?, 0.0)
-            }
-        };
-        let remesh = before + clock.elapsed().as_secs_f64();
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
-        let mut analysis = problem.analyse(moved, Derivatives::First, cache, progress)?;
-        analysis.timings.remesh += remesh;
+        let mut analysis = problem.analyse(moved.clone(), Derivatives::First, cache, progress)?;
+        analysis.timings.remesh += before;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
         let initial = self.initial(objective, analysis.quality.worst, &values)?;
@@ -97,38 +84,13 @@ impl Run<'_> {
         self.observer.stage(Stage::Writing);
         self.recorder.record(&record, &analysis, self.problem)?;
         self.observer.evaluation(&record.row);
-        self.keep(record, sample.clone(), comparison, |_| BestField::Computed(Box::new(analysis)));
+        self.keep(record, sample.clone(), comparison, || BestField::Computed(Box::new(analysis)));
         Ok(sample)
-    }
-
-    /// The mesh of a design, unless it goes beyond what the round's reference can carry.
-    fn mesh(&self, p: &[f64]) -> Result<Moved, Stop> {
-        let refused = |cause: String| Stop::Mesh(Refusal { cause, wanted: p.to_vec() });
-        let moved = self.problem.moved(p).map_err(|error| match error {
-            RemeshError::Inverted { .. } => refused(error.to_string()),
-            other => Stop::Error(Box::new(other.into())),
-        })?;
-        let limits = &self.shape().limits;
-        let share = 1.0 / moved.inversion.step;
-        // Without rounds there is no other reference to take.
-        if let Some(element) =
-            moved.inversion.element.filter(|_| share > limits.inversion_share && limits.rounds > 0)
-        {
-            return Err(refused(format!(
-                "a design would go {:.0} % of the way to inverting element {element}, beyond the allowed share of {}",
-                100.0 * share,
-                limits.inversion_share
-            )));
-        }
-        match self.poor_element(&moved) {
-            Some(cause) => Err(refused(cause)),
-            None => Ok(moved),
-        }
     }
 
     /// Why a mesh is refused that has an element below the least quality.
     pub(super) fn poor_element(&self, moved: &Moved) -> Option<String> {
-        let least = self.shape().limits.least_quality;
+        let least = self.shape().least_quality;
         let quality = (least > 0.0).then(|| self.problem.quality(&moved.mesh))?;
         (quality.worst < least).then(|| {
             format!(
@@ -182,7 +144,6 @@ impl Run<'_> {
     pub(super) fn compare(&self, objective: f64, sample: &Sample) -> Comparison {
         match &self.best {
             None => Comparison::First,
-            Some(_) if self.best_is_stale => Comparison::Remeshed,
             Some(best) => best.compare(self.goal, objective, sample),
         }
     }
@@ -215,7 +176,6 @@ impl Run<'_> {
             step_to_inversion: analysis.inversion.element.map(|_| analysis.inversion.step),
             inversion_element: analysis.inversion.element.map(ElementId::index),
             inversion_region: analysis.inversion.element.map(region),
-            round: shape.motion().round(),
             level: self.level,
             forces: analysis.forces.clone(),
             constraints: BTreeMap::new(),
@@ -230,7 +190,6 @@ impl Run<'_> {
             gradient,
             constraints: analysis.constraints.iter().map(constraint).collect(),
             members: analysis.members.iter().map(constraint).collect(),
-            reference: reference_hash(shape.motion().reference()),
             methods: self.cache.methods(),
             worst_residual: analysis.worst_residual,
             timings: analysis.timings,

@@ -31,14 +31,12 @@ pub struct Evaluation {
     pub linear_iterations: usize,
     /// Wall time of the evaluation [s].
     pub seconds: f64,
-    /// Multiple of the motion from the round's reference at which the first element inverts; `None` if none ever does.
+    /// Multiple of the motion from the undeformed mesh at which the first element inverts; `None` if none ever does.
     pub step_to_inversion: Option<f64>,
     /// That element.
     pub inversion_element: Option<usize>,
     /// Its region.
     pub inversion_region: Option<String>,
-    /// Rounds of the mesh motion begun so far (see [`fluxmorph_optimizer::driver`]).
-    pub round: usize,
     /// Times the mesh had been refined.
     #[serde(default)]
     pub level: usize,
@@ -57,7 +55,7 @@ pub fn column(constraint: &str) -> String {
 
 impl Evaluation {
     /// The columns of `history.csv` before those of the constraints.
-    pub const COLUMNS: [&'static str; 16] = [
+    pub const COLUMNS: [&'static str; 15] = [
         "evaluation",
         "iteration",
         "objective",
@@ -72,7 +70,6 @@ impl Evaluation {
         "step_to_inversion",
         "inversion_element",
         "inversion_region",
-        "round",
         "level",
     ];
 }

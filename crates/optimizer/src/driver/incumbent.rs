@@ -2,8 +2,6 @@
 
 use std::cmp::Ordering;
 
-use fluxmorph_remesh::Motion;
-
 use crate::constraint::Bound;
 use crate::nlopt::Sample;
 use crate::objective::Goal;
@@ -22,8 +20,6 @@ pub(super) struct Initial {
 pub(super) enum Comparison {
     First,
     Better,
-    /// It takes the place of the best one, whose mesh has changed.
-    Remeshed,
     Worse,
 }
 
@@ -33,21 +29,12 @@ impl Comparison {
     }
 }
 
-/// In what an evaluation was computed: with both it comes out as it was.
-#[derive(Debug)]
-pub(super) struct ReplayState {
-    /// The mesh motion of its round.
-    pub(super) motion: Motion,
-    /// What the linear solvers kept before it.
-    pub(super) cache: SolverCache,
-}
-
 /// What is known of the field of the best design.
 #[derive(Debug)]
 pub(super) enum BestField {
     Computed(Box<Analysis>),
-    /// It was computed before the run was interrupted.
-    Replayed(Box<ReplayState>),
+    /// It was computed before the run was interrupted; with what the linear solvers kept before it, it comes out as it was.
+    Replayed(Box<SolverCache>),
 }
 
 /// The best design so far.
@@ -59,10 +46,6 @@ pub(super) struct Incumbent {
     pub(super) violation: f64,
     /// What the method has seen of it.
     pub(super) sample: Sample,
-    /// The round it was evaluated in: there, and only there, the gradient is that of the mesh motion.
-    pub(super) round: usize,
-    /// How many rounds had been begun by then.
-    pub(super) starts: usize,
     pub(super) field: BestField,
 }
 

@@ -4,20 +4,18 @@
 //!   improves on the best so far (the first counts as none). Of two designs that keep all constraints the one with the
 //!   better objective is better; otherwise the one that violates them less.
 //! * The method sees `±F/|F0|`, which it makes small; everything shown or kept is `F` itself.
-//! * A *round* is an outer iteration: within it the elastic map is frozen on the round's reference mesh, so that `F(p)` is
-//!   one function. The method searches within a trust region around the round's first design (`trust_region`). A design
-//!   that goes too near to an inversion, or below the minimum quality, is never shown to the method as NaN, infinity or a
+//! * Every design has one mesh, so that `F(p)` is one function. Where the mesh does not carry a design, a part of the step to it is
+//!   evaluated (`carry`). A design that falls below the minimum quality is never shown to the method as NaN, infinity or a
 //!   penalty: the method is stopped. It has no objective: it is no evaluation and leaves no row in the history.
-//! * What follows from one search is decided in `search`: the best mesh becomes the reference of the next round, the trust
-//!   region shrinks, or the mesh motion falls back to another stiffness policy, smoothing or motion along one axis
-//!   ([`fluxmorph_remesh::FallbackLevel`]). Where nothing is left the run ends with [`StopReason::MeshLimited`]; so does one
-//!   whose method came to its tolerance in a small trust region while the gradient promises as much as before
-//!   (`promised_gain`): that is no convergence.
+//! * What follows from one search is decided in `search`: the next one begins at the best design, or in a smaller trust region
+//!   around it (`trust_region`). Where nothing is left the run ends with [`StopReason::MeshLimited`]; so does one whose method came
+//!   to its tolerance in a small trust region while the gradient promises as much as before (`promised_gain`): that is no
+//!   convergence.
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
-//!   the same designs to the last bit, in the same rounds on the same meshes, they are the answers (`replay`). The method
+//!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
 //! * On a finer mesh a search goes on from the best design of the one before (`start`).
-//! * Limits of evaluations and time are checked before the mesh of each evaluation but the first, and before each fallback: what was
+//! * Limits of evaluations and time are checked before the mesh of each evaluation but the first: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
 
@@ -45,7 +43,7 @@ use crate::problem::Problem;
 pub use evaluation::{Evaluation, column};
 pub use observer::{Observer, Silent, Watching};
 pub use outcome::{Best, Optimised};
-pub use record::{Record, reference_hash};
+pub use record::Record;
 pub use recorder::{Recorder, Unrecorded};
 pub use settings::Settings;
 pub use start::Start;
@@ -54,9 +52,9 @@ pub use stop_reason::StopReason;
 use run::Run;
 use search::{NextStep, Search};
 
-/// Runs the optimisation of a problem with a shape and an objective; it leaves the problem in its last round.
+/// Runs the optimisation of a problem with a shape and an objective.
 ///
-/// `interrupted` is asked before each evaluation and each fallback.
+/// `interrupted` is asked before each evaluation.
 ///
 /// # Errors
 /// [`Error`] of an evaluation that fails for another reason than its mesh, unless there is a best design to save: then
@@ -91,7 +89,6 @@ pub fn optimise_from(
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
     let mut run = Run::new(problem, settings, observer, recorder, interrupted).taking_over(start);
-    run.continue_to_start()?;
     let reason = match run.take_up(start.design.as_deref()) {
         Ok(None) => search(&mut run, settings)?,
         Ok(Some(reason)) => reason,
@@ -102,7 +99,7 @@ pub fn optimise_from(
 
 /// One search after the other, until there is a reason to stop.
 fn search(run: &mut Run<'_>, settings: &Settings) -> Result<StopReason, Error> {
-    let mut search = Search::new(run, settings)?;
+    let mut search = Search::new(run, settings);
     loop {
         match advance(&mut search, run) {
             Ok(None) => {}
@@ -119,12 +116,8 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
         NextStep::Stop(reason) => return Ok(Some(reason)),
         NextStep::SearchOn => {}
         NextStep::TightenTolerance => search.tighten_tolerance(run),
-        NextStep::MoveTrustRegion => search.move_trust_region(run)?,
-        NextStep::NewReference { cause } => search.begin_round(run, &cause)?,
-        NextStep::ShrinkTrustRegion { refused, gained } => {
-            search.shrink_trust_region(run, &refused, gained)?
-        }
-        NextStep::FallBack(refused) => return search.fall_back(run, &refused),
+        NextStep::MoveTrustRegion => search.move_trust_region(run),
+        NextStep::ShrinkTrustRegion { refused, gained } => search.shrink_trust_region(run, &refused, gained),
     }
     Ok(None)
 }

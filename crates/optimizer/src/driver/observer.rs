@@ -3,7 +3,7 @@
 use fluxmorph_solver::newton::NewtonProgress;
 
 use super::evaluation::Evaluation;
-use crate::problem::{Progress, RoundEvent, Stage};
+use crate::problem::{Progress, Stage};
 
 /// Receives what happens during a run. Nothing is shown unless a method is overridden; whatever is shown as a line goes
 /// through [`Observer::line`].
@@ -36,11 +36,6 @@ pub trait Observer {
     /// An evaluation is complete.
     fn evaluation(&mut self, evaluation: &Evaluation) {
         let _ = evaluation;
-    }
-
-    /// The mesh has a new reference, the trust region shrank, or the mesh motion fell back.
-    fn round(&mut self, event: &RoundEvent) {
-        self.line(&event.describe());
     }
 
     /// Something that was skipped, and why; nothing to act on.

@@ -2,7 +2,7 @@
 
 use super::StopReason;
 use crate::constraint::Bound;
-use crate::problem::{Analysis, RoundEvent, RoundStart, Timings};
+use crate::problem::{Analysis, Timings};
 
 /// The best design of a run.
 #[derive(Debug)]
@@ -15,8 +15,6 @@ pub struct Best {
     pub objective: f64,
     /// Largest excess of a constraint over its bound, relative to it; zero where all are kept.
     pub violation: f64,
-    /// The rounds through which its mesh was reached.
-    pub starts: Vec<RoundStart>,
     /// Its field.
     pub analysis: Analysis,
 }
@@ -42,6 +40,4 @@ pub struct Optimised {
     pub worst_residual: f64,
     /// Where the time went, all evaluations together.
     pub timings: Timings,
-    /// What happened to the mesh between evaluations.
-    pub rounds: Vec<RoundEvent>,
 }

@@ -1,6 +1,5 @@
 //! One evaluation as a recorder keeps it: all that answers the method when a run is resumed.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_solver::linear::Method;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +9,7 @@ use crate::problem::Timings;
 /// One evaluation with everything that a resumed run needs of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Its row in the history, with objective and round.
+    /// Its row in the history, with the objective.
     pub row: Evaluation,
     /// Whether it was the best until then.
     pub improved: bool,
@@ -23,8 +22,6 @@ pub struct Record {
     /// Of a worst case: its terms with their weights, in SI, with the derivatives by the variables.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub members: Vec<(f64, Vec<f64>)>,
-    /// [`reference_hash`] of the round's reference mesh.
-    pub reference: String,
     /// The method of the linear solver that worked last, by matrix; `None` where it is the first one.
     #[serde(with = "method_names")]
     pub methods: Vec<Option<Method>>,
@@ -33,12 +30,6 @@ pub struct Record {
     /// Where its time went.
     #[serde(rename = "timings_s")]
     pub timings: Timings,
-}
-
-/// BLAKE3 of the points of a mesh whose topology is known, hexadecimal.
-pub fn reference_hash(mesh: &Mesh) -> String {
-    let bytes: Vec<u8> = mesh.points().as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect();
-    blake3::hash(&bytes).to_hex().to_string()
 }
 
 /// Methods by the names that they have in a configuration.

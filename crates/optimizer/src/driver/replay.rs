@@ -2,48 +2,41 @@
 
 use std::time::Instant;
 
-use super::incumbent::{BestField, Incumbent, ReplayState};
+use super::incumbent::{BestField, Incumbent};
 use super::run::Run;
 use super::stop::Stop;
-use super::{Best, Record, reference_hash};
+use super::{Best, Record};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::{Derivatives, NoProgress, SolverCache};
 
 /// Largest difference of a design to that of its record, relative to the largest variable, where the work of either is or was
-/// shared out: sums over ranks have no fixed last bits, and every round's mesh is made of some. Well above what they leave,
+/// shared out: sums over ranks have no fixed last bits. Well above what they leave,
 /// and far below the steps of a method.
 const CLOSE: f64 = 1e-7;
 
 impl Run<'_> {
     /// Whether a record is that of a design on this mesh: to the last bit, or closely where ranks had a share in it.
     pub(super) fn is_of(&self, record: &Record, p: &[f64]) -> bool {
-        let motion = self.shape().motion();
-        let follows = record.row.evaluation == self.evaluations()
-            && record.row.round == motion.round()
-            && record.design.len() == p.len();
+        let follows = record.row.evaluation == self.evaluations() && record.design.len() == p.len();
         let pairs = || record.design.iter().zip(p);
         if self.is_shared_out {
             let largest = record.design.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
             return follows && pairs().all(|(was, is)| (was - is).abs() <= CLOSE * largest);
         }
-        follows
-            && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
-            && record.reference == reference_hash(motion.reference())
+        follows && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
     }
 
     /// Why a record is not the answer to what the method asks for.
     pub(super) fn difference(&self, record: &Record, p: &[f64]) -> Error {
         let Record { row, design, .. } = record;
-        let round = self.shape().motion().round();
         let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
         let cause = match differing {
             _ if row.evaluation != self.evaluations() => {
                 format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations())
             }
-            _ if row.round != round => format!("it was in round {}, now the mesh is in {round}", row.round),
             Some(k) => format!("variable {k} was {:e} m, now the method asks for {:e} m", design[k], p[k]),
-            None => "the reference mesh of its round is another one".to_owned(),
+            None => format!("it has {} variables, now there are {}", design.len(), p.len()),
         };
         Error::Replay { evaluation: row.evaluation, cause }
     }
@@ -64,29 +57,20 @@ impl Run<'_> {
         // The time of a resumed run begins where it has something to compute.
         self.clock = Instant::now();
         self.observer.evaluation(&record.row);
-        let field = |run: &Self| {
-            BestField::Replayed(Box::new(ReplayState { motion: run.shape().motion().clone(), cache }))
-        };
-        self.keep(record, sample.clone(), comparison, field);
+        self.keep(record, sample.clone(), comparison, || BestField::Replayed(Box::new(cache)));
         Ok(sample)
     }
 
-    /// The best design with its field: one that was replayed is computed in its own round, and comes out as it was.
+    /// The best design with its field: one that was replayed is computed, and comes out as it was.
     pub(super) fn with_field(&mut self, best: Incumbent) -> Result<Best, Error> {
-        let Incumbent { evaluation, values, objective, violation, starts, field, .. } = best;
-        let starts = self.starts[..starts].to_vec();
+        let Incumbent { evaluation, values, objective, violation, field, .. } = best;
         let analysis = match field {
             BestField::Computed(analysis) => *analysis,
-            BestField::Replayed(state) => {
+            BestField::Replayed(mut cache) => {
                 self.observer.phase("computing the field of the best design");
-                let ReplayState { motion, mut cache } = *state;
-                let own = self.shape_mut().set_motion(motion);
-                let analysis =
-                    self.problem.evaluate(&values, Derivatives::First, &mut cache, &mut NoProgress);
-                self.shape_mut().set_motion(own);
-                analysis?
+                self.problem.evaluate(&values, Derivatives::First, &mut cache, &mut NoProgress)?
             }
         };
-        Ok(Best { evaluation, values, objective, violation, starts, analysis })
+        Ok(Best { evaluation, values, objective, violation, analysis })
     }
 }

@@ -1,9 +1,7 @@
-//! The state of one optimisation: counts and limits, rounds of the mesh motion, the best design, the outcome.
+//! The state of one optimisation: counts and limits, the best design, the outcome.
 
 use std::collections::BTreeSet;
 use std::time::Instant;
-
-use fluxmorph_remesh::{FallbackLevel, FallbackReport, RemeshError};
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::promised_gain::promised_gain;
@@ -12,7 +10,7 @@ use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::objective::{Combination, Goal};
-use crate::problem::{Analysis, Problem, RoundEvent, RoundStart, Shape, SolverCache, Timings};
+use crate::problem::{Problem, Shape, SolverCache, Timings};
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
@@ -32,25 +30,18 @@ pub(super) struct Run<'a> {
     /// The record that the next design should be answered with.
     pub(super) next: Option<Record>,
     pub(super) best: Option<Incumbent>,
-    /// The mesh of the best design has changed: the next evaluation replaces it.
-    pub(super) best_is_stale: bool,
-    /// Without rounds: whether the mesh holds the best design back.
+    /// Whether the mesh holds the best design back.
     pub(super) is_held_back: bool,
-    /// Without rounds: what would help the mesh, each of which is said once.
+    /// What would help the mesh, each of which is said once.
     pub(super) cures: BTreeSet<&'static str>,
     worst_residual: f64,
     timings: Timings,
-    rounds: Vec<RoundEvent>,
-    /// Rounds begun at a best design.
-    begun: usize,
     /// What the gradient promised at the first design.
     promised: Option<f64>,
     /// Times the mesh has been refined.
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
     pub(super) first_evaluation: usize,
-    /// How every round began.
-    pub(super) starts: Vec<RoundStart>,
     /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
@@ -81,17 +72,13 @@ impl<'a> Run<'a> {
             last,
             next: None,
             best: None,
-            best_is_stale: false,
             is_held_back: false,
             cures: BTreeSet::new(),
             worst_residual: 0.0,
             timings: Timings::default(),
-            rounds: Vec::new(),
-            begun: 0,
             promised: None,
             level: 0,
             first_evaluation: 0,
-            starts: Vec::new(),
             is_shared_out,
         }
     }
@@ -106,10 +93,6 @@ impl<'a> Run<'a> {
         self.problem.shape().expect("an optimisation has a shape")
     }
 
-    pub(super) fn shape_mut(&mut self) -> &mut Shape {
-        self.problem.shape_mut().expect("an optimisation has a shape")
-    }
-
     pub(super) fn constraint_count(&self) -> usize {
         self.problem.constraints().len()
     }
@@ -120,10 +103,9 @@ impl<'a> Run<'a> {
         worst.map_or(0, |objective| objective.terms.len())
     }
 
-    /// Constraints that the method sees: those of the problem, and the room of a mesh without rounds.
+    /// Constraints that the method sees: those of the problem, and the room of the mesh.
     pub(super) fn method_constraint_count(&self) -> usize {
-        let room = self.takes_constraints() && self.shape().motion().is_one_function();
-        self.constraint_count() + usize::from(room)
+        self.constraint_count() + usize::from(self.takes_constraints())
     }
 
     pub(super) fn takes_constraints(&self) -> bool {
@@ -142,10 +124,9 @@ impl<'a> Run<'a> {
         self.best.as_ref().map(|best| best.evaluation)
     }
 
-    /// Violation and objective of the best design, unless its mesh has changed since it was evaluated.
+    /// Violation and objective of the best design.
     pub(super) fn incumbent_values(&self) -> Option<(f64, f64)> {
-        let best = self.best.as_ref().filter(|_| !self.best_is_stale)?;
-        Some((best.violation, best.objective))
+        self.best.as_ref().map(|best| (best.violation, best.objective))
     }
 
     /// Whether the best design is better than it was `before`, after so many evaluations and with those
@@ -159,91 +140,6 @@ impl<'a> Run<'a> {
 
     pub(super) fn warn(&mut self, message: &str) {
         self.observer.warning(message);
-    }
-
-    /// Keeps what happened to the mesh, and reports it.
-    pub(super) fn report(&mut self, event: RoundEvent) {
-        self.observer.round(&event);
-        self.rounds.push(event);
-    }
-
-    /// Takes the mesh near the first design.
-    ///
-    /// # Errors
-    /// As [`Problem::continue_to`]; [`Error::InterruptedRun`] where a signal comes.
-    pub(super) fn continue_to_start(&mut self) -> Result<(), Error> {
-        let first = self.shape().initial().to_vec();
-        let events = self.problem.continue_to(&first, self.interrupted).map_err(|error| match error {
-            Error::Interrupted => Error::InterruptedRun,
-            other => other,
-        })?;
-        events.into_iter().for_each(|event| self.report(event));
-        Ok(())
-    }
-
-    /// Whether another round may begin.
-    pub(super) fn has_rounds_left(&self) -> bool {
-        self.begun < self.shape().limits.rounds
-    }
-
-    /// Makes the mesh of the best design the reference, and counts the round.
-    pub(super) fn begin_round(&mut self) -> Result<(), RemeshError> {
-        self.begun += 1;
-        self.rebase_at_best()
-    }
-
-    /// Makes the mesh of the best design the reference.
-    fn rebase_at_best(&mut self) -> Result<(), RemeshError> {
-        let Some(best) = self.best.as_ref().filter(|_| !self.best_is_stale) else { return Ok(()) };
-        let shape = self.shape();
-        let motion = match &best.field {
-            BestField::Computed(analysis) => {
-                let Analysis { mesh, displacement, .. } = &**analysis;
-                shape.next_round(&best.values, mesh.clone(), displacement.clone())?
-            }
-            BestField::Replayed(state) => {
-                let moved = state.motion.moved(&shape.displacement(&best.values))?;
-                shape.next_round(&best.values, moved.mesh, moved.displacement)?
-            }
-        };
-        let design_m = best.values.clone();
-        self.shape_mut().set_motion(motion);
-        self.starts.push(RoundStart::Reference { design_m });
-        Ok(())
-    }
-
-    /// Lets the mesh motion fall back beyond `level` on the mesh of the best design, towards a design that was refused;
-    /// `None` where no fallback is left.
-    pub(super) fn fall_back(
-        &mut self,
-        wanted: &[f64],
-        level: FallbackLevel,
-    ) -> Result<Option<(FallbackReport, FallbackLevel)>, RemeshError> {
-        if !self.has_rounds_left() {
-            return Ok(None);
-        }
-        self.rebase_at_best()?;
-        let shape = self.shape();
-        let start = RoundStart::fallback(level, wanted);
-        let escalated = shape.motion().escalate(&shape.displacement(wanted), level, &shape.limits)?;
-        Ok(escalated.map(|(motion, report, level)| {
-            self.best_is_stale = report.fallback.changes_mesh();
-            self.shape_mut().set_motion(motion);
-            self.starts.push(start);
-            (report, level)
-        }))
-    }
-
-    /// Why there is no fallback left, for a message.
-    pub(super) fn why_no_fallback(&self) -> String {
-        match self.shape().limits.rounds {
-            _ if self.shape().motion().is_one_function() => {
-                "and there is one mesh for every design".to_owned()
-            }
-            0 => "and no other reference mesh is allowed (rounds = 0)".to_owned(),
-            rounds if !self.has_rounds_left() => format!("and all {rounds} rounds are used"),
-            _ => "and no fallback of the mesh motion is left".to_owned(),
-        }
     }
 
     /// Where the next search starts: the best design so far.
@@ -286,28 +182,24 @@ impl<'a> Run<'a> {
         record: Record,
         sample: Sample,
         comparison: Comparison,
-        field: impl FnOnce(&Self) -> BestField,
+        field: impl FnOnce() -> BestField,
     ) {
         self.iterations = self.iterations_after(comparison);
         self.evaluations += 1;
         self.worst_residual = self.worst_residual.max(record.worst_residual);
         self.timings += record.timings;
-        self.best_is_stale = false;
         self.last.clone_from(&record.design);
         if self.promised.is_none() {
             self.promised = Some(self.promised_gain(&sample, &record.design));
         }
         if comparison.is_improved() {
-            let field = field(self);
             self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
                 values: record.design,
                 objective: record.row.objective,
                 violation: sample.violation(),
                 sample,
-                round: record.row.round,
-                starts: self.starts.len(),
-                field,
+                field: field(),
             });
         }
     }
@@ -372,7 +264,6 @@ impl<'a> Run<'a> {
             initial_quality: initial.quality,
             worst_residual: self.worst_residual,
             timings: self.timings,
-            rounds: self.rounds,
         })
     }
 }

@@ -2,20 +2,17 @@
 //!
 //! [`Search::decide`] only looks; the other methods act, each in one way.
 
-use fluxmorph_remesh::FallbackLevel;
-
 use super::run::Run;
 use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
 use super::{Settings, StopReason};
 use crate::error::Error;
 use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
-use crate::problem::{RoundEvent, RoundKind};
 
 /// How much of the trust region is left after a design in it was refused and nothing was gained.
 const SHRINK: f64 = 0.5;
 
-/// How often the trust region may shrink before the mesh motion falls back: to an eighth.
+/// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
 
 /// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
@@ -49,18 +46,12 @@ pub(super) enum NextStep {
     TightenTolerance,
     /// From the best design, where the mesh leaves little room or the search has come from outside the constraints.
     SearchOn,
-    /// Around the best design, on the same reference mesh.
+    /// Around the best design.
     MoveTrustRegion,
-    /// The best mesh becomes the reference of a new round.
-    NewReference {
-        cause: String,
-    },
     ShrinkTrustRegion {
         refused: Refusal,
         gained: bool,
     },
-    /// To another stiffness policy, smoothing, or motion along one axis.
-    FallBack(Refusal),
 }
 
 /// The state of the search for the best design between two starts of the method.
@@ -70,24 +61,21 @@ pub(super) struct Search<'a> {
     ftol_rel: f64,
     /// How often the trust region shrank since the last gain.
     shrinks: usize,
-    /// The fallback of the mesh motion since the last gain.
-    level: FallbackLevel,
     tightenings: usize,
     /// The design refused last.
     refused: Option<Refusal>,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(run: &Run<'_>, settings: &'a Settings) -> Result<Self, Error> {
-        Ok(Self {
+    pub(super) fn new(run: &Run<'_>, settings: &'a Settings) -> Self {
+        Self {
             settings,
-            trust: TrustRegion::new(run.shape(), &run.centre(), 1.0)?,
+            trust: TrustRegion::new(run.centre(), 1.0),
             ftol_rel: settings.ftol_rel,
             shrinks: 0,
-            level: FallbackLevel::None,
             tightenings: 0,
             refused: None,
-        })
+        }
     }
 
     /// Runs the method once within the trust region, from the best design.
@@ -134,11 +122,8 @@ impl<'a> Search<'a> {
                 Ok(NextStep::Stop(StopReason::NumericalFailure))
             }
             Outcome::Interrupted(Stop::Error(error)) => Err(*error),
-            Outcome::Interrupted(Stop::Mesh(Refusal { cause, .. })) if !run.has_best() => {
+            Outcome::Interrupted(Stop::Mesh(Refusal { cause })) if !run.has_best() => {
                 Err(Error::FirstDesign { cause })
-            }
-            Outcome::Interrupted(Stop::Mesh(Refusal { cause, .. })) if gained && run.has_rounds_left() => {
-                Ok(NextStep::NewReference { cause })
             }
             Outcome::Interrupted(Stop::Mesh(refusal)) => Ok(self.after_refusal(run, refusal, gained)),
         }
@@ -158,9 +143,6 @@ impl<'a> Search<'a> {
         }
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
-            _ if held_back && gained && run.has_rounds_left() => {
-                NextStep::NewReference { cause: "the search stopped at the trust-region boundary".to_owned() }
-            }
             _ if held_back && gained => NextStep::MoveTrustRegion,
             Some(refusal) if held_back && self.trust.scale < 1.0 => {
                 self.after_refusal(run, refusal.clone(), gained)
@@ -176,32 +158,32 @@ impl<'a> Search<'a> {
 
     /// Whether the method came to its tolerance only because the trust region is small, which is said then.
     fn is_throttled(&self, run: &mut Run<'_>) -> bool {
-        let reach = self.trust.reach();
+        let scale = self.trust.scale;
         let Some([before, now]) = run.promised_gains() else { return false };
-        let is_throttled = reach.iter().any(|reach| *reach < 1.0) && now > STILL_PROMISED * before;
+        let is_throttled = scale < 1.0 && now > STILL_PROMISED * before;
         if is_throttled {
-            let [down, up] = reach.map(|reach| 100.0 * reach);
-            let share = 100.0 * now / before;
             run.warn(&format!(
-                "not converged: the search came to its tolerance in a trust region of {down:.1} % of the bound range \
-                 downwards, {up:.1} % upwards, where the gradient still promises {share:.0} % of what it did at the start; a \
-                 smoother design (design.filter_radius or design.grid), surfaces that slide (remesh.slide) or more \
-                 remesh.rounds let the mesh go further"
+                "not converged: the search came to its tolerance in a trust region of {:.1} % of the bound range, where the \
+                 gradient still promises {:.0} % of what it did at the start; a smoother design (design.filter_radius or \
+                 design.grid), surfaces that slide (remesh.slide) or a lower optimizer.minimum_quality let the mesh go further",
+                100.0 * scale,
+                100.0 * now / before
             ));
         }
         is_throttled
     }
 
-    /// Where no new reference is to be had, or would be of use.
+    /// Nearer to the best design, as long as that helps.
     fn after_refusal(&self, run: &mut Run<'_>, refusal: Refusal, gained: bool) -> NextStep {
         match run.limit_reached() {
             Some(reason) => NextStep::Stop(reason),
-            // After a gain without rounds the reference stays, and so does what the mesh can carry: search nearer to
-            // the best design.
             None if gained || self.shrinks < MAX_SHRINKS => {
                 NextStep::ShrinkTrustRegion { refused: refusal, gained }
             }
-            None => NextStep::FallBack(refusal),
+            None => {
+                run.warn(&format!("{}: the mesh carries the design no further", refusal.cause));
+                NextStep::Stop(StopReason::MeshLimited)
+            }
         }
     }
 
@@ -216,81 +198,18 @@ impl<'a> Search<'a> {
     }
 
     /// Centres the trust region on the best design.
-    pub(super) fn move_trust_region(&mut self, run: &Run<'_>) -> Result<(), Error> {
-        self.trust = TrustRegion::new(run.shape(), &run.centre(), self.trust.scale)?;
-        Ok(())
-    }
-
-    /// Makes the best mesh the reference of a new round, and centres the trust region on the best design.
-    pub(super) fn begin_round(&mut self, run: &mut Run<'_>, cause: &str) -> Result<(), Error> {
-        run.begin_round()?;
-        // What a trust region shrank to is doubled with every gain.
-        let scale = (self.trust.scale / SHRINK).min(1.0);
-        self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
-        (self.shrinks, self.level, self.tightenings) = (0, FallbackLevel::None, 0);
-        self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
-        let event = self.event(run, cause);
-        run.report(event);
-        Ok(())
+    pub(super) fn move_trust_region(&mut self, run: &Run<'_>) {
+        self.trust = TrustRegion::new(run.centre(), self.trust.scale);
     }
 
     /// Shrinks the trust region around the best design.
-    pub(super) fn shrink_trust_region(
-        &mut self,
-        run: &mut Run<'_>,
-        refused: &Refusal,
-        gained: bool,
-    ) -> Result<(), Error> {
-        if gained {
-            (self.shrinks, self.level) = (0, FallbackLevel::None);
-        }
-        self.shrinks += 1;
-        let scale = SHRINK * self.trust.scale;
-        self.trust = TrustRegion::new(run.shape(), &run.centre(), scale)?;
-        let shape = run.shape();
-        let step = shape.motion().step(&shape.displacement(&refused.wanted))?;
-        let admitted = shape.motion().admissible_share(&step, &shape.limits);
-        let event = self.event(run, &refused.cause);
-        run.report(RoundEvent { kind: RoundKind::SmallerSteps, admitted: Some([admitted; 2]), ..event });
-        Ok(())
-    }
-
-    /// Takes the next fallback of the mesh motion; a reason to stop where none is left.
-    pub(super) fn fall_back(
-        &mut self,
-        run: &mut Run<'_>,
-        refused: &Refusal,
-    ) -> Result<Option<StopReason>, Error> {
-        let Some((report, level)) = run.fall_back(&refused.wanted, self.level)? else {
-            run.warn(&format!(
-                "{}, {}: the mesh carries the design no further",
-                refused.cause,
-                run.why_no_fallback()
-            ));
-            return Ok(Some(StopReason::MeshLimited));
-        };
-        self.level = level;
-        (self.shrinks, self.tightenings) = (0, 0);
-        self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
-        self.trust = TrustRegion::new(run.shape(), &run.centre(), 1.0)?;
-        let event = self.event(run, &refused.cause).with(&report);
-        run.report(event);
-        Ok(None)
-    }
-
-    /// A round that begins now at the best design.
-    fn event(&self, run: &Run<'_>, cause: &str) -> RoundEvent {
-        let motion = run.shape().motion();
-        let quality = motion.quality(motion.reference()).worst;
-        RoundEvent {
-            round: motion.round(),
-            kind: RoundKind::Round,
-            evaluation: run.best_evaluation(),
-            worst_quality: [quality; 2],
-            admitted: None,
-            stiffness: motion.policy().name().to_owned(),
-            reach: self.trust.reach(),
-            cause: cause.to_owned(),
-        }
+    pub(super) fn shrink_trust_region(&mut self, run: &mut Run<'_>, refused: &Refusal, gained: bool) {
+        self.shrinks = if gained { 1 } else { self.shrinks + 1 };
+        self.trust = TrustRegion::new(run.centre(), SHRINK * self.trust.scale);
+        run.observer.note(&format!(
+            "{}; the search goes on within {:.2} % of the bound range around the best design",
+            refused.cause,
+            100.0 * self.trust.scale
+        ));
     }
 }

@@ -4,7 +4,6 @@ use super::run::Run;
 use super::stop::{Refusal, Stop};
 use super::stop_reason::StopReason;
 use crate::error::Error;
-use crate::problem::RoundStart;
 
 /// What a search takes over from one on a coarser mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,20 +31,17 @@ impl Run<'_> {
         if let Some(reason) = self.evaluated(&initial)? {
             return Ok(Some(reason));
         }
-        match self.problem.continue_to(design, self.interrupted) {
-            Ok(events) => events.into_iter().for_each(|event| self.report(event)),
-            Err(Error::DesignUnreached { .. } | Error::Remesh(_)) => return self.begin_at_initial(),
-            Err(Error::Interrupted) => return Ok(Some(StopReason::Interrupted)),
-            Err(other) => return Err(other),
-        }
-        if self.shape().limits.rounds > 0 {
-            self.starts.push(RoundStart::Reference { design_m: design.to_vec() });
-        }
         if let Some(reason) = self.evaluated(design)? {
             return Ok(Some(reason));
         }
         let has_gained = self.best_evaluation().is_some_and(|best| best > self.first_evaluation);
-        if has_gained || design == initial { Ok(None) } else { self.begin_at_initial() }
+        if !has_gained && design != initial {
+            self.warn(
+                "the best design of the coarser mesh is no better than the initial one on this mesh, or out of its reach: the \
+                 search begins anew",
+            );
+        }
+        Ok(None)
     }
 
     /// The limit that an evaluation runs into, if it does.
@@ -54,20 +50,8 @@ impl Run<'_> {
             Ok(_) | Err(Stop::CutShort) => Ok(None),
             Err(Stop::Limit(reason)) => Ok(Some(reason)),
             Err(Stop::Mesh(_)) if self.has_best() => Ok(None),
-            Err(Stop::Mesh(Refusal { cause, .. })) => Err(Error::FirstDesign { cause }),
+            Err(Stop::Mesh(Refusal { cause })) => Err(Error::FirstDesign { cause }),
             Err(Stop::Error(error)) => Err(*error),
         }
-    }
-
-    /// Begins at the initial design after all.
-    fn begin_at_initial(&mut self) -> Result<Option<StopReason>, Error> {
-        self.warn(
-            "the best design of the coarser mesh is no better than the initial one on this mesh, or out of its reach: the \
-             search begins anew",
-        );
-        self.starts.clear();
-        self.problem.restart()?;
-        self.continue_to_start()?;
-        Ok(None)
     }
 }

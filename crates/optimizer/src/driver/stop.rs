@@ -7,7 +7,7 @@ use crate::error::Error;
 #[derive(Debug)]
 pub(super) enum Stop {
     Limit(StopReason),
-    /// The round's mesh cannot carry a design.
+    /// A design whose mesh is refused.
     Mesh(Refusal),
     /// The mesh carries a part of the step to a design, which is the best one now.
     CutShort,
@@ -20,10 +20,8 @@ impl From<Error> for Stop {
     }
 }
 
-/// A design that the round's mesh cannot carry.
+/// Why the mesh of a design is refused.
 #[derive(Clone, Debug)]
 pub(super) struct Refusal {
     pub(super) cause: String,
-    /// Its variables [m].
-    pub(super) wanted: Vec<f64>,
 }

@@ -17,7 +17,7 @@ pub enum StopReason {
     MaxTime,
     /// A signal arrived.
     Interrupted,
-    /// The mesh, the trust region or the number of rounds held the search back.
+    /// The mesh or the trust region held the search back.
     #[serde(rename = "mesh_limited", alias = "mesh_limit")]
     MeshLimited,
     /// Rounding allows the method no further step.

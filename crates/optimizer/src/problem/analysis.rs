@@ -44,7 +44,7 @@ pub struct Analysis {
     pub mesh: Mesh,
     /// Displacement of every node from the undeformed mesh [m], shape `(n_nodes, 3)`.
     pub displacement: Vec<Point>,
-    /// First inversion along the motion from the round's reference, as a multiple of it.
+    /// First inversion along the motion from the undeformed mesh, as a multiple of it.
     pub inversion: StepToInversion,
     /// One solution per state.
     pub solutions: Vec<FieldSolution>,

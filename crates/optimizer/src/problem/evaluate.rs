@@ -40,7 +40,7 @@ struct Sums<'a> {
 }
 
 impl Problem {
-    /// Field, objective, constraints and, if wanted, gradients of a design in the present round.
+    /// Field, objective, constraints and, if wanted, gradients of a design.
     ///
     /// `cache` holds what the linear solvers keep from the designs before; it is empty where a solver failed.
     ///
@@ -79,7 +79,7 @@ impl Problem {
     ) -> Result<Analysis, Error> {
         let is_own_anchor = match (&self.shape, derivatives) {
             (Some(shape), Derivatives::First) => {
-                self.anchor(shape.motion().reference(), &moved.mesh, cache, progress)?
+                self.anchor(shape.motion().original(), &moved.mesh, cache, progress)?
             }
             _ => false,
         };
@@ -142,7 +142,7 @@ impl Problem {
         Ok(analysis)
     }
 
-    /// Solves the states with B–H laws on a round's reference mesh, unless that has been done: others begin with these. Nothing
+    /// Solves the states with B–H laws on the undeformed mesh, unless that has been done: others begin with these. Nothing
     /// of other designs takes part. Whether the states of `mesh`, which is that one, are to be kept so instead.
     fn anchor(
         &self,
@@ -165,7 +165,7 @@ impl Problem {
             }
             let begin = (&LinearSolverCache::default(), None);
             let solved = model.solve_nonlinear(reference, begin, &mut |newton| progress.newton(newton));
-            let (state, _) = solved.map_err(finite::of_field("the state of the reference mesh", model))?;
+            let (state, _) = solved.map_err(finite::of_field("the state of the undeformed mesh", model))?;
             Ok(Some(state.values().to_vec()))
         };
         let states = self.states.iter().map(state).collect::<Result<_, _>>()?;

@@ -1,24 +1,19 @@
 //! The optimisation problem as a function: design variables in, objective, constraints and exact gradients out.
 //!
-//! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed map → dF/dp`. Within a round the
-//! reference mesh and the elastic factor are fixed, so `F(p)` is one function and not a path; [`Shape::motion`] holds the
-//! round. A problem owns one state a load case; the objective costs one adjoint solve a state whatever the number of its
+//! `p → Δx_b → Δx (Eq. 3) → mesh → state u → F`, and back: `λ → dF/dx → transposed tangent → dF/dp`. The mesh is one
+//! function of the design ([`Shape::motion`]), so `F(p)` is one too, and not a path. A problem owns one state a load case; the objective costs one adjoint solve a state whatever the number of its
 //! terms, each constraint of the field another.
 //!
 //! Here: what is moved and solved (`mod`, `shape`), one evaluation (`evaluate`) with its sums (`adjoint_accumulator`) and
-//! result (`analysis`), the continuation to a design far away (`continuation`) or
-//! through the rounds of a run (`round_start`), and the check of what is computed (`finite`).
+//! result (`analysis`), and the check of what is computed (`finite`).
 //! Nothing here knows an optimiser, a file or a terminal.
 
 mod adjoint_accumulator;
 mod analysis;
-mod continuation;
 mod estimate;
 mod evaluate;
 pub mod finite;
 mod progress;
-mod round_event;
-mod round_start;
 mod shape;
 mod solver_cache;
 mod stopwatch;
@@ -38,8 +33,6 @@ pub use analysis::{Analysis, Measured, Timings};
 pub use estimate::ErrorEstimate;
 pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
-pub use round_event::{RoundEvent, RoundKind};
-pub use round_start::RoundStart;
 pub use shape::{Shape, between};
 pub use solver_cache::SolverCache;
 
@@ -136,7 +129,7 @@ impl Problem {
         self.shape.as_ref()
     }
 
-    /// What moves, to change the round or the limits of its motion.
+    /// What moves, to change its bounds and limits.
     pub fn shape_mut(&mut self) -> Option<&mut Shape> {
         self.shape.as_mut()
     }
@@ -151,7 +144,7 @@ impl Problem {
         self.share.as_ref()
     }
 
-    /// The mesh of a design in the present round; the undeformed one where nothing moves.
+    /// The mesh of a design; the undeformed one where nothing moves.
     ///
     /// # Errors
     /// [`RemeshError::Inverted`] says which element breaks and how far the step may go.
@@ -197,10 +190,8 @@ impl Problem {
         };
         let initial;
         let measured = if p != shape.initial() && self.constraints.iter().any(is_ratio) {
-            // Of the undeformed mesh's motion, as a run has it, and not of the round around `p`.
-            let (p, cache) = (shape.initial(), &mut SolverCache::default());
-            let moved = shape.from_undeformed(p)?;
-            initial = self.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
+            let cache = &mut SolverCache::default();
+            initial = self.evaluate(shape.initial(), Derivatives::None, cache, &mut NoProgress)?;
             &initial.constraints
         } else {
             &analysis.constraints

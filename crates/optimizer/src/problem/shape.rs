@@ -1,8 +1,7 @@
 //! What moves: design variables to surface, surface to mesh, within bounds.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError, Shortfall, StepLimits};
+use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError, Shortfall};
 
 use super::finite;
 use crate::design::DesignSurface;
@@ -17,8 +16,8 @@ const MOST_PUSHES: usize = 20;
 pub struct Shape {
     surface: DesignSurface,
     motion: Motion,
-    /// How far a design may lie from the reference of its round, and how many rounds there may be.
-    pub limits: StepLimits,
+    /// Least quality (Eq. 4) of an element that may move, of a design that is evaluated.
+    pub least_quality: f64,
     thickness: Option<WallThickness>,
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -31,13 +30,11 @@ impl Shape {
     ///
     /// # Panics
     /// If there is not one bound a variable, or the bounds cross.
-    pub fn new(surface: DesignSurface, motion: Motion, limits: StepLimits, bounds: [Vec<f64>; 2]) -> Self {
+    pub fn new(surface: DesignSurface, motion: Motion, least_quality: f64, bounds: [Vec<f64>; 2]) -> Self {
         let [lower, upper] = bounds;
         check_bounds(&surface, &lower, &upper);
         let initial = lower.iter().zip(&upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
-        let limits =
-            StepLimits { rounds: if motion.is_one_function() { 0 } else { limits.rounds }, ..limits };
-        Self { surface, motion, limits, thickness: None, lower, upper, initial }
+        Self { surface, motion, least_quality, thickness: None, lower, upper, initial }
     }
 
     /// The same with the thickness of the designed body.
@@ -79,14 +76,9 @@ impl Shape {
         &self.surface
     }
 
-    /// Surface to mesh (Eq. 3) in the present round.
+    /// Surface to mesh.
     pub fn motion(&self) -> &Motion {
         &self.motion
-    }
-
-    /// Begins another round, and gives back the motion of the one before.
-    pub fn set_motion(&mut self, motion: Motion) -> Motion {
-        std::mem::replace(&mut self.motion, motion)
     }
 
     /// Thickness of the designed body, where it has one.
@@ -118,15 +110,14 @@ impl Shape {
         self.surface.displacement(p)
     }
 
-    /// How far the mesh follows the straight way from a design to another one, and the room there by the variables; `None` where
-    /// the mesh moves in rounds.
+    /// How far the mesh follows the straight way from a design to another one, and the room there by the variables.
     ///
     /// # Errors
     /// As [`Motion::carried_along`].
     ///
     /// # Panics
     /// If a design has another length than there are variables.
-    pub fn carried(&self, from: &[f64], to: &[f64]) -> Result<Option<Carried>, RemeshError> {
+    pub fn carried(&self, from: &[f64], to: &[f64]) -> Result<Carried, RemeshError> {
         let path = |t: f64| self.displacement(&between(from, to, t));
         self.motion.carried_along(&path)
     }
@@ -159,20 +150,6 @@ impl Shape {
             }
         }
         Ok(design)
-    }
-
-    /// The round that begins at a design: `reference` is its mesh, `displacement` that of every node from the undeformed
-    /// one [m].
-    ///
-    /// # Errors
-    /// As [`Motion::rebased`].
-    pub fn next_round(
-        &self,
-        p: &[f64],
-        reference: Mesh,
-        displacement: Vec<Point>,
-    ) -> Result<Motion, RemeshError> {
-        self.motion.rebased(reference, displacement, self.displacement(p), self.motion.policy())
     }
 
     /// dF/dp of `owner` from dF/dx at the nodes of a mesh, shape `(n_nodes, 3)`.

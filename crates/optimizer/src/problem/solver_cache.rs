@@ -14,8 +14,8 @@ pub struct SolverCache {
     anchor: Option<Anchor>,
 }
 
-/// Where Newton's method begins: the states on a round's reference mesh, whose nodes these are. A state is then a function of its
-/// design in the round, and not of the designs before.
+/// Where Newton's method begins: the states on the undeformed mesh, whose nodes these are. A state is then a function of its
+/// design, and not of the designs before.
 #[derive(Debug, Clone)]
 struct Anchor {
     nodes: Vec<Point>,

@@ -17,16 +17,16 @@ use super::design::Design;
 use super::mesh::MeshConfig;
 use super::remesh::Remesh;
 use crate::config::section::Section;
-use crate::config::table::{Group, Unread, one_of, table};
-use crate::config::value::choice::choice;
+use crate::config::table::{Group, Unread, table};
 use crate::config::value::range::Range;
 
-/// Most increments: far beyond any use.
-const MOST_INCREMENTS: usize = 10_000;
 /// Largest number of elements or equations: no table holds more.
 const MOST_COUNTED: usize = usize::MAX >> 12;
 /// Shares in per cent.
 const PER_CENT: Range = Range::closed(0.0, 100.0);
+/// A key of earlier versions.
+const INCREMENTS: (&str, &str) =
+    ("increments", "a motion is taken at once; remesh.law = \"hyperelastic\" takes it further than \"linear\"");
 /// Qualities that can be asked for.
 const QUALITIES: Range = Range::half_open(0.0, 1.0);
 
@@ -37,16 +37,10 @@ table! {
     ///
     /// ```toml
     /// [morph]
-    /// increments = "auto"
     /// least_quality = 0.05
     /// ```
     pub struct Morph {
-        /// `"auto"`: one increment where that goes at most half of the way to the first inversion, else as many as are needed,
-        /// each on a stiffness of its own. A number: equal parts of the motion; the last may break the mesh, which is then the
-        /// result.
-        increments: Increments = ONE_OF => Increments::Auto(AutoWord::Auto);
-        /// Quality (Eq. 4) that an element of the body may not fall below: an increment that would is not taken, and the motion
-        /// stops there. The last of a number of increments is the result all the same, and not valid.
+        /// Quality (Eq. 4) below which no element of the body may be for the motion to count as valid.
         least_quality: f64 = number(QUALITIES) => 0.0;
         /// What moves and how; later entries win at nodes of several.
         #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -57,30 +51,12 @@ table! {
         #[serde(skip_serializing_if = "Vec::is_empty")]
         cases["case"]: Vec<Case> = TABLES, else Vec::new();
     }
+    former = [INCREMENTS];
     check = Morph::check;
     rules = |rules| rules.add(json!({ "anyOf": [
         { "required": ["motion"] },
         { "required": ["case"], "properties": { "case": { "minItems": 1, "items": { "required": ["motion"] } } } },
     ] }));
-}
-
-one_of! {
-    /// In how many parts a motion is taken.
-    #[derive(Copy, Eq)]
-    pub enum Increments {
-        /// In one where that keeps away from inversion, else in as many as are needed.
-        Auto(AutoWord) = WORD, if text;
-        /// In equal parts of the path, each from the mesh that the one before left.
-        Count(usize) = integer(1, MOST_INCREMENTS);
-    }
-}
-
-choice! {
-    /// Word for `increments`.
-    pub enum AutoWord {
-        /// As many increments as are needed.
-        Auto = "auto",
-    }
 }
 
 /// One row of a sweep.
@@ -101,7 +77,7 @@ pub struct Case {
 
 table! {
     /// One row of a sweep: the configuration with the case's own `mesh`, `remesh` and `design` tables laid over it
-    /// (`remesh.poisson = 0.1`; a list replaces a list), and with `motion`, `increments` and `least_quality` of its own where it
+    /// (`remesh.poisson = 0.1`; a list replaces a list), and with `motion` and `least_quality` of its own where it
     /// gives them.
     ///
     /// ```toml
@@ -123,10 +99,9 @@ table! {
         /// What moves in this case, instead of `[[morph.motion]]`.
         motion: Option<Unread> = unread::<Vec<PrescribedMotion>, _>(not_empty(TABLES));
         /// As in `[morph]`.
-        increments: Option<Unread> = unread::<Increments, _>(ONE_OF);
-        /// As in `[morph]`.
         least_quality: Option<Unread> = unread::<f64, _>(number(QUALITIES));
     }
+    former = [INCREMENTS];
 }
 
 table! {
