@@ -131,6 +131,9 @@ impl Motion {
         mut near: Option<Equilibrium>,
     ) -> Result<(f64, Moved), RemeshError> {
         let (mut low, mut high, mut best) = (0.0, 1.0, None);
+        if near.is_none() {
+            near = settled(law.equilibrium(&path(0.0)))?;
+        }
         for _ in 0..SHARE_BITS {
             let middle = 0.5 * (low + high);
             let design = path(middle);

@@ -32,7 +32,7 @@ pub(crate) trait EnergyLaw: std::fmt::Debug + Send + Sync {
     fn equilibrium(&self, design: &[Point]) -> Result<Equilibrium, RemeshError>;
 
     /// Where the nodes come to rest for displacements near those of another equilibrium: sooner, and where there are several
-    /// equilibria perhaps at another one.
+    /// equilibria perhaps at another one. Gives up early.
     ///
     /// # Errors
     /// As [`EnergyLaw::equilibrium`].

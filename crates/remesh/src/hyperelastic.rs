@@ -34,6 +34,10 @@ const CLOSE: f64 = 1e-2;
 /// Relative change below which the exact tangent is tried again after it was not positive definite.
 const NEAR: f64 = 0.25;
 
+/// Newton steps at most from an equilibrium nearby, in the search for what is carried: what takes more lies beyond that, or so near
+/// to the limit that little is lost.
+const MAX_STEPS_NEARBY: usize = 12;
+
 /// Parts in which displacements are approached that are not reached at once.
 const PARTS: usize = 4;
 
@@ -106,13 +110,13 @@ impl Hyperelastic {
         gathered(&self.elements, &stresses, |element| element.weight, nodes)
     }
 
-    /// Newton's method from displacements that are those of the design at its nodes.
+    /// Newton's method from displacements that are those of the design at its nodes, in so many steps at most.
     ///
     /// # Errors
     /// [`RemeshError::NotSettled`]; as [`ElasticMap::new`].
-    fn settle(&self, mut u: Vec<Point>) -> Result<Equilibrium, RemeshError> {
+    fn settle(&self, mut u: Vec<Point>, most: usize) -> Result<Equilibrium, RemeshError> {
         let mut curvature = None;
-        for steps in 1..=MAX_STEPS {
+        for steps in 1..=most {
             let deformations = self.deformations(&u);
             // Where elements are inverted there is no hope for the exact one.
             let first = || {
@@ -142,7 +146,7 @@ impl Hyperelastic {
             }
             curvature = Some(if share * change < NEAR { Curvature::Exact } else { taken });
         }
-        Err(RemeshError::NotSettled { steps: MAX_STEPS })
+        Err(RemeshError::NotSettled { steps: most })
     }
 
     /// Where the tangent of an equilibrium leads for a change of the displacements of the design nodes, to `design`.
@@ -176,7 +180,7 @@ impl Hyperelastic {
                 None => self.harmonic.linear(&change)?,
                 Some(before) => self.further(before, &change, &goal)?,
             };
-            let own = self.settle(start)?;
+            let own = self.settle(start, MAX_STEPS)?;
             steps += own.steps;
             if own.least.0 <= 0.0 {
                 return Err(RemeshError::NotSettled { steps });
@@ -198,7 +202,7 @@ impl EnergyLaw for Hyperelastic {
     }
 
     fn equilibrium(&self, design: &[Point]) -> Result<Equilibrium, RemeshError> {
-        match self.settle(self.harmonic.linear(design)?) {
+        match self.settle(self.harmonic.linear(design)?, MAX_STEPS) {
             Ok(own) if own.least.0 > 0.0 => Ok(own),
             at_once => self.in_parts(design).or(at_once),
         }
@@ -208,7 +212,7 @@ impl EnergyLaw for Hyperelastic {
         let nodes = self.rest.design_nodes();
         let change: Vec<Point> =
             nodes.iter().zip(design).map(|(n, u)| sub(*u, other.displacement[n.index()])).collect();
-        self.settle(self.further(other, &change, design)?)
+        self.settle(self.further(other, &change, design)?, MAX_STEPS_NEARBY)
     }
 
     fn has_one_equilibrium(&self) -> bool {

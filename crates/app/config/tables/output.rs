@@ -22,7 +22,7 @@ table! {
     /// The fresh mesh of `verify_refinement` has every line of the run's, and new ones between them over the box around all that
     /// moves and all that the objective is taken over; with the generator `sphere` all of it is finer. It shares with the run
     /// the size of the box, the far cells, materials, conditions, elements and their order, and the model of every region: an
-    /// error of these is in both ratios. It is brought to the shapes in as many rounds as that takes, at least 20 if need be.
+    /// error of these is in both ratios.
     /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
     /// its triangles. Constraints are measured anew at both shapes. A run that is interrupted or ends with `max_time` is not
     /// checked; a signal during the check ends with 130 or 143 and the `status` `interrupted`, beside the `stop_reason` of the

@@ -2,7 +2,7 @@
 //!
 //! NLopt keeps its state to itself, but its methods are deterministic: started afresh and given the same objectives,
 //! constraints and gradients, they ask for the same designs and are in the same state at the end. The journal holds what
-//! they were given. [`crate::driver`] replays it as long as designs, rounds and reference meshes agree to the last bit.
+//! they were given. [`crate::driver`] replays it as long as designs agree to the last bit.
 //!
 //! The file is a header and records, a line each (`line`), appended and synced one by one. Numbers are decimal, with the
 //! digits that read back as the same bits. Every line carries a checksum over itself and the checksum before it: a record

@@ -32,7 +32,6 @@ pub(super) fn record(number: usize) -> Record {
             max_thickness_m: Some(0.02),
             linear_iterations: 7,
             inversion_region: Some("air,\"sum\":\"gap\"".to_owned()),
-            round: 1,
             constraints: BTreeMap::from([("c_volume".to_owned(), -0.5)]),
             ..Evaluation::default()
         },
@@ -41,7 +40,6 @@ pub(super) fn record(number: usize) -> Record {
         gradient: vec![1.0 / 3.0, x, -x],
         constraints: vec![(x, vec![0.1, 0.2, 0.3])],
         members: vec![(-x, vec![0.4, 0.5, 0.6])],
-        reference: "3".repeat(64),
         methods: vec![None, Some(Method::Direct), Some(Method::TwoLevel)],
         worst_residual: 1e-12,
         timings: Timings { factor: 1.5, ..Timings::default() },
@@ -159,7 +157,7 @@ fn records_of_other_sizes_are_not_taken() {
     let other = Identity { variables: 2, ..identity() };
     assert_eq!(parse(&Written::new(other, vec![record(0)]).bytes).expect("a header").records, []);
     let mut long = record(0);
-    long.reference = "3".repeat(1 << 24);
+    long.row.inversion_region = Some("3".repeat(1 << 24));
     let contents = parse(&Written::new(identity(), vec![record(0), long]).bytes).expect("a header");
     assert!(contents.records.len() == 1 && matches!(contents.rest, Rest::Damaged(_)), "{:?}", contents.rest);
 }

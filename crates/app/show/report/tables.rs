@@ -1,4 +1,4 @@
-//! Tables of the page: evaluations, constraints, terms, losses, probes, skin depths, rounds.
+//! Tables of the page: evaluations, constraints, terms, losses, probes, skin depths.
 
 use std::collections::BTreeMap;
 
@@ -100,7 +100,7 @@ pub(super) fn evaluations(data: &RunData) -> Markup {
         }
         (note(
             "The best design is marked. An iteration is an evaluation that improves on all before; “inversion at” is the \
-             multiple of the motion from the round's reference mesh at which the first element would invert."
+             multiple of the straight motion from the undeformed mesh at which the first element would invert."
         ))
     }
 }

@@ -489,7 +489,7 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
             let expected = "the method broke down; take another algorithm, or other bounds";
             return Some(Err(Error::NotFinite { what, value: x[k], expected }.into()));
         }
-        // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a round starts at a
+        // Scaling back may leave start and bounds by a rounding: what is evaluated must not, since a search starts at a
         // mesh that is known.
         let (start, scaled_start) = &self.start;
         let unit = &self.scaling.unit;
