@@ -9,8 +9,11 @@ use crate::support::program::{finish, folder};
 fn the_result_of_a_run_is_solved_again_to_the_last_bit() {
     for law in [("slide = [", "slide = ["), LINEAR, HYPERELASTIC] {
         let home = folder();
-        let device =
-            written("device", home.path(), &[law, THROUGH_THE_GAP, ("max_evaluations = 6", "max_evaluations = 14")]);
+        let device = written(
+            "device",
+            home.path(),
+            &[law, THROUGH_THE_GAP, ("max_evaluations = 6", "max_evaluations = 14")],
+        );
         let [run, solved, again] = ["run", "solved", "again"].map(|name| home.path().join(name));
         finish(&mut device.command("run", &run)).completed();
         let result = RunFolder(run.clone()).result();

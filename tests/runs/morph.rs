@@ -32,7 +32,10 @@ fn one_motion_leaves_both_meshes_and_a_result() {
     assert_eq!(finished.json()["cases"], result["cases"]);
     assert_eq!((&result["command"], &result["status"]), (&"morph".into(), &"done".into()));
     let case = &result["cases"][0];
-    assert_eq!((count(case, "/tets"), count(case, "/moved_nodes"), count(case, "/newton_steps")), (384, 1, 0));
+    assert_eq!(
+        (count(case, "/tets"), count(case, "/moved_nodes"), count(case, "/newton_steps")),
+        (384, 1, 0)
+    );
     // Interior nodes of 3 × 3 × 4, top free, without the node that is moved.
     assert_eq!(count(case, "/equations"), 3 * (36 - 1));
     assert_eq!(case["valid"], true);

@@ -133,7 +133,8 @@ pub(super) fn shape(
     // Unless more is asked for, it is the room of elements that is held.
     let least_quality = config.optimizer.minimum_quality.unwrap_or(0.0);
     let bounds = [vec![design.lower; n], vec![design.upper; n]];
-    let shape = Shape::new(surface, motion, least_quality, bounds).with_thickness(thickness).starting_at(initial);
+    let shape =
+        Shape::new(surface, motion, least_quality, bounds).with_thickness(thickness).starting_at(initial);
     Ok(shape)
 }
 

@@ -14,9 +14,7 @@ use fluxmorph_geometry::ElementId;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
 use fluxmorph_optimizer::memory_estimate::Sizes;
-use fluxmorph_optimizer::problem::{
-    Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache,
-};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
 
 use super::Session;
@@ -141,7 +139,7 @@ impl Session<'_> {
                 let refinements = levels.map(|levels| levels.kept);
                 return Ok(Searched { optimised, first, at_best, refinements });
             }
-                start = Start {
+            start = Start {
                 level: start.level + 1,
                 evaluations: optimised.evaluations,
                 iterations: optimised.iterations,

@@ -69,16 +69,6 @@ impl<'a> Prepared<'a> {
     ) -> Session<'a> {
         let Self { setup, config, source, options, clock } = self;
         let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
-        Session {
-            command,
-            config,
-            source,
-            setup,
-            directory,
-            manifest,
-            clock,
-            setup_seconds,
-            interrupted,
-        }
+        Session { command, config, source, setup, directory, manifest, clock, setup_seconds, interrupted }
     }
 }

@@ -98,11 +98,12 @@ pub(crate) fn resume_held(
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(Concluded { result, directory });
     }
-    let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer)
-        .map_err(|error| match error {
+    let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer).map_err(
+        |error| match error {
             Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
             other => other,
-        })?;
+        },
+    )?;
     let mut session = prepared.session("run", directory.clone(), manifest);
     let contents = journal(&directory, &session.identity(), observer)?;
     session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);

@@ -47,8 +47,7 @@ impl Session<'_> {
             self.complete(index, analysis, terminals, state)?;
         }
         let StateResult { probes, losses_w, forces, saturation, coils, multipoles, .. } = states[0].clone();
-        let design =
-            problem.shape().zip(design).map(|(shape, values)| design_result(shape, values));
+        let design = problem.shape().zip(design).map(|(shape, values)| design_result(shape, values));
         let topology = mesh.topology();
         let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
         let warnings = reservations(self.config, &self.setup, analysis);

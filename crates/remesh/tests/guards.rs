@@ -4,8 +4,8 @@
 use crate::support::{Point, at, nodes_where, shaken, unit_cells, whole};
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_remesh::{
-    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion,
-    check_step, step_to_inversion,
+    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion, check_step,
+    step_to_inversion,
 };
 
 const SOLVERS: [SolverChoice; 2] = [SolverChoice::Direct, SolverChoice::ComponentBlocks];

@@ -1,8 +1,8 @@
 //! The elastic map of Eq. 3 as a linear map: patch test, scaling laws of section 2 of the paper, transpose, bits.
 
 use crate::support::{
-    self, Point, at, largest_difference, nodes_where, on_threads, outer_design, product, random,
-    unit_cells, whole,
+    self, Point, at, largest_difference, nodes_where, on_threads, outer_design, product, random, unit_cells,
+    whole,
 };
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::{

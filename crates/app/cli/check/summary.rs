@@ -168,7 +168,8 @@ fn stiffness(remesh: &Remesh, shape: Option<&Shape>) -> String {
         Some(config::MotionLaw::Hyperelastic) => MotionLaw::Hyperelastic,
         _ => MotionLaw::Linear,
     };
-    let policy = shape.map_or_else(|| stiffness_policy(remesh, law), |shape| shape.motion().map().setup().policy);
+    let policy =
+        shape.map_or_else(|| stiffness_policy(remesh, law), |shape| shape.motion().map().setup().policy);
     policy.name().to_owned()
 }
 

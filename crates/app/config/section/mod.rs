@@ -72,7 +72,8 @@ impl<'a> Section<'a> {
         for (key, why) in keys {
             self.former.borrow_mut().push(key);
             if self.has(key) {
-                let notice = format!("`{}` is of an earlier version, and has no effect: {why}", join(&self.path, key));
+                let notice =
+                    format!("`{}` is of an earlier version, and has no effect: {why}", join(&self.path, key));
                 self.context.notices.borrow_mut().push(notice);
             }
         }

@@ -50,8 +50,8 @@ pub use mesh::{
     SphereMesh,
 };
 pub use morph::{
-    Case, DesignMotion, DesignWord, Morph, Paper, PrescribedMotion, Rotation, Scale,
-    Target, Tune, TunedParameter,
+    Case, DesignMotion, DesignWord, Morph, Paper, PrescribedMotion, Rotation, Scale, Target, Tune,
+    TunedParameter,
 };
 pub use multipole::{ExpansionShape, MultipoleSet};
 pub use objective::{Combination, Goal, Objective, Probe, Sum, Term};

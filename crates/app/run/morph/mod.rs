@@ -11,8 +11,8 @@ mod session;
 mod table;
 mod tune;
 
+pub use moved::{MovedMesh, move_mesh};
 pub use report::{CaseReport, CaseResult, Inversion, MorphReport, QualityShares, WorstElement};
 pub use session::{MotionSummary, inspect, morph};
-pub use moved::{MovedMesh, move_mesh};
 pub use table::{csv, text};
 pub use tune::{Parameters, TuneReport, TunedRegion};

@@ -226,11 +226,7 @@ impl Session<'_> {
     }
 
     /// Runs one motion and writes both meshes.
-    fn run_motion(
-        &self,
-        index: usize,
-        setup: &MotionSetup,
-    ) -> Result<MovedMesh, Error> {
+    fn run_motion(&self, index: usize, setup: &MotionSetup) -> Result<MovedMesh, Error> {
         let number = (self.jobs.len() > 1).then_some(index);
         let moved = move_mesh(setup)?;
         self.directory.write(&self.directory.before(number), &vtu(&moved, &moved.before)?)?;

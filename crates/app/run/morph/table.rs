@@ -6,16 +6,8 @@ use crate::files::csv_text;
 use crate::show::text_table::Table;
 
 /// The columns of the first table.
-const ROW: [&str; 8] = [
-    "case",
-    "equations",
-    "elements",
-    "q worst",
-    "q <= 0.3",
-    "inverted",
-    "motion %",
-    "Newton steps",
-];
+const ROW: [&str; 8] =
+    ["case", "equations", "elements", "q worst", "q <= 0.3", "inverted", "motion %", "Newton steps"];
 /// The columns of the table of shares.
 const SHARES: [&str; 4] = ["case", "% q <= 0.3", "% between", "% q >= 0.6"];
 /// The columns of the table of places.

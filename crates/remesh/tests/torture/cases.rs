@@ -62,15 +62,18 @@ fn of_ball(ball: &Device) -> Vec<Kind> {
     let scaled = |name: &str, factor: f64, shift: f64| {
         ball.moved(name, |p| add(p.map(|c| (factor - 1.0) * c), [shift * RADIUS, 0.0, 0.0]))
     };
-    let spun = |name: &str, degrees: f64| {
-        ball.moved(name, |p| turn(p, [2.0 / 7.0, -3.0 / 7.0, 6.0 / 7.0], degrees))
-    };
+    let spun =
+        |name: &str, degrees: f64| ball.moved(name, |p| turn(p, [2.0 / 7.0, -3.0 / 7.0, 6.0 / 7.0], degrees));
     // Every node moved along its radius by up to a share of it.
     let rough = |name: &str, share: f64| {
         let nodes = &ball.setup.design_nodes;
         let design = |seed: u64| -> Vec<Point> {
             let mut noise = noise(seed);
-            nodes.iter().map(|n| (ball.mesh.point(*n), share * noise())).map(|(p, s)| p.map(|c| s * c)).collect()
+            nodes
+                .iter()
+                .map(|n| (ball.mesh.point(*n), share * noise()))
+                .map(|(p, s)| p.map(|c| s * c))
+                .collect()
         };
         Kind { name: name.to_owned(), designs: (0..SEEDS).map(design).collect() }
     };
@@ -114,8 +117,13 @@ pub(crate) fn table() -> String {
         let laws = [MotionLaw::Linear, MotionLaw::Hyperelastic].map(|law| device.motion(law));
         for kind in kinds {
             let [linear, own] = laws.each_ref().map(|motion| measured(motion, &kind));
-            let line =
-                format!("| {} | {} | {} | {} |\n", kind.name, kind.designs.len(), linear.cells(), own.cells());
+            let line = format!(
+                "| {} | {} | {} | {} |\n",
+                kind.name,
+                kind.designs.len(),
+                linear.cells(),
+                own.cells()
+            );
             print!("{line}");
             assert_eq!(own.carried, kind.designs.len(), "{}", kind.name);
             table += &line;

@@ -25,8 +25,10 @@ const MOST_COUNTED: usize = usize::MAX >> 12;
 /// Shares in per cent.
 const PER_CENT: Range = Range::closed(0.0, 100.0);
 /// A key of earlier versions.
-const INCREMENTS: (&str, &str) =
-    ("increments", "a motion is taken at once; remesh.law = \"hyperelastic\" takes it further than \"linear\"");
+const INCREMENTS: (&str, &str) = (
+    "increments",
+    "a motion is taken at once; remesh.law = \"hyperelastic\" takes it further than \"linear\"",
+);
 /// Qualities that can be asked for.
 const QUALITIES: Range = Range::half_open(0.0, 1.0);
 
