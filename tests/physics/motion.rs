@@ -79,7 +79,9 @@ fn a_signal_while_the_mesh_moves_does_not_cost_the_evaluation_in_hand() {
 #[ignore = "measures time"]
 fn what_the_laws_cost() {
     println!("| tets | evaluation | rails | steps | share | hyperelastic | steps | share |");
-    for (name, refinement) in [("shield_quick.toml", "0.55"), ("shield_quick.toml", "1"), ("shield.toml", "1.25")] {
+    for (name, refinement) in
+        [("shield_quick.toml", "0.55"), ("shield_quick.toml", "1"), ("shield.toml", "1.25")]
+    {
         let mesh = format!("mesh.shield.refinement={refinement}");
         let mut line = String::new();
         for law in LAWS {
