@@ -9,7 +9,7 @@ use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_optimizer::{Error as OptimizerError, geometric};
-use fluxmorph_solver::functional::{self, AtTerminals, Inductive, Observed, Weighting};
+use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use super::entries::material;
@@ -229,7 +229,8 @@ fn measured(
         | ObjectiveKind::TargetField
         | ObjectiveKind::Homogeneity
         | ObjectiveKind::FieldComponent => {
-            Ok(Functional::observation(mesh, region()?, observed(functional))?)
+            let follow = follow(functional.follow, model);
+            Ok(Functional::observation(mesh, region()?, observed(functional), follow)?)
         }
         ObjectiveKind::Loss => Ok(Functional::loss(model, name)?),
         ObjectiveKind::Energy => {
@@ -262,6 +263,15 @@ fn measured(
         ObjectiveKind::Voltage => at_terminals(AtTerminals::Voltage),
         ObjectiveKind::Power => at_terminals(AtTerminals::Power),
         ObjectiveKind::PowerFactor => at_terminals(AtTerminals::PowerFactor),
+    }
+}
+
+/// What observed places do where the mesh moves.
+pub(super) fn follow(written: Option<config::Follow>, model: &FieldModel) -> Follow {
+    match written {
+        None => Follow::Held,
+        Some(config::Follow::Mesh) => Follow::Mesh,
+        Some(config::Follow::Space) => Follow::Space(model.space().order()),
     }
 }
 

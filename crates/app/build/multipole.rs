@@ -6,6 +6,7 @@ use fluxmorph_solver::functional::{MirrorPlane, Multipoles, OfTerms};
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{FieldModel, Functional};
 
+use super::functional::follow;
 use super::references::functionals;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
 use crate::error::Error;
@@ -101,7 +102,11 @@ pub(crate) fn multipoles(
         ExpansionShape::Ball => Expansion::ball(&frame, set.radius, set.order),
     };
     let planes = planes(config, set, mesh)?;
-    Ok(Multipoles::new(model, mesh, &set.name, &expansion, &planes)?)
+    // What is reported is what is made of it.
+    let named =
+        functionals(config).into_iter().map(|(_, f)| f).filter(|f| f.region.as_ref() == Some(&set.name));
+    let written = named.filter(|f| f.kind.is_of_terms()).find_map(|f| f.follow);
+    Ok(Multipoles::new(model, mesh, &set.name, &expansion, (&planes, follow(written, model)))?)
 }
 
 /// A functional of terms.

@@ -196,7 +196,8 @@ fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
     surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
 }
 
-/// Refuses a remesh region that meets the observation region or the shell of open space: both must stay where they are.
+/// Refuses a remesh region that meets the shell of open space, which must stay where it is, or an observation region of which it is
+/// not said whether it does.
 fn overlap_faults(
     inputs: &Inputs<'_>,
     moving: &[ElementId],
@@ -209,9 +210,11 @@ fn overlap_faults(
     for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
         faults.push(
             source
-                .diagnostic(path, "the observation region lies inside the remesh region and would move")
-                .expected("an observation region that no remesh region holds")
-                .help("take the region out of remesh.region, or shrink remesh.box"),
+                .diagnostic(path, "the mesh moves where the field is observed")
+                .expected(
+                    "follow = \"space\" for places that stay, follow = \"mesh\" for cells that move along",
+                )
+                .help("or take the region out of remesh.region, or shrink remesh.box"),
         );
     }
     if let Some(e) = models[0].open_elements().find(moves) {

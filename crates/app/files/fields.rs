@@ -219,7 +219,7 @@ impl StateArrays {
         let b_abs = b[0].par_iter().zip(&b[1]).map(magnitude).collect();
         let suffix = match index {
             0 => String::new(),
-            _ => suffix(model),
+            _ => format!("_{}", model.label()),
         };
         Self {
             node_names: NODE_ARRAYS.map(|name| format!("{name}{suffix}")),
@@ -258,35 +258,7 @@ impl StateArrays {
     }
 }
 
-/// `_short_circuit` of a load, else that of the frequency; without what ParaView's calculator takes for an operator.
-fn suffix(model: &FieldModel) -> String {
-    match &model.setup().load_case {
-        Some(name) => format!("_{}", name.replace('-', "_")),
-        None => suffix_of_frequency(model.angular_frequency()),
-    }
-}
-
-/// `_200Hz`; to a microhertz, and without a point.
-fn suffix_of_frequency(angular_frequency: f64) -> String {
-    let hertz = (angular_frequency / (2.0 * std::f64::consts::PI) * 1e6).round() / 1e6;
-    format!("_{hertz}Hz").replace('.', "_")
-}
-
 /// Real and imaginary parts.
 fn parts(values: &[[c64; 3]]) -> [Vec<Point>; 2] {
     [|c: c64| c.re, |c: c64| c.im].map(|part| values.par_iter().map(|v| v.map(part)).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::suffix_of_frequency;
-
-    #[test]
-    fn the_suffix_of_a_frequency_can_stand_in_a_name() {
-        let of = |hertz: f64| suffix_of_frequency(2.0 * std::f64::consts::PI * hertz);
-        assert_eq!(
-            (of(200.0), of(0.5), of(16.7)),
-            ("_200Hz".to_owned(), "_0_5Hz".to_owned(), "_16_7Hz".to_owned())
-        );
-    }
 }

@@ -16,14 +16,14 @@ pub struct History {
 }
 
 impl History {
-    /// Starts the file with the rows so far; `constraints` and `bodies` are the names of the constraints and of the bodies whose
-    /// forces are reported, in their order.
+    /// Starts the file with the rows so far; `constraints` are the names of the constraints, and `forces` what is reported of bodies,
+    /// in their order.
     pub fn create(
         directory: &RunDirectory,
-        (constraints, bodies): (&[&str], &[&str]),
+        (constraints, forces): (&[&str], &[BodyForce]),
         rows: &[&Evaluation],
     ) -> Result<Self, OutputError> {
-        let columns = columns(constraints, bodies);
+        let columns = columns(constraints, forces);
         let head: Vec<String> = columns.iter().map(|column| csv_text(column)).collect();
         let mut table = format!("{}\n", head.join(","));
         table.extend(rows.iter().map(|row| csv_line(row, &columns)));
@@ -36,13 +36,11 @@ impl History {
     }
 }
 
-/// The columns of `history.csv`: those of every run, then one for each constraint, then six for each body.
-fn columns(constraints: &[&str], bodies: &[&str]) -> Vec<String> {
+/// The columns of `history.csv`: those of every run, then one for each constraint, then six for each body in each load case.
+fn columns(constraints: &[&str], forces: &[BodyForce]) -> Vec<String> {
     let fixed = Evaluation::COLUMNS.iter().map(|&name| name.to_owned());
-    let at_rest =
-        |name: &&str| BodyForce { name: (*name).to_owned(), force_n: [0.0; 3], torque_nm: [0.0; 3] };
-    let of_body = |name| at_rest(name).columns().map(|(column, _)| column).collect::<Vec<_>>();
-    fixed.chain(constraints.iter().map(|name| column(name))).chain(bodies.iter().flat_map(of_body)).collect()
+    let of_bodies = forces.iter().flat_map(BodyForce::columns).map(|(column, _)| column);
+    fixed.chain(constraints.iter().map(|name| column(name))).chain(of_bodies).collect()
 }
 
 /// The line of an evaluation in `history.csv`: shortest digits that read back as the same number; empty for what
@@ -83,6 +81,7 @@ mod tests {
             level: 0,
             forces: vec![BodyForce {
                 name: "pole".to_owned(),
+                state: Some("closed".to_owned()),
                 force_n: [0.5, 0.0, -1.25],
                 torque_nm: [0.0; 3],
             }],
@@ -95,15 +94,15 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let run = RunDirectory::create(&system_disk(), folder.path(), OverwritePolicy::Keep)
             .expect("a run directory");
-        History::create(&run, (&["volume"], &["pole"]), &[&evaluation()])
+        History::create(&run, (&["volume"], &evaluation().forces), &[&evaluation()])
             .and_then(|mut history| history.append(&evaluation()))
             .expect("written");
 
         let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,0,-0.5,0.5,0.0,-1.25,0.0,0.0,0.0\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
                       min_thickness_m,max_thickness_m,linear_iterations,seconds,step_to_inversion,inversion_element,inversion_region,\
-                      level,c_volume,force_pole_x_n,force_pole_y_n,force_pole_z_n,torque_pole_x_nm,torque_pole_y_nm,\
-                      torque_pole_z_nm\n";
+                      level,c_volume,force_pole_x_n_closed,force_pole_y_n_closed,force_pole_z_n_closed,torque_pole_x_nm_closed,\
+                      torque_pole_y_nm_closed,torque_pole_z_nm_closed\n";
         let csv = std::fs::read_to_string(run.history_csv()).expect("read");
         assert_eq!(csv, format!("{header}{row}{row}"));
     }

@@ -45,8 +45,7 @@ impl DirectoryRecorder {
         let names: Vec<&str> =
             problem.constraints().iter().map(|constraint| constraint.name.as_str()).collect();
         let rows: Vec<&Evaluation> = replayed.iter().map(|record| &record.row).collect();
-        let bodies: Vec<&str> = session.config.forces.iter().map(|body| body.name.as_str()).collect();
-        let history = History::create(&directory, (&names, &bodies), &rows)?;
+        let history = History::create(&directory, (&names, &problem.forces_at_rest()), &rows)?;
         let mut written = directory.evaluations_with_fields()?;
         let is_first = |k: usize| k == 0 || replayed[k - 1].row.level != replayed[k].row.level;
         written.retain(|&k| k < replayed.len() && is_wanted(kept, &replayed[k], is_first(k)));

@@ -118,7 +118,7 @@ impl Session<'_> {
         let mesh = &analysis.mesh;
         let of = |set: &config::MultipoleSet| {
             let multipoles = multipole::multipoles(self.config, set, mesh, model)?;
-            let coefficients = multipoles.coefficients(model, mesh, solution);
+            let coefficients = multipoles.coefficients(model, mesh, solution)?;
             let main = multipole::main_terms(set);
             let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
             let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();

@@ -22,6 +22,9 @@ pub struct Body {
 pub struct BodyForce {
     /// The body.
     pub name: String,
+    /// The load case, [`FieldModel::label`]; `None` in the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<String>,
     /// [N].
     pub force_n: Point,
     /// About the body's point [N m].
@@ -55,22 +58,30 @@ impl Body {
         self.force.nodal(model, mesh, solution)
     }
 
+    /// No force, under its name.
+    pub(crate) fn at_rest(&self) -> BodyForce {
+        BodyForce { name: self.name.clone(), state: None, force_n: [0.0; 3], torque_nm: [0.0; 3] }
+    }
+
     /// Its force and torque.
     pub fn force(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> BodyForce {
         let [force_n, torque_nm] = resultant(&self.nodal(model, mesh, solution), mesh, self.about);
-        BodyForce { name: self.name.clone(), force_n, torque_nm }
+        BodyForce { name: self.name.clone(), state: None, force_n, torque_nm }
     }
 }
 
 impl BodyForce {
-    /// The columns of the history: `force_NAME_x_n` …, `torque_NAME_x_nm` …, with their values.
+    /// The columns of the history: `force_NAME_x_n` …, `torque_NAME_x_nm` …, with their values; of further load cases with their
+    /// label behind.
     pub fn columns(&self) -> impl Iterator<Item = (String, f64)> + '_ {
+        let behind = self.state.as_ref().map_or(String::new(), |state| format!("_{state}"));
         let of = |what: &'static str, unit: &'static str, values: Point| {
             ["x", "y", "z"]
                 .into_iter()
                 .zip(values)
-                .map(move |(axis, v)| (format!("{what}_{}_{axis}_{unit}", self.name), v))
+                .map(|(axis, v)| (format!("{what}_{}_{axis}_{unit}{behind}", self.name), v))
+                .collect::<Vec<_>>()
         };
-        of("force", "n", self.force_n).chain(of("torque", "nm", self.torque_nm))
+        [of("force", "n", self.force_n), of("torque", "nm", self.torque_nm)].into_iter().flatten()
     }
 }

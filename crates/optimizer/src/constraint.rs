@@ -124,12 +124,13 @@ mod tests {
     use fluxmorph_geometry::RegionId;
     use fluxmorph_geometry::generate::{BlockParameters, block};
     use fluxmorph_solver::Functional;
-    use fluxmorph_solver::functional::Observed;
+    use fluxmorph_solver::functional::{Follow, Observed};
 
     fn constraint(limit: Limit) -> Constraint {
         let mesh = block(&BlockParameters::default()).expect("defaults are valid");
         let observed = Observed::Component { direction: [0.0, 0.0, 1.0] };
-        let functional = Functional::observation(&mesh, RegionId::new(0), observed).expect("it has elements");
+        let functional = Functional::observation(&mesh, RegionId::new(0), observed, Follow::Held)
+            .expect("it has elements");
         let label =
             Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None, load: None };
         let term = Term { functional, states: vec![0], weight: 1.0, label };

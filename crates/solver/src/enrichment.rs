@@ -148,15 +148,16 @@ impl FieldModel {
 }
 
 impl Enrichment {
-    /// The correction of a state of `coarse` on a mesh; `model` is [`FieldModel::enriched`] of it.
+    /// The correction of a state of `coarse` on a mesh; `model` is [`FieldModel::enriched`] of it, and `shared` is of another state on
+    /// that mesh whose model has the same matrix.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
     pub fn new(
         coarse: &FieldModel,
         model: FieldModel,
-        mesh: &Mesh,
-        state: &FieldSolution,
+        (mesh, state): (&Mesh, &FieldSolution),
+        shared: Option<Self>,
     ) -> Result<Self, SolverError> {
         let fine = model.unknowns();
         let prolongation = match model.space().family() {
@@ -170,7 +171,10 @@ impl Enrichment {
         let currents = state.currents().to_vec();
         model.windings().add_driven_load(&currents, &mut residual);
         let (mut system, linear) = if model.is_linear() {
-            let system = model.prepare(model.assembled(mesh))?;
+            let system = match shared {
+                Some(other) => model.take_over(other.system)?,
+                None => model.prepare(model.assembled(mesh))?,
+            };
             system.subtract_product(&field, &mut residual);
             (system, None)
         } else {

@@ -205,6 +205,17 @@ pub enum SolverError {
         /// Largest modulus of its entries.
         largest: f64,
     },
+    /// Something that moves has reached a place at which the field is observed.
+    #[error(
+        "the observed place ({:.3}, {:.3}, {:.3}) mm would lie in {by}: a place that stays is of use where the body does not come;          narrow the bounds of the design, or observe another region",
+        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+    )]
+    Covered {
+        /// The place [m].
+        place: [f64; 3],
+        /// What is there.
+        by: String,
+    },
     /// A probe lies outside the mesh.
     #[error(
         "point {point:?} m of the probe `{probe}` lies outside the mesh, whose box is {lower:?} to {upper:?} m"

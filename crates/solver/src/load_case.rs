@@ -67,6 +67,14 @@ impl FieldModel {
         LoadCase::of(self.setup())
     }
 
+    /// The load case as a part of names: its name, else its frequency to a microhertz, `200Hz`; without what ParaView's calculator takes
+    /// for an operator.
+    pub fn label(&self) -> String {
+        let hertz = (self.setup().frequency * 1e6).round() / 1e6;
+        let name = self.setup().load_case.clone();
+        name.unwrap_or_else(|| format!("{hertz}Hz")).replace(['-', '.'], "_")
+    }
+
     /// The same problem at another frequency [Hz].
     ///
     /// # Errors

@@ -51,7 +51,7 @@ fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f
     let (state, _) = coarse.solve(mesh).expect("it converges");
     let value = functional.evaluate(&coarse, mesh, &state).expect("a number").value;
     let fine = coarse.enriched(mesh, Effort::Any).expect("a sound problem");
-    let mut enriched = Enrichment::new(&coarse, fine, mesh, &state).expect("it converges");
+    let mut enriched = Enrichment::new(&coarse, fine, (mesh, &state), None).expect("it converges");
     let at = |enriched: &Enrichment, share: f64| {
         functional.evaluate(enriched.model(), mesh, &enriched.state(share)).expect("a number")
     };

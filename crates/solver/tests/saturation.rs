@@ -7,7 +7,7 @@ use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::functional::{Follow, Observed, Weighting};
 use fluxmorph_solver::linear::{LinearSolverCache, LinearSolverSettings};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::newton::NewtonProgress;
@@ -168,8 +168,13 @@ fn derivatives_match(frequency: f64, iron_material: Material, families: &[(Eleme
         let iron = topology.region("iron").expect("it is named");
         let square = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
         let functionals = [
-            Functional::observation(&start, observed, square),
-            Functional::observation(&start, observed, Observed::Component { direction: [0.0, 0.0, 1.0] }),
+            Functional::observation(&start, observed, square, Follow::Held),
+            Functional::observation(
+                &start,
+                observed,
+                Observed::Component { direction: [0.0, 0.0, 1.0] },
+                Follow::Held,
+            ),
             Functional::energy(&model, None),
             Functional::energy(&model, Some(iron)),
             Functional::force(&model, &start, "iron", &[iron], RigidMotion::Translation([0.36, 0.48, 0.8])),

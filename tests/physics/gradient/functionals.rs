@@ -117,3 +117,68 @@ fn sums_over_two_frequencies_are_exact() {
     }
     all_hold_on(&problem, wavy);
 }
+
+/// Observed where the mesh moves: cells that move along, and places that stay; an expansion there.
+const WHERE_IT_MOVES: &str = r#"
+[[multipoles]]
+name = "ball"
+shape = "ball"
+center = ["20 mm", "60 mm", "-46 mm"]
+radius = "8 mm"
+order = 2
+[[constraints]]
+kind = "flux_density_squared"
+region = "observation"
+weighting = "volume"
+follow = "mesh"
+upper_ratio = 0.9
+[[constraints]]
+kind = "homogeneity"
+region = "observation"
+compare = "modulus"
+follow = "mesh"
+upper_ratio = 2
+[[constraints]]
+kind = "homogeneity"
+name = "in_space"
+region = "observation"
+follow = "space"
+upper_ratio = 2
+[[constraints]]
+kind = "field_component"
+region = "observation"
+direction = [0.2, -0.1, 1.0]
+follow = "space"
+upper = "1 T"
+[[constraints]]
+kind = "multipole_content"
+region = "ball"
+harmonics = ["c1_0", "s2_1"]
+follow = "space"
+upper_ratio = 2
+"#;
+
+#[test]
+fn observation_where_the_mesh_moves_is_exact_for_cells_that_follow_and_for_places_that_stay() {
+    observed_where_it_moves(&[("nodal", 1, 60), ("edge", 1, 60), ("edge", 1, 0)]);
+}
+
+#[test]
+#[ignore = "minutes: many gradients of second order"]
+fn so_it_is_with_elements_of_second_order() {
+    observed_where_it_moves(&[("nodal", 2, 60), ("edge", 2, 60), ("edge", 2, 0)]);
+}
+
+/// Of elements and orders at frequencies [Hz].
+fn observed_where_it_moves(cases: &[(&str, u8, u8)]) {
+    let regions = "remesh.region=[\"plate\", \"remesh\", \"observation\"]";
+    for (elements, order, frequency) in cases {
+        let elements = [format!("analysis.elements={elements}"), format!("analysis.order={order}")];
+        let coarse = ["mesh.shield.refinement=0.25", "mesh.shield.skin=[\"2 mm\"]", regions];
+        let overrides = [&MESHED[..], &[&elements[0], &elements[1]], &coarse].concat();
+        let objective = "region = \"observation\"\nfollow = \"space\"";
+        println!("{elements:?} {frequency} Hz");
+        let frequency = format!("frequency = {frequency}");
+        all_hold_on(&problem(objective, WHERE_IT_MOVES, &frequency, &overrides), wavy);
+    }
+}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
-use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::functional::{Follow, Observed, Weighting};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldModelSetup, Functional, SolverError};
 
@@ -73,13 +73,13 @@ fn estimated(mesh: &Mesh, setup: FieldModelSetup, asked: Asked) -> Result<[f64; 
         Asked::Square => {
             let region = mesh.topology().region(OBSERVATION).expect("every mesh has it");
             let observed = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
-            Functional::observation(mesh, region, observed)?
+            Functional::observation(mesh, region, observed, Follow::Held)?
         }
         Asked::Loss => Functional::loss(&coarse, "block")?,
         Asked::Energy => Functional::energy(&coarse, None)?,
     };
     let fine = coarse.enriched(mesh, Effort::Any)?;
-    let mut enriched = Enrichment::new(&coarse, fine, mesh, &state)?;
+    let mut enriched = Enrichment::new(&coarse, fine, (mesh, &state), None)?;
     let at = |share| functional.evaluate(enriched.model(), mesh, &enriched.state(share));
     let (before, half_way, after) = (at(0.0)?.value, at(0.5)?.derivative, at(1.0)?.value);
     let remainder = enriched.weigh(&coarse, &half_way)?.remainder;

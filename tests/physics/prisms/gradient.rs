@@ -2,7 +2,7 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::dot;
-use fluxmorph_solver::functional::{Observed, Weighting};
+use fluxmorph_solver::functional::{Follow, Observed, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, adjoint};
 
 use super::boxed::{Cells, OBSERVATION, boxed};
@@ -24,7 +24,7 @@ pub(super) fn square_derivative(
     let (state, mut system) = model.solve(&mesh).expect("it converges");
     let region = mesh.topology().region(OBSERVATION).expect("every mesh has it");
     let observed = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
-    let functional = Functional::observation(&mesh, region, observed).expect("it has elements");
+    let functional = Functional::observation(&mesh, region, observed, Follow::Held).expect("it has elements");
     let value = functional.evaluate(&model, &mesh, &state).expect("it is finite");
     let adjoint = adjoint::solve(&mut system, &value.derivative).expect("it converges");
     let velocity = |n: fluxmorph_geometry::NodeId| motion.of_node(mesh.point(n));

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::constraint_kind::{BodyKind, Kind, ThicknessKind};
 use super::design::COMPONENTS;
-use super::functional::{Compared, Functional, ObjectiveKind, Weighting, keys_of_the_kind};
+use super::functional::{Compared, Follow, Functional, ObjectiveKind, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
 use crate::config::table::kinds::{WORD, quantity};
 use crate::config::table::rules::{Rules, Then, is, present};
@@ -72,6 +72,8 @@ table! {
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
         /// As in `[objective]`.
+        follow: Option<Follow> = WORD;
+        /// As in `[objective]`.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
         /// As in `[objective]`.
         load: Option<String> = TEXT;
@@ -94,8 +96,8 @@ table! {
 }
 
 /// The keys of a functional of the field.
-const OF_A_FIELD: [&str; 8] =
-    ["coils", "harmonics", "weighting", "target", "compare", "direction", "frequency", "load"];
+const OF_A_FIELD: [&str; 9] =
+    ["coils", "harmonics", "weighting", "target", "compare", "direction", "follow", "frequency", "load"];
 /// The keys of a bound on a value.
 const BOUNDS: [&str; 4] = ["upper", "upper_ratio", "lower", "lower_ratio"];
 /// The keys of a bound on a thickness.
@@ -260,6 +262,7 @@ impl Limit {
             target,
             compare,
             direction,
+            follow,
             frequency,
             load,
             ..
@@ -273,6 +276,7 @@ impl Limit {
             target,
             compare,
             direction,
+            follow,
             frequency,
             load,
         };

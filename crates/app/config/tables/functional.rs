@@ -37,6 +37,9 @@ table! {
         /// does not matter.
         #[also(not_all_zero)]
         direction: Option<[f64; 3]> = number(COMPONENTS);
+        /// For kinds of B in a region or of an expansion, where the mesh moves there; required then: `"space"`, the places stay and the
+        /// mesh moves through them, or `"mesh"`, the cells of the region move with it; an expansion stays.
+        follow: Option<Follow> = WORD;
         /// The one frequency it is taken at [Hz], one of `[analysis]` or of `[[loads]]`. Default: the values at all frequencies are
         /// added.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
@@ -69,6 +72,17 @@ const OF_TWO_COILS: [&str; 3] = ["mutual_inductance", "coupling", "link_efficien
 /// Kinds of an expansion.
 const OF_TERMS: [&str; 2] = ["multipole", "multipole_content"];
 
+/// Kinds of the flux density in cells or of an expansion, whose places may stay or follow the mesh.
+const OBSERVES: [&str; 7] = [
+    "flux_density_squared",
+    TARGET_FIELD[0],
+    TARGET_FIELD[1],
+    "homogeneity",
+    "field_component",
+    OF_TERMS[0],
+    OF_TERMS[1],
+];
+
 /// Kinds that may have one.
 const MAY_BE_DIRECTED: [&str; 4] = ["field_component", "force", "torque", "homogeneity"];
 
@@ -98,6 +112,8 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
         .when("kind", &DIRECTED, Then { required: &["direction"], refused: &[] })
         .unless("kind", &MAY_BE_DIRECTED, Then { required: &[], refused: &["direction"] })
         .unless("kind", &["homogeneity"], Then { required: &[], refused: &["compare"] })
+        .unless("kind", &OBSERVES, Then { required: &[], refused: &["follow"] })
+        .add(json!({ "if": is("kind", &OF_TERMS), "then": { "properties": { "follow": { "const": "space" } } } }))
         .when("compare", &["component"], Then { required: &["direction"], refused: &[] })
         .when("compare", &["vector", "modulus"], Then { required: &[], refused: &["direction"] })
 }
@@ -105,15 +121,15 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
 choice! {
     /// Kinds of functionals.
     pub enum ObjectiveKind {
-        /// Σ w B·B* [T²; by volume T² m³]. The region must not move.
+        /// Σ w B·B* [T²; by volume T² m³]. Where the mesh moves there, see `follow`.
         FluxDensitySquared = "flux_density_squared",
         /// Deviation from a field that is wished for: Σ w |B − `target`|² [T²; by volume T² m³]; in harmonics the imaginary part is
-        /// to vanish. A field that is even but of another strength counts as deviating. The region must not move.
+        /// to vanish. A field that is even but of another strength counts as deviating. Where the mesh moves there, see `follow`.
         TargetField = "target_field" | "uniformity",
         /// Deviation from the field's own mean, whatever that is: Σ w |b − b̄|² / Σ w |b̄|² [1], the square of the relative rms
-        /// deviation, for b as `compare` says; the result has its figures in ppm. The region must not move.
+        /// deviation, for b as `compare` says; the result has its figures in ppm. Where the mesh moves there, see `follow`.
         Homogeneity = "homogeneity",
-        /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. The region must not move.
+        /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. Where the mesh moves there, see `follow`.
         FieldComponent = "field_component",
         /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
         /// impedance surface, and may move.
@@ -151,10 +167,10 @@ choice! {
         /// Power factor [1] of a coil with what is in series with it: its power over half the product of the magnitudes of voltage and
         /// current; needs a frequency above 0.
         PowerFactor = "power_factor",
-        /// One of the `harmonics` of an expansion [T]; in harmonics the magnitude of its phasor. What is expanded must not move.
+        /// One of the `harmonics` of an expansion [T]; in harmonics the magnitude of its phasor. The places stay; where the mesh moves there, see `follow`.
         Multipole = "multipole",
         /// How much of some `harmonics` an expansion has: their summed squares over those of the main order [1], the square of what
-        /// builders of magnets give in units of 1e-4. What is expanded must not move.
+        /// builders of magnets give in units of 1e-4. The places stay; where the mesh moves there, see `follow`.
         MultipoleContent = "multipole_content",
     }
 }
@@ -168,6 +184,16 @@ choice! {
         Component = "component",
         /// The modulus |B|.
         Modulus = "modulus",
+    }
+}
+
+choice! {
+    /// What observed places do where the mesh moves.
+    pub enum Follow {
+        /// They stay as they are at the start, with their weights; what moves must not reach them.
+        Space = "space",
+        /// The cells move with the mesh.
+        Mesh = "mesh",
     }
 }
 
@@ -299,6 +325,11 @@ impl Functional {
             let message = format!("`multipole` is one term, and {} are named", named.len());
             section.wrong("harmonics", message, "one of them, or the kind multipole_content");
         }
+        if kind.is_of_terms() && self.follow == Some(Follow::Mesh) {
+            let message =
+                format!("`{}` is of an expansion, whose places do not follow the mesh", kind.name());
+            section.wrong("follow", message, "\"space\"");
+        }
         for (key, example, wanted) in [
             ("harmonics", Some("harmonics = [\"b3\"]"), kind.is_of_terms()),
             ("coils", Some(example), kind.coils() > 0),
@@ -307,6 +338,7 @@ impl Functional {
             ("target", Some("target = [\"0 T\", \"0 T\", \"0.5 T\"]"), kind == ObjectiveKind::TargetField),
             ("direction", is_component.then_some("direction = [0, 0, 1]"), takes_direction),
             ("compare", None, is_homogeneity),
+            ("follow", None, OBSERVES.contains(&kind.name())),
         ] {
             match (section.has(key), example) {
                 (true, _) if !wanted => {

@@ -40,7 +40,7 @@ pub use constraint::{Constraint, Limit, ValueBound};
 pub use constraint_kind::{BodyKind, ThicknessKind};
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
-pub use functional::{Compared, Functional, ObjectiveKind, Weighting};
+pub use functional::{Compared, Follow, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use load::{Feed, Load, LoadCase};

@@ -9,7 +9,8 @@ use crate::config::value::choice::choice;
 const MOST: usize = 20;
 
 table! {
-    /// A circle or ball in air that does not move, in which the flux density is expanded; the result has all terms, objective and
+    /// A circle or ball in air in which the flux density is expanded; it stays where it is (`follow` of what is made of it says what
+    /// holds where the mesh moves). The result has all terms, objective and
     /// constraints of the kinds `multipole` and `multipole_content` name it as their `region`.
     ///
     /// Points beyond a symmetry plane through the centre, one of `[boundaries]` at right angles to a coordinate axis, have the field

@@ -59,7 +59,8 @@ pub(super) fn figures(data: &RunData) -> Markup {
             let force = row.forces.get(k)?.force_n;
             Some(force.iter().map(|f| f * f).sum::<f64>().sqrt())
         };
-        all.push(("force", series(&format!("force on {} [N]", body.name), &size)));
+        let under = body.state.as_ref().map_or(String::new(), |state| format!(", {state}"));
+        all.push(("force", series(&format!("force on {}{under} [N]", body.name), &size)));
     }
     all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [F/m]", &|row| Some(row.gradient_norm))));
     all.push(("quality", series("worst quality of an element (Eq. 4)", &|row| Some(row.worst_quality))));

@@ -2,8 +2,8 @@
 
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
-    Algorithm, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord, Functional, Goal,
-    Limit, ObjectiveKind, ValueBound, Weighting,
+    Algorithm, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord, Follow, Functional,
+    Goal, Limit, ObjectiveKind, ValueBound, Weighting,
 };
 
 /// What is made small or large.
@@ -66,6 +66,11 @@ pub(super) fn functional(functional: &Functional) -> String {
             format!("the relative content of {} in {region}", harmonics(functional))
         }
         kind => format!("the {} of {}", kind.name().replace('_', " "), coils(functional)),
+    };
+    let what = match functional.follow {
+        None => what,
+        Some(Follow::Space) => format!("{what}, at places that stay"),
+        Some(Follow::Mesh) => format!("{what}, which moves with the mesh"),
     };
     match (functional.frequency, &functional.load) {
         (_, Some(load)) => format!("{what} under the load {load}"),

@@ -93,7 +93,7 @@ impl Run<'_> {
                 (goal, share, moved) = (pushed, nearer.share, nearer.moved);
             }
         }
-        if let Some(cause) = self.poor_element(&moved) {
+        if let Some(cause) = self.refusal(&moved) {
             return Err(Stop::Mesh(Refusal { cause }));
         }
         let design = between(&from, &goal, share);

@@ -88,8 +88,12 @@ impl Run<'_> {
         Ok(sample)
     }
 
-    /// Why a mesh is refused that has an element below the least quality.
-    pub(super) fn poor_element(&self, moved: &Moved) -> Option<String> {
+    /// Why a mesh is refused: what moves would reach a place at which the field is observed, or an element would be below the least
+    /// quality.
+    pub(super) fn refusal(&self, moved: &Moved) -> Option<String> {
+        if let Err(reached) = self.problem.check_places(&moved.mesh) {
+            return Some(reached.to_string());
+        }
         let least = self.shape().least_quality;
         let quality = (least > 0.0).then(|| self.problem.quality(&moved.mesh))?;
         (quality.worst < least).then(|| {

@@ -68,24 +68,27 @@ impl Problem {
         };
         // One in statics, one above 0 Hz: the others share what is large of these.
         let mut known: [Option<FieldModel>; 2] = [None, None];
-        for (index, coarse) in self.states().iter().enumerate() {
+        let mut before: Option<Enrichment> = None;
+        for index in self.matrices().concat() {
+            let coarse = &self.states()[index];
             let known = &mut known[usize::from(coarse.angular_frequency() > 0.0)];
             let fine = match known {
                 Some(model) => model.at_load_case(&analysis.mesh, &coarse.load_case())?,
-                None => known.insert(coarse.enriched(&analysis.mesh, effort)?).clone(),
+                None => coarse.enriched(&analysis.mesh, effort)?,
             };
-            let mut state = State {
-                coarse,
-                enriched: Enrichment::new(coarse, fine, &analysis.mesh, &analysis.solutions[index])?,
-                analysis,
-                index,
-            };
+            *known = Some(fine.clone());
+            // Of one frequency the factor too.
+            let shared = before.take().filter(|before| before.model().shares_matrix_with(&fine));
+            let solution = &analysis.solutions[index];
+            let enriched = Enrichment::new(coarse, fine, (&analysis.mesh, solution), shared)?;
+            let mut state = State { coarse, enriched, analysis, index };
             let terms = self.terms_of_value(analysis);
             estimate.objective += state.error_of(&terms, Some(&mut estimate.by_element))?;
             for (error, (_, term)) in estimate.constraints.iter_mut().zip(self.field_constraints()) {
                 error.1 += state.error_of(&[term], None)?;
             }
             estimate.iterations += state.enriched.iterations();
+            before = Some(state.enriched);
         }
         Ok(estimate)
     }

@@ -7,13 +7,13 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent};
-use fluxmorph_solver::{FieldModel, FieldSolution};
+use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
 use super::progress::{Progress, Stage};
 use super::stopwatch::Stopwatch;
 use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings, finite};
-use crate::body::Body;
+use crate::body::{Body, BodyForce};
 use crate::constraint::{Constraint, Quantity};
 use crate::error::Error;
 use crate::objective::{Combination, Term};
@@ -119,9 +119,8 @@ impl Problem {
         let nodal = std::mem::take(&mut objective[active].nodal);
         let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
-        let of_body = |body: &Body| body.force(&self.states[0], &mesh, &solutions[0]);
         let analysis = Analysis {
-            forces: self.bodies.iter().map(of_body).collect(),
+            forces: self.forces(|body, state| body.force(&self.states[state], &mesh, &solutions[state])),
             displacement,
             inversion,
             solutions,
@@ -262,6 +261,31 @@ impl Problem {
             }
         }
         matrices
+    }
+
+    /// What every evaluation reports of the bodies, without values.
+    pub fn forces_at_rest(&self) -> Vec<BodyForce> {
+        self.forces(|body, _| body.at_rest())
+    }
+
+    /// Of every body in every state, state by state.
+    fn forces(&self, of: impl Fn(&Body, usize) -> BodyForce) -> Vec<BodyForce> {
+        let label = |state: usize| (state > 0).then(|| self.states[state].label());
+        let in_state = |state| {
+            let force = |body| BodyForce { state: label(state), ..of(body, state) };
+            self.bodies.iter().map(force).collect::<Vec<_>>()
+        };
+        (0..self.states.len()).flat_map(in_state).collect()
+    }
+
+    /// Whether what moves has left all observed places as they were.
+    ///
+    /// # Errors
+    /// [`fluxmorph_solver::SolverError::Covered`] for one that it has reached.
+    pub(crate) fn check_places(&self, mesh: &Mesh) -> Result<(), SolverError> {
+        let constrained = self.field_constraints().map(|(_, term)| term);
+        let mut terms = self.terms().iter().chain(constrained);
+        terms.try_for_each(|term| term.functional.check_places(&self.states[0], mesh))
     }
 
     /// Whether the objective is the worst of its terms.

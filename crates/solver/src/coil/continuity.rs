@@ -3,11 +3,11 @@
 //! `∫J·∇q` over a region is zero for every `q` that is constant on each connected set of walls with a fixed tangential
 //! `A` and of conductors, or current gathers there; `∫J·h` for a curl-free `h` round a tunnel is zero, or a current
 //! flows through a loop on which `H` has nothing to turn round. Otherwise there is no field, and what edge elements give depends on
-//! their tree. Analytic coils and magnets act through `curl w`: there is nothing to check.
+//! their tree. What a current brings to vertices does not change as it is carried along with the mesh, so that a conductor that moves
+//! passes wherever it did at first. Analytic coils and magnets act through `curl w`: there is nothing to check.
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
-use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Tet4, dot};
+use fluxmorph_geometry::tet4::EDGES;
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::Coil;
@@ -46,10 +46,9 @@ pub(crate) fn check(
 /// Where current gathers.
 fn gathered(mesh: &Mesh, current: &RegionCurrent, joined: &mut DisjointSets) -> Option<RegionFault> {
     let mut left = vec![0.0; mesh.topology().node_count()];
-    for &(e, density) in current.current_density() {
-        let tet = Tet4::new(mesh.vertices(e));
-        for (node, gradient) in mesh.topology().tet(e).into_iter().zip(tet.gradients) {
-            left[joined.root(node.index())] += tet.volume * dot(density, gradient);
+    for ((e, _), into) in current.current_density().iter().zip(current.into_vertices()) {
+        for (node, share) in mesh.topology().tet(*e).into_iter().zip(into) {
+            left[joined.root(node.index())] += share;
         }
     }
     let place = left.iter().position(|i| i.abs() > LEFT_OVER)?;
@@ -67,12 +66,11 @@ fn encircled(
         return None;
     }
     let mut load = vec![0.0; space.edges().len()];
-    for &(e, density) in current.current_density() {
-        let local = space.elements().current_load(&space.cell(mesh, e), &density.map(c64::from));
-        for (carrier, values) in space.carriers_of(e).iter().zip(local.values()) {
-            if let Some(entry) = load.get_mut(carrier.index()) {
-                *entry += values[0].re;
-            }
+    for ((e, _), into) in current.current_density().iter().zip(current.into_vertices()) {
+        let into = space.cell(mesh, *e).order.map(|place| into[usize::from(place)]);
+        // `∫J·(λ_i∇λ_j − λ_j∇λ_i)` of a constant J.
+        for (carrier, [i, j]) in space.carriers_of(*e).iter().zip(EDGES) {
+            load[carrier.index()] += 0.25 * (into[j] - into[i]);
         }
     }
     harmonic

@@ -71,6 +71,8 @@ pub enum End {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegionCurrent {
     current_density: Vec<(ElementId, Point)>,
+    /// `∫J·∇λ_a` [1] for the vertices of every element, which a current that is carried along with the mesh keeps.
+    into_vertices: Vec<[f64; 4]>,
     terminals: Vec<TerminalFace>,
     terminal_names: Option<[String; 2]>,
     report: CurrentReport,
@@ -119,13 +121,20 @@ impl RegionCurrent {
         sections: Section<'_>,
     ) -> Self {
         let report = report(patch, problem, [&current, &current], &terminals, sections);
+        let into_vertices = into_vertices(patch, &current);
         let current_density = patch.elements.iter().copied().zip(current).collect();
-        Self { current_density, terminals, terminal_names: names, report }
+        Self { current_density, into_vertices, terminals, terminal_names: names, report }
     }
 
     /// `J` of every element of the region for one ampere-turn [A/m²], ascending by element.
     pub fn current_density(&self) -> &[(ElementId, Point)] {
         &self.current_density
+    }
+
+    /// What it brings to the vertices of every element in the same order, for one ampere-turn; of a current that is carried along with the
+    /// mesh the same on all meshes.
+    pub(super) fn into_vertices(&self) -> &[[f64; 4]] {
+        &self.into_vertices
     }
 
     /// The faces of the terminals; none in a closed ring.
@@ -202,11 +211,19 @@ fn stranded_current(
     let current = scaled(&projected);
     let report = report(patch, problem, [&scaled(&uniform), &current], &terminals, sections);
     RegionCurrent {
+        into_vertices: into_vertices(patch, &current),
         current_density: patch.elements.iter().copied().zip(current).collect(),
         terminals,
         terminal_names: None,
         report,
     }
+}
+
+/// `∫J·∇λ_a` for the vertices of every element.
+fn into_vertices(patch: &Patch, current: &[Point]) -> Vec<[f64; 4]> {
+    let of =
+        |(tet, j): (&Tet4, &Point)| tet.gradients.map(|g| tet.volume * fluxmorph_geometry::tet4::dot(*j, g));
+    patch.tets.iter().zip(current).map(of).collect()
 }
 
 /// The triangles of the terminals that are faces of the region.

@@ -6,13 +6,13 @@ use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::Point;
 
 use super::{Cell, EachCurl, EachFunction, Family, Local, LocalIntegral, Matrices};
-use crate::element::Complex3;
 use crate::element::density::OfFlux;
 use crate::element::edge::triangle::{EdgeTriangle, EdgeTriangleShape};
 use crate::element::edge::{EdgeShape, FieldPoint, tet::EdgeTet};
 use crate::element::tabulated::Rule;
 use crate::element::tensor::CurlsOfRule;
 use crate::element::volume::Coefficients;
+use crate::element::{Complex3, dot3};
 use crate::surface::SurfaceTerm;
 
 /// Elements with `N` carriers on a tetrahedron and `F` on a face; of `M` and `K` functions.
@@ -47,6 +47,22 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
         self.tet.field_at(&cell.ascending(), &cell.ascending_coordinates(lambda), coefficients)
+    }
+
+    fn flux_change(
+        &self,
+        cell: &Cell,
+        lambda: &[f64; 4],
+        coefficients: &[[c64; 4]],
+        q: Complex3,
+    ) -> [Complex3; 4] {
+        // δB = (∇v) B − (div v) B with v = λ_k d.
+        let b = self.field(cell, lambda, coefficients).flux_density;
+        let along = dot3(q, b);
+        cell.tet.gradients.map(|g| {
+            let through: c64 = (0..3).map(|i| g[i] * b[i]).sum();
+            std::array::from_fn(|d| q[d] * through - g[d] * along)
+        })
     }
 
     fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint {

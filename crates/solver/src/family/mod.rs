@@ -129,6 +129,14 @@ pub(crate) trait Family: Sync {
     fn each_curl(&self, cell: &Cell, rule: Rule, each: &mut EachCurl<'_>);
     /// The field at such a point.
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint;
+    /// `∂/∂x_k (q·B)` at such a point, which moves with the element, shape `(4, 3)`; the coefficients are held.
+    fn flux_change(
+        &self,
+        cell: &Cell,
+        lambda: &[f64; 4],
+        coefficients: &[[c64; 4]],
+        q: Complex3,
+    ) -> [Complex3; 4];
     /// The field at a vertex, by its place in the mesh's order.
     fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint;
     /// The field at the centroid.

@@ -15,7 +15,7 @@ use crate::element::tabulated::{Rule, Tabulated};
 use crate::element::tensor::CurlsOfRule;
 use crate::element::virtual_work;
 use crate::element::volume::{AphiTet, Coefficients, NodalField};
-use crate::element::{Complex3, impedance, interface};
+use crate::element::{Complex3, cross3, impedance, interface};
 use crate::surface::{SurfaceMatrix, SurfaceTerm};
 
 /// Elements with `N` nodes on a tetrahedron and `F` on a face.
@@ -81,6 +81,20 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
 
     fn field(&self, cell: &Cell, lambda: &[f64; 4], coefficients: &[[c64; 4]]) -> FieldPoint {
         PointField::new(self.tet, &cell.tet, lambda, &nodal(coefficients)).into()
+    }
+
+    fn flux_change(
+        &self,
+        cell: &Cell,
+        lambda: &[f64; 4],
+        coefficients: &[[c64; 4]],
+        q: Complex3,
+    ) -> [Complex3; 4] {
+        // δ(∂_i A_j) = −∂_i λ_k ∂_d A_j, hence q·δB = −∇λ_k · (∂_d A × q).
+        let turned = PointField::new(self.tet, &cell.tet, lambda, &nodal(coefficients))
+            .gradient
+            .map(|row| cross3(row, q));
+        cell.tet.gradients.map(|g| turned.map(|row| -(0..3).map(|i| g[i] * row[i]).sum::<c64>()))
     }
 
     fn at_vertex(&self, cell: &Cell, vertex: usize, coefficients: &[[c64; 4]]) -> FieldPoint {

@@ -41,7 +41,7 @@ fn of_observation(
 ) -> Vec<(ElementId, f64)> {
     let Some(deviation) = observation.deviation_of(model, mesh, solution) else { return Vec::new() };
     let at = |e| (e, deviation(solution.at(model, mesh, e, &MIDDLE).flux_density));
-    observation.elements().map(at).collect()
+    observation.elements_on(model, mesh).into_iter().map(at).collect()
 }
 
 fn of_expansion(

@@ -114,6 +114,17 @@ impl<'a> Spread<'a> {
         (variance, derivatives.collect())
     }
 
+    /// Derivatives of `F` by the weights: `(|b_k − b̄|² − F (|b̄|² + 2 Re b̄·conj(b_k − b̄))) / (Σ w · |b̄|²)`.
+    pub(super) fn variance_by_weights(&self) -> Vec<f64> {
+        let (variance, square) = (self.variance(), norm_sqr(&self.mean));
+        let of = |b: &Complex3| {
+            let deviation = self.deviation(b);
+            let along: f64 = (0..3).map(|d| (self.mean[d].conj() * deviation[d]).re).sum();
+            (norm_sqr(&deviation) - variance * (square + 2.0 * along)) / (self.weight * square)
+        };
+        self.compared.iter().map(of).collect()
+    }
+
     /// The figures.
     pub(super) fn quality(&self) -> FieldQuality {
         let square = norm_sqr(&self.mean);

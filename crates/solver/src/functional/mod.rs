@@ -2,7 +2,7 @@
 //!
 //! `dF/dx = explicit − 2 Re( λᵀ (∂K/∂x u − ∂f/∂x) )` with `K λ = ∂F/∂u`: [`FunctionalValue::derivative`] is the right
 //! side of the adjoint problem, [`FunctionalValue::explicit`] the first term, and [`crate::adjoint`] the second.
-//! `observation` holds what is a function of B in cells that do not move, `homogeneity` its deviation from its own mean,
+//! `observation` holds what is a function of B in cells, `homogeneity` its deviation from its own mean,
 //! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body, `terminal` what is a
 //! function of current and flux linkage of a coil, `inductance` what is one of the inductances, `multipole` what is one of terms of
 //! an expansion, `deviation` where the field misses what a quality asks for. Weighted sums, bounds and several frequencies are the optimiser's business.
@@ -29,13 +29,13 @@ pub use homogeneity::{Compared, FieldQuality};
 pub use inductance::{InductanceFunctional, Inductive};
 pub use integral::Integral;
 pub use multipole::{MirrorPlane, MultipoleFunctional, Multipoles, OfTerms};
-pub use observation::{Observation, Observed, Weighting};
+pub use observation::{Follow, Observation, Observed, Weighting};
 pub use terminal::{AtTerminals, TerminalFunctional};
 
 /// A real quantity of one field solution.
 #[derive(Clone, Debug)]
 pub enum Functional {
-    /// A function of B in cells that do not move.
+    /// A function of B in cells.
     Observation(Observation),
     /// An integral over elements or an impedance surface, which may move.
     Integral(Integral),
@@ -64,12 +64,17 @@ pub struct FunctionalValue {
 }
 
 impl Functional {
-    /// A function of B on the cells of a region.
+    /// A function of B on the cells of a region; the mesh is the one at the start.
     ///
     /// # Errors
     /// [`SolverError::EmptyRegion`].
-    pub fn observation(mesh: &Mesh, region: RegionId, observed: Observed) -> Result<Self, SolverError> {
-        Ok(Self::Observation(Observation::new(mesh, region, observed)?))
+    pub fn observation(
+        mesh: &Mesh,
+        region: RegionId,
+        observed: Observed,
+        follow: Follow,
+    ) -> Result<Self, SolverError> {
+        Ok(Self::Observation(Observation::new(mesh, region, observed, follow)?))
     }
 
     /// The eddy-current loss [W] of a conductor, by the name of its region: meshed, or replaced by its surface.
@@ -142,8 +147,20 @@ impl Functional {
             Self::Multipole(multipole) => (None, Some(multipole.as_ref())),
             _ => (None, None),
         };
-        let observed = observation.into_iter().flat_map(Observation::elements);
+        let observed = observation.into_iter().flat_map(Observation::held_elements);
         observed.chain(multipole.into_iter().flat_map(MultipoleFunctional::elements))
+    }
+
+    /// Whether what moves has left the observed places as they were; nothing where none stays while the mesh moves.
+    ///
+    /// # Errors
+    /// [`SolverError::Covered`] for a place that is reached.
+    pub fn check_places(&self, model: &FieldModel, mesh: &Mesh) -> Result<(), SolverError> {
+        match self {
+            Self::Observation(observation) => observation.check_places(model, mesh),
+            Self::Multipole(multipole) => multipole.check_places(model, mesh),
+            _ => Ok(()),
+        }
     }
 
     /// Mean flux density [T] of every observation cell, shape `(n_cells, 3)`; empty for an integral.
@@ -175,7 +192,7 @@ impl Functional {
     /// `F` and its derivatives on a solution of `model` on `mesh`.
     ///
     /// # Errors
-    /// [`SolverError::NotFinite`]; [`SolverError::Parameter`] where the state lacks a response of [`Functional::windings`].
+    /// [`SolverError::NotFinite`]; [`SolverError::Covered`]; [`SolverError::Parameter`] where the state lacks a response of [`Functional::windings`].
     pub fn evaluate(
         &self,
         model: &FieldModel,
@@ -183,12 +200,12 @@ impl Functional {
         solution: &FieldSolution,
     ) -> Result<FunctionalValue, SolverError> {
         let result = match self {
-            Self::Observation(observation) => observation.evaluate(model, mesh, solution),
+            Self::Observation(observation) => observation.evaluate(model, mesh, solution)?,
             Self::Integral(integral) => integral.evaluate(model, mesh, solution),
             Self::Force(force) => force.evaluate(model, mesh, solution),
             Self::Terminal(terminal) => terminal.evaluate(model, mesh, solution),
             Self::Inductance(inductance) => inductance.evaluate(model, solution)?,
-            Self::Multipole(multipole) => multipole.evaluate(model, mesh, solution),
+            Self::Multipole(multipole) => multipole.evaluate(model, mesh, solution)?,
         };
         if !result.value.is_finite() {
             return Err(SolverError::NotFinite { what: "objective", value: result.value });

@@ -1,6 +1,7 @@
 //! Functions of the terms of an expansion of B around an axis or a point that does not move.
 //!
-//! The field at the points is the recovered one, linear in the potentials; a point beyond a symmetry plane has the field of its
+//! The field at the points is the recovered one, linear in the potentials; where the mesh moves through them the one that is
+//! continuous then ([`crate::recovery::FixedPlaces`]). A point beyond a symmetry plane has the field of its
 //! image. On a flux-parallel plane B has no component across it, on a flux-normal one none along it: mirrored, that component
 //! changes its sign.
 
@@ -9,11 +10,12 @@ use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh};
 
-use super::FunctionalValue;
+use super::{Follow, FunctionalValue};
+use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
-use crate::recovery::RecoveredPoint;
+use crate::recovery::{BlendedPoint, FixedPlaces, RecoveredPoint};
 use crate::solution::FieldSolution;
 
 /// A symmetry plane at right angles to an axis.
@@ -30,10 +32,43 @@ pub struct MirrorPlane {
 /// The terms of an expansion as linear functions of the field of a model.
 #[derive(Clone, Debug)]
 pub struct Multipoles {
-    places: Vec<RecoveredPoint>,
+    places: Places,
     /// Weights as of [`Expansion::terms`], of the fields at the images.
     terms: Vec<(Harmonic, Vec<Point>)>,
     domain: Domain,
+}
+
+/// Where the field is taken.
+#[derive(Clone, Debug)]
+enum Places {
+    /// In elements that do not move.
+    Held(Vec<RecoveredPoint>),
+    /// In whatever elements are there.
+    InSpace(FixedPlaces),
+}
+
+/// What gives the field at one of them on a mesh.
+enum At<'a> {
+    Held(&'a RecoveredPoint),
+    InSpace(BlendedPoint),
+}
+
+impl Places {
+    fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<At<'_>>, SolverError> {
+        Ok(match self {
+            Self::Held(points) => points.iter().map(At::Held).collect(),
+            Self::InSpace(places) => places.on(model, mesh)?.into_iter().map(At::InSpace).collect(),
+        })
+    }
+}
+
+impl At<'_> {
+    fn flux_density(&self, state: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+        match self {
+            Self::Held(point) => point.flux_density(state, model, mesh),
+            Self::InSpace(point) => point.flux_density(state, model, mesh),
+        }
+    }
 }
 
 /// The main terms of an expansion with their coefficients in a field.
@@ -75,7 +110,8 @@ pub struct MultipoleFunctional {
 }
 
 impl Multipoles {
-    /// Of an expansion with its name; points outside the mesh are sought beyond the planes.
+    /// Of an expansion with its name, in elements that do not move or (`Follow::Space`) while the mesh moves through its points;
+    /// points outside the mesh are sought beyond the planes.
     ///
     /// # Errors
     /// [`SolverError::ProbeOutside`] for the first point that no element holds, and no element the image of.
@@ -84,7 +120,7 @@ impl Multipoles {
         mesh: &Mesh,
         name: &str,
         expansion: &Expansion,
-        planes: &[MirrorPlane],
+        (planes, follow): (&[MirrorPlane], Follow),
     ) -> Result<Self, SolverError> {
         // All combinations of planes, the points themselves first.
         let images = |x: Point| -> Vec<(Point, Point)> {
@@ -113,7 +149,7 @@ impl Multipoles {
                 let (probe, point) = (name.to_owned(), expansion.points[k]);
                 return Err(SolverError::ProbeOutside { probe, point, lower, upper });
             };
-            places.push(RecoveredPoint::new(model, mesh, element, own[image].0));
+            places.push((own[image].0, element));
             factors.push(own[image].1);
         }
         let mirrored = |weights: &[Point]| -> Vec<Point> {
@@ -121,22 +157,42 @@ impl Multipoles {
             weights.iter().zip(&factors).map(of).collect()
         };
         let terms = expansion.terms.iter().map(|(term, weights)| (*term, mirrored(weights))).collect();
+        let recovered = |&(x, e): &(Point, ElementId)| RecoveredPoint::new(model, mesh, e, x);
+        let places = match follow {
+            Follow::Space(order) => Places::InSpace(FixedPlaces::new(mesh, order, places)),
+            Follow::Held | Follow::Mesh => Places::Held(places.iter().map(recovered).collect()),
+        };
         Ok(Self { places, terms, domain: expansion.domain })
     }
 
-    /// Elements that take part: these must not move.
+    /// Elements that must not move.
     pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.places.iter().flat_map(RecoveredPoint::elements)
+        let held = match &self.places {
+            Places::Held(points) => points.as_slice(),
+            Places::InSpace(_) => &[],
+        };
+        held.iter().flat_map(RecoveredPoint::elements)
     }
 
     /// The coefficients [T] of a field.
+    ///
+    /// # Errors
+    /// [`SolverError::Covered`] for a place that something which moves has reached.
     pub fn coefficients(
         &self,
         model: &FieldModel,
         mesh: &Mesh,
         state: &FieldSolution,
+    ) -> Result<Vec<(Harmonic, c64)>, SolverError> {
+        Ok(self.coefficients_at(&self.places.on(model, mesh)?, (state, model, mesh)))
+    }
+
+    fn coefficients_at(
+        &self,
+        places: &[At<'_>],
+        (state, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
     ) -> Vec<(Harmonic, c64)> {
-        let fields: Vec<_> = self.places.iter().map(|place| place.flux_density(state, model, mesh)).collect();
+        let fields: Vec<_> = places.iter().map(|place| place.flux_density(state, model, mesh)).collect();
         let sum = |weights: &[Point]| -> c64 {
             let dot = |(w, b): (&Point, &[c64; 3])| (0..3).map(|d| w[d] * b[d]).sum::<c64>();
             weights.iter().zip(&fields).map(dot).sum()
@@ -174,23 +230,43 @@ impl MultipoleFunctional {
         state: &FieldSolution,
     ) -> Option<MainField> {
         let OfTerms::Content { main, .. } = &self.of else { return None };
-        let mut terms = self.multipoles.coefficients(model, mesh, state);
+        let mut terms = self.multipoles.coefficients(model, mesh, state).ok()?;
         terms.retain(|(term, _)| main.contains(term));
         Some(MainField { domain: self.multipoles.domain, terms })
     }
 
-    pub(super) fn evaluate(&self, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> FunctionalValue {
-        let coefficients = self.multipoles.coefficients(model, mesh, state);
+    pub(super) fn check_places(&self, model: &FieldModel, mesh: &Mesh) -> Result<(), SolverError> {
+        match &self.multipoles.places {
+            Places::InSpace(places) => places.locate(model, mesh).map(|_| ()),
+            Places::Held(_) => Ok(()),
+        }
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        state: &FieldSolution,
+    ) -> Result<FunctionalValue, SolverError> {
+        let places = self.multipoles.places.on(model, mesh)?;
+        let coefficients = self.multipoles.coefficients_at(&places, (state, model, mesh));
         let (value, slopes) = self.value(&coefficients, model.angular_frequency());
         let mut derivative = vec![c64::default(); model.unknown_count()];
-        for (k, place) in self.multipoles.places.iter().enumerate() {
+        let mut explicit: Option<Vec<Point>> = None;
+        for (k, place) in places.iter().enumerate() {
             let mut q = [c64::default(); 3];
             for ((_, weights), slope) in self.multipoles.terms.iter().zip(&slopes) {
                 (0..3).for_each(|d| q[d] += slope * weights[k][d]);
             }
-            place.add_derivative(q, model, mesh, &mut derivative);
+            match place {
+                At::Held(point) => point.add_derivative(q, model, mesh, &mut derivative),
+                At::InSpace(point) => {
+                    let by_positions = explicit.get_or_insert_with(|| vec![[0.0; 3]; mesh.points().len()]);
+                    point.add_derivatives(q, (state, model, mesh), (&mut derivative, by_positions));
+                }
+            }
         }
-        FunctionalValue { value, derivative, ..Default::default() }
+        Ok(FunctionalValue { value, derivative, explicit, ..Default::default() })
     }
 
     /// The value, and its derivative `s` by every coefficient: `dF = 2 Re Σ s dc`.

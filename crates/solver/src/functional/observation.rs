@@ -1,20 +1,26 @@
-//! Functions of the flux density in observation cells that do not move with the design.
+//! Functions of the flux density in observation cells.
 //!
-//! The driver refuses an observation region inside the remesh region, so these depend on the node positions through
-//! the field alone.
+//! Cells that do not move depend on the node positions through the field alone. Those that move with the mesh have an explicit
+//! derivative: of `B` at a point of an element, of the elements' shares of a cell's mean and of volumes as weights. Where the
+//! cells' places at the start are kept instead ([`Follow::Space`]), so are their weights, and the field is the one that is
+//! continuous as the mesh moves through them ([`crate::recovery::FixedPlaces`]).
+
+use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use rayon::prelude::*;
 
 use super::FunctionalValue;
 use super::deviation::length;
 use super::homogeneity::{Compared, FieldQuality, Spread};
-use crate::element::Complex3;
 use crate::element::quadrature::{self, Node};
+use crate::element::{Complex3, dot3};
 use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
+use crate::recovery::{BlendedPoint, FixedPlaces, scatter_flux};
 use crate::solution::FieldSolution;
 
 /// How observation cells are weighted.
@@ -51,11 +57,42 @@ pub enum Observed {
     },
 }
 
+/// What cells do where the mesh may move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Follow {
+    /// Nothing: none of their nodes moves.
+    Held,
+    /// They move with it.
+    Mesh,
+    /// They stay, and the mesh moves through them; the field is recovered for elements of this order.
+    Space(Order),
+}
+
 /// A function of the mean flux densities `B_k` of cells.
 #[derive(Clone, Debug)]
 pub struct Observation {
     cells: Vec<Vec<ElementId>>,
     observed: Observed,
+    follow: Follow,
+    fixed: Option<FixedCells>,
+}
+
+/// Cells that stay: means over places in them.
+#[derive(Clone, Debug)]
+struct FixedCells {
+    places: FixedPlaces,
+    /// Number of places, and share of each in the mean; volume [m³].
+    samples: Vec<(Vec<(usize, f64)>, f64)>,
+}
+
+/// `B` [T] of a cell, or at a point of each of its elements, and the volume [m³] that it stands for.
+type Sample = (Complex3, f64);
+
+/// A function of samples: its value, and its derivatives by every `B` (`dF = 2 Re(q·dB)`) and every volume.
+struct OfSamples {
+    value: f64,
+    by_b: Vec<Complex3>,
+    by_volume: Vec<f64>,
 }
 
 impl Observation {
@@ -63,7 +100,12 @@ impl Observation {
     ///
     /// # Errors
     /// [`SolverError::EmptyRegion`].
-    pub fn new(mesh: &Mesh, region: RegionId, observed: Observed) -> Result<Self, SolverError> {
+    pub fn new(
+        mesh: &Mesh,
+        region: RegionId,
+        observed: Observed,
+        follow: Follow,
+    ) -> Result<Self, SolverError> {
         let topology = mesh.topology();
         let elements = topology.elements_of(region);
         if elements.is_empty() {
@@ -81,12 +123,37 @@ impl Observation {
                 }
             }
         };
-        Ok(Self { cells, observed })
+        let fixed = match follow {
+            Follow::Space(order) => Some(FixedCells::new(mesh, &cells, (observed, order))),
+            Follow::Held | Follow::Mesh => None,
+        };
+        Ok(Self { cells, observed, follow, fixed })
     }
 
-    /// Elements that take part.
+    /// Elements of the region.
     pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.cells.iter().flatten().copied()
+    }
+
+    /// Elements that must not move.
+    pub(super) fn held_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
+        self.elements().filter(|_| self.follow == Follow::Held)
+    }
+
+    /// Elements in which the field is observed on a mesh, each once.
+    pub(super) fn elements_on(&self, model: &FieldModel, mesh: &Mesh) -> Vec<ElementId> {
+        let Some(fixed) = &self.fixed else { return self.elements().collect() };
+        let located = fixed.places.locate(model, mesh).unwrap_or_default();
+        let holders: BTreeSet<ElementId> = located.into_iter().map(|(e, _)| e).collect();
+        holders.into_iter().collect()
+    }
+
+    /// Whether what moves has left the observed places as they were.
+    ///
+    /// # Errors
+    /// [`SolverError::Covered`].
+    pub(super) fn check_places(&self, model: &FieldModel, mesh: &Mesh) -> Result<(), SolverError> {
+        self.fixed.as_ref().map_or(Ok(()), |fixed| fixed.places.locate(model, mesh).map(|_| ()))
     }
 
     /// Mean flux density of every cell [T], shape `(n_cells, 3)`.
@@ -104,30 +171,63 @@ impl Observation {
         model: &FieldModel,
         mesh: &Mesh,
         solution: &FieldSolution,
-    ) -> FunctionalValue {
+    ) -> Result<FunctionalValue, SolverError> {
         let mut derivative = vec![c64::default(); model.unknown_count()];
-        let samples = self.samples(model, mesh, solution);
-        let (value, by_b) = match self.observed {
-            Observed::Homogeneity { of, weighting } => {
-                Spread::new(&weighted(&samples, weighting), of).variance_with_derivatives()
+        let nodes = mesh.points().len();
+        let mut explicit = (self.follow != Follow::Held).then(|| vec![[0.0; 3]; nodes]);
+        let field = (solution, model, mesh);
+        let value = match (&self.fixed, &mut explicit) {
+            (Some(fixed), Some(explicit)) => {
+                let points = fixed.places.on(model, mesh)?;
+                let of = self.of_samples(&fixed.samples_at(&points, field), model.angular_frequency());
+                for ((parts, _), by_b) in fixed.samples.iter().zip(&of.by_b) {
+                    for &(place, share) in parts {
+                        let own = by_b.map(|c| share * c);
+                        points[place].add_derivatives(own, field, (&mut derivative, explicit));
+                    }
+                }
+                of.value
             }
-            _ => self.sum(&samples, model.angular_frequency()),
+            (_, explicit) => self.differentiate(field, &mut derivative, explicit.as_deref_mut()),
         };
-        let places =
-            self.cells.iter().flat_map(|c| self.rule(model.space().order()).iter().map(move |q| (c, q)));
-        for (((cell, (lambda, share)), (_, volume)), by_b) in places.zip(&samples).zip(by_b) {
-            let by_b = by_b.map(|c| c / *volume);
+        Ok(FunctionalValue { value, derivative, explicit, ..Default::default() })
+    }
+
+    /// The value in cells of the mesh, with its derivatives added to those by potentials and by positions.
+    fn differentiate(
+        &self,
+        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+        derivative: &mut [c64],
+        mut explicit: Option<&mut [Point]>,
+    ) -> f64 {
+        let samples = self.samples_of_cells(model, mesh, solution);
+        let of = self.of_samples(&samples, model.angular_frequency());
+        let rule = self.rule(model.space().order());
+        let places = self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q)));
+        for (k, (cell, (lambda, share))) in places.enumerate() {
+            let (b, volume) = samples[k];
+            let by_b = of.by_b[k].map(|c| c / volume);
             for &e in cell {
-                let cell = model.space().cell(mesh, e);
-                let carriers = model.space().carriers_of(e);
-                model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
-                    let mut local = [c64::default(); 4];
-                    local[component] = (0..3).map(|d| by_b[d] * (share * cell.tet.volume * curl[d])).sum();
-                    model.unknowns().scatter_add(&mut derivative, carriers[carrier], local);
-                });
+                let part = share * volume_of(mesh.vertices(e));
+                let q = by_b.map(|c| part * c);
+                scatter_flux((model, mesh), (e, lambda), q, derivative);
+                let Some(explicit) = explicit.as_deref_mut() else { continue };
+                let (space, field) = (model.space(), solution.element(model, e));
+                let geometry = space.cell(mesh, e);
+                let changes = space.elements().flux_change(&geometry, lambda, field.values(), q);
+                let own = solution.at(model, mesh, e, lambda).flux_density;
+                let more: Complex3 = std::array::from_fn(|d| own[d] - b[d]);
+                // δV = V ∇λ_k·v: the element's share of the mean, and what the sample stands for.
+                let by_growth = 2.0 * dot3(q, more).re + part * of.by_volume[k];
+                for (a, node) in model.topology().tet(e).iter().enumerate() {
+                    for d in 0..3 {
+                        explicit[node.index()][d] +=
+                            2.0 * changes[a][d].re + by_growth * geometry.tet.gradients[a][d];
+                    }
+                }
             }
         }
-        FunctionalValue { value, derivative, ..Default::default() }
+        of.value
     }
 
     /// Where `B` is taken in each element of a cell.
@@ -143,21 +243,49 @@ impl Observation {
         }
     }
 
-    /// `B` [T] and the volume [m³] that it stands for, of every cell at every point of the rule.
-    fn samples(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(Complex3, f64)> {
+    /// The samples: of every cell at every point of the rule, or of cells that stay.
+    ///
+    /// # Errors
+    /// [`SolverError::Covered`].
+    fn samples(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        solution: &FieldSolution,
+    ) -> Result<Vec<Sample>, SolverError> {
+        let Some(fixed) = &self.fixed else { return Ok(self.samples_of_cells(model, mesh, solution)) };
+        Ok(fixed.samples_at(&fixed.places.on(model, mesh)?, (solution, model, mesh)))
+    }
+
+    fn samples_of_cells(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<Sample> {
         let rule = self.rule(model.space().order());
         let at =
             |cell| rule.iter().map(move |(lambda, share)| mean(cell, lambda, *share, model, mesh, solution));
         self.cells.iter().flat_map(|cell| at(cell)).collect()
     }
 
-    /// The sum of the terms of all samples, and the derivative of each.
-    fn sum(&self, samples: &[(Complex3, f64)], angular_frequency: f64) -> (f64, Vec<Complex3>) {
-        let terms = samples.iter().map(|&(b, volume)| self.term(b, volume, angular_frequency));
-        terms.fold((0.0, Vec::new()), |(sum, mut all), (term, by_b)| {
-            all.push(by_b);
-            (sum + term, all)
-        })
+    /// The value of samples, and its derivatives.
+    fn of_samples(&self, samples: &[Sample], angular_frequency: f64) -> OfSamples {
+        if let Observed::Homogeneity { of, weighting } = self.observed {
+            let weighted = weighted(samples, weighting);
+            let spread = Spread::new(&weighted, of);
+            let (value, by_b) = spread.variance_with_derivatives();
+            let by_volume = match weighting {
+                Weighting::Volume => spread.variance_by_weights(),
+                Weighting::Point => vec![0.0; samples.len()],
+            };
+            return OfSamples { value, by_b, by_volume };
+        }
+        let mut sum = OfSamples { value: 0.0, by_b: Vec::new(), by_volume: Vec::new() };
+        for &(b, volume) in samples {
+            let (term, by_b) = self.term(b, volume, angular_frequency);
+            sum.value += term;
+            sum.by_b.push(by_b);
+            let is_integral =
+                matches!(self.observed, Observed::Deviation { weighting: Weighting::Volume, .. });
+            sum.by_volume.push(if is_integral { term / volume } else { 0.0 });
+        }
+        sum
     }
 
     /// How homogeneous the field is, where that is what is observed.
@@ -168,7 +296,8 @@ impl Observation {
         solution: &FieldSolution,
     ) -> Option<FieldQuality> {
         let Observed::Homogeneity { of, weighting } = self.observed else { return None };
-        Some(Spread::new(&weighted(&self.samples(model, mesh, solution), weighting), of).quality())
+        let samples = self.samples(model, mesh, solution).ok()?;
+        Some(Spread::new(&weighted(&samples, weighting), of).quality())
     }
 
     /// What a flux density [T] misses of what is asked for [T], where a quality of the field is.
@@ -183,7 +312,7 @@ impl Observation {
                 (Compared::Vector, target.map(c64::from))
             }
             Observed::Homogeneity { of, weighting } => {
-                let samples = weighted(&self.samples(model, mesh, solution), weighting);
+                let samples = weighted(&self.samples(model, mesh, solution).ok()?, weighting);
                 (of, Spread::new(&samples, of).mean())
             }
             Observed::Deviation { .. } | Observed::Component { .. } => return None,
@@ -224,6 +353,54 @@ impl Observation {
                 (value, direction.map(|d| 0.5 * d * phase))
             }
         }
+    }
+}
+
+impl FixedCells {
+    /// The places of cells at the start: the points of a rule in each element.
+    fn new(mesh: &Mesh, cells: &[Vec<ElementId>], (observed, order): (Observed, Order)) -> Self {
+        let is_by_cell = matches!(
+            observed,
+            Observed::Deviation { weighting: Weighting::Point, .. }
+                | Observed::Homogeneity { weighting: Weighting::Point, .. }
+        );
+        // The field that is recovered is linear where the elements are of first order: its square wants the degree 2.
+        let rule = if is_by_cell { &[([0.25; 4], 1.0)][..] } else { quadrature::degree_2() };
+        let is_one = is_by_cell || matches!(observed, Observed::Component { .. });
+        let (mut places, mut samples) = (Vec::new(), Vec::new());
+        for cell in cells {
+            let mut parts: Vec<(usize, f64)> = Vec::new();
+            for &e in cell {
+                let (vertices, volume) = (mesh.vertices(e), volume_of(mesh.vertices(e)));
+                for (lambda, share) in rule {
+                    let place = |d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>();
+                    parts.push((places.len(), share * volume));
+                    places.push((std::array::from_fn(place), e));
+                }
+            }
+            let groups =
+                if is_one { vec![parts] } else { parts.into_iter().map(|part| vec![part]).collect() };
+            samples.extend(groups.into_iter().map(|mut parts| {
+                let volume: f64 = parts.iter().map(|(_, own)| own).sum();
+                parts.iter_mut().for_each(|(_, own)| *own /= volume);
+                (parts, volume)
+            }));
+        }
+        Self { places: FixedPlaces::new(mesh, order, places), samples }
+    }
+
+    fn samples_at(
+        &self,
+        points: &[BlendedPoint],
+        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+    ) -> Vec<Sample> {
+        let fields: Vec<Complex3> =
+            points.par_iter().map(|point| point.flux_density(solution, model, mesh)).collect();
+        let mean = |(parts, volume): &(Vec<(usize, f64)>, f64)| {
+            let b = |d| parts.iter().map(|&(place, share)| share * fields[place][d]).sum();
+            (std::array::from_fn(b), *volume)
+        };
+        self.samples.iter().map(mean).collect()
     }
 }
 

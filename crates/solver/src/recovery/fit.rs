@@ -1,5 +1,6 @@
 //! A polynomial fitted to values at points, as weights of these values.
 
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 
 /// Exponents of `x, y, z` in the monomials up to a degree: the constant, the coordinates, then the higher ones.
@@ -22,9 +23,11 @@ const DEPENDENT: f64 = 1e-3;
 /// The polynomial of a degree fitted to values at points, at the origin.
 ///
 /// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), coordinates
-/// scaled to the extent of the points in each direction; the weight `exp(−|ξ|²)` in these coordinates lets the nearest
-/// nodes count most.
+/// scaled to the extent of the points in each direction.
 pub(super) struct Fit {
+    monomials: Vec<[i32; 3]>,
+    /// The points in the scaled coordinates.
+    points: Vec<Point>,
     /// Orthonormal columns, one a monomial, of weighted values.
     columns: Vec<Vec<f64>>,
     /// The upper triangle.
@@ -36,8 +39,18 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    /// `None` where the points do not determine the polynomial.
+    /// With the weight `exp(−|ξ|²)` in the scaled coordinates, that lets the nearest points count most; `None` where the points do
+    /// not determine the polynomial.
     pub(super) fn new(degree: usize, points: &[Point]) -> Option<Self> {
+        Self::weighted(degree, points, |square| (-square).exp())
+    }
+
+    /// All points count alike: a smooth function of their places, whatever the scale. `None` as above.
+    pub(super) fn even(degree: usize, points: &[Point]) -> Option<Self> {
+        Self::weighted(degree, points, |_| 1.0)
+    }
+
+    fn weighted(degree: usize, points: &[Point], weight: impl Fn(f64) -> f64) -> Option<Self> {
         let monomials = monomials(degree);
         let terms = monomials.len();
         if points.len() < terms {
@@ -46,9 +59,11 @@ impl Fit {
         let scale: Point = std::array::from_fn(|d| points.iter().map(|p| p[d].abs()).fold(0.0, f64::max));
         let mut columns = vec![Vec::with_capacity(points.len()); terms];
         let mut weights = Vec::with_capacity(points.len());
-        for p in points {
-            let [x, y, z]: Point = std::array::from_fn(|d| p[d] / scale[d]);
-            let weight = (-(x * x + y * y + z * z)).exp();
+        // A single monomial does not need an extent.
+        let scaled = |p: &Point| std::array::from_fn(|d| if scale[d] > 0.0 { p[d] / scale[d] } else { 0.0 });
+        let scaled: Vec<Point> = points.iter().map(scaled).collect();
+        for &[x, y, z] in &scaled {
+            let weight = weight(x * x + y * y + z * z);
             for (column, &[i, j, k]) in columns.iter_mut().zip(&monomials) {
                 column.push(weight * x.powi(i) * y.powi(j) * z.powi(k));
             }
@@ -67,7 +82,6 @@ impl Fit {
                 }
             }
             let length = product(column, column).sqrt();
-            // A direction without extent makes the length not a number.
             if length.is_nan() || length <= DEPENDENT * before {
                 return None;
             }
@@ -76,7 +90,7 @@ impl Fit {
                 *c /= length;
             }
         }
-        Some(Self { columns, upper, weights, scale })
+        Some(Self { monomials, points: scaled, columns, upper, weights, scale })
     }
 
     /// Weights of the values in the polynomial's value.
@@ -91,17 +105,57 @@ impl Fit {
         x.iter().zip(&y).zip(&z).map(|((x, y), z)| [x / a, y / b, z / c]).collect()
     }
 
+    /// Derivatives of the value of an even fit by the places of its points [unit of the values per m], the values held.
+    ///
+    /// With `M` the monomials at the points, `c = (MᵀM)⁻¹Mᵀv`, `y = (MᵀM)⁻¹e` and the weights `w = My` of the values, moving point
+    /// `i` changes `eᵀc` by `(y·δm_i)(v_i − m_i·c) − w_i (δm_i·c)`.
+    pub(super) fn value_by_points(&self, weights: &[f64], values: &[c64]) -> Vec<[c64; 3]> {
+        let terms = self.columns.len();
+        let projected = self.columns.iter().map(|q| q.iter().zip(values).map(|(q, v)| q * v).sum::<c64>());
+        let coefficients = self.from_the_bottom(projected.collect());
+        let unit = self.from_the_top(0).into_iter().map(c64::from).collect();
+        let dual = self.from_the_bottom(unit);
+        let at = |(p, (&w, v)): (&Point, (&f64, &c64))| -> [c64; 3] {
+            let value = |[i, j, k]: [i32; 3]| p[0].powi(i) * p[1].powi(j) * p[2].powi(k);
+            let fitted: c64 = (0..terms).map(|t| value(self.monomials[t]) * coefficients[t]).sum();
+            std::array::from_fn(|d| {
+                let slope = |mut exponents: [i32; 3]| {
+                    let power = exponents[d];
+                    exponents[d] = (power - 1).max(0);
+                    if power == 0 { 0.0 } else { f64::from(power) * value(exponents) / self.scale[d] }
+                };
+                let along = |of: &[c64]| (0..terms).map(|t| slope(self.monomials[t]) * of[t]).sum::<c64>();
+                along(&dual) * (v - fitted) - w * along(&coefficients)
+            })
+        };
+        self.points.iter().zip(weights.iter().zip(values)).map(at).collect()
+    }
+
+    /// The solution of `Ry = b`.
+    fn from_the_bottom(&self, mut b: Vec<c64>) -> Vec<c64> {
+        for k in (0..b.len()).rev() {
+            let known: c64 = (k + 1..b.len()).map(|j| self.upper[k][j] * b[j]).sum();
+            b[k] = (b[k] - known) / self.upper[k][k];
+        }
+        b
+    }
+
     /// Weights of the values in the coefficient of a monomial: the row of `R⁻¹ Qᵀ W`.
     fn coefficient(&self, of: usize) -> Vec<f64> {
-        // Rᵀ y = e: from the top.
+        let y = self.from_the_top(of);
+        let at = |i: usize| self.columns.iter().zip(&y).map(|(q, y)| q[i] * y).sum::<f64>();
+        (0..self.weights.len()).map(|i| self.weights[i] * at(i)).collect()
+    }
+
+    /// The solution of `Rᵀy = e` for a unit vector.
+    fn from_the_top(&self, of: usize) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(self.columns.len());
         for k in 0..self.columns.len() {
             let known: f64 = y.iter().enumerate().map(|(i, y)| self.upper[i][k] * y).sum();
             let unit = if k == of { 1.0 } else { 0.0 };
             y.push((unit - known) / self.upper[k][k]);
         }
-        let at = |i: usize| self.columns.iter().zip(&y).map(|(q, y)| q[i] * y).sum::<f64>();
-        (0..self.weights.len()).map(|i| self.weights[i] * at(i)).collect()
+        y
     }
 }
 
@@ -133,6 +187,36 @@ mod tests {
         }
         let value: f64 = fit.value().iter().zip(&points).map(|(w, &p)| w * quadratic(p)).sum();
         assert!((value - 0.4).abs() < 1e-13, "{value}");
+    }
+
+    #[test]
+    fn an_even_fit_has_the_derivatives_of_its_value_by_the_places_of_the_points() {
+        let place = |k: usize| [0.7, 1.9, 4.3].map(|a| 0.02 * (a * (k as f64 + 1.0)).sin());
+        let points: Vec<Point> = (0..30).map(place).collect();
+        let values: Vec<c64> =
+            (0..30).map(|k| c64::new((2.1 * k as f64).cos(), (0.4 * k as f64).sin())).collect();
+        for degree in 0..3 {
+            let value = |points: &[Point]| -> c64 {
+                let fit = Fit::even(degree, points).expect("30 points determine it");
+                fit.value().iter().zip(&values).map(|(w, v)| *w * v).sum()
+            };
+            let fit = Fit::even(degree, &points).expect("30 points determine it");
+            let exact = fit.value_by_points(&fit.value(), &values);
+            for (i, d) in [(0, 0), (7, 1), (29, 2)] {
+                let moved = |h: f64| {
+                    let mut points = points.clone();
+                    points[i][d] += h;
+                    value(&points)
+                };
+                // Steps of a few thousandths of the extent: of second order, and rounding.
+                let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                assert!(
+                    (difference - exact[i][d]).norm() < 1e-6,
+                    "{degree} {i}: {difference} {}",
+                    exact[i][d]
+                );
+            }
+        }
     }
 
     #[test]

@@ -13,13 +13,14 @@
 //! the points of elements where it is best (Zienkiewicz and Zhu, Int. J. Numer. Methods Eng. 33 (1992) 1331).
 
 mod fit;
+mod places;
 
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::{Point, sub};
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, Topology};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
@@ -30,6 +31,7 @@ use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 use fit::Fit;
+pub(crate) use places::{BlendedPoint, FixedPlaces};
 
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
@@ -58,22 +60,10 @@ enum Weights {
 impl RecoveredPoint {
     /// At a point of an element.
     pub fn new(model: &FieldModel, mesh: &Mesh, element: ElementId, point: Point) -> Self {
-        let topology = model.topology();
-        // A magnet's face is one even where its permeability is that of air, and that of open space is one of the map.
-        let material = |e: ElementId| {
-            let linear = model.materials()[topology.region_of()[e.index()].index()];
-            let is_open = model.form().stretch_of(e).is_some();
-            (linear, model.remanence_of(e), model.curve_of(e), is_open)
-        };
+        let is_alike = has_the_material_of(model, element);
         let mut elements = BTreeSet::from([element]);
         for _ in 0..LAYERS_LIMIT {
-            elements = elements
-                .iter()
-                .flat_map(|&e| topology.tet(e))
-                .flat_map(|n| topology.elements_around(n))
-                .copied()
-                .filter(|&e| material(e) == material(element))
-                .collect();
+            elements = around(model.topology(), &elements, &is_alike);
             let weights = match model.space().family() {
                 ElementFamily::Nodal => of_potentials(model, mesh, &elements, point),
                 ElementFamily::Edge => of_flux_densities(model, mesh, &elements, point),
@@ -136,16 +126,59 @@ impl RecoveredPoint {
             }
             Weights::FluxDensities(points) => {
                 for (e, lambda, weight) in points {
-                    let (cell, carriers) = (model.space().cell(mesh, *e), model.space().carriers_of(*e));
-                    model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
-                        let mut local = [c64::default(); 4];
-                        local[component] = (0..3).map(|d| q[d] * (*weight * curl[d])).sum();
-                        model.unknowns().scatter_add(derivative, carriers[carrier], local);
-                    });
+                    scatter_flux((model, mesh), (*e, lambda), q.map(|c| *weight * c), derivative);
                 }
             }
         }
     }
+}
+
+/// Whether elements have the material of one: a magnet's face is one even where its permeability is that of air, and that of open
+/// space is one of the map.
+fn has_the_material_of(model: &FieldModel, element: ElementId) -> impl Fn(ElementId) -> bool {
+    let topology = model.topology();
+    let material = move |e: ElementId| {
+        let linear = model.materials()[topology.region_of()[e.index()].index()];
+        let is_open = model.form().stretch_of(e).is_some();
+        (linear, model.remanence_of(e), model.curve_of(e), is_open)
+    };
+    let own = material(element);
+    move |e| material(e) == own
+}
+
+/// Some elements with all that share a vertex with one of them, those that count.
+fn around(
+    topology: &Topology,
+    elements: &BTreeSet<ElementId>,
+    counts: &impl Fn(ElementId) -> bool,
+) -> BTreeSet<ElementId> {
+    let vertices = elements.iter().flat_map(|&e| topology.tet(e));
+    let all = vertices.flat_map(|n| topology.elements_around(n)).copied();
+    all.filter(|&e| counts(e)).collect()
+}
+
+/// Points of elements of an order at which `B` is of one order better: the centroid, or the four of the rule of degree 2.
+fn super_convergent(order: Order, elements: &BTreeSet<ElementId>) -> Vec<(ElementId, &'static [f64; 4])> {
+    let rule: &'static [Node] = match order {
+        Order::Linear => Rule::Centroid.nodes(),
+        Order::Quadratic => Rule::Degree2.nodes(),
+    };
+    elements.iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda))).collect()
+}
+
+/// Adds `∂(q·B)/∂u` at a point of an element to a vector of unknowns.
+pub(crate) fn scatter_flux(
+    (model, mesh): (&FieldModel, &Mesh),
+    (e, lambda): (ElementId, &[f64; 4]),
+    q: Complex3,
+    derivative: &mut [c64],
+) {
+    let (cell, carriers) = (model.space().cell(mesh, e), model.space().carriers_of(e));
+    model.space().functions(&cell, lambda, &mut |carrier, component, _, curl| {
+        let mut local = [c64::default(); 4];
+        local[component] = (0..3).map(|d| q[d] * curl[d]).sum();
+        model.unknowns().scatter_add(derivative, carriers[carrier], local);
+    });
 }
 
 /// The recovered flux density [T] at a point of an element ([`RecoveredPoint`]).
@@ -174,7 +207,7 @@ fn of_potentials(
 }
 
 /// The value at a point of the polynomial fitted to the flux densities in some elements, taken where they are of one order
-/// better: at the centroid, or at the four points of the rule of degree 2.
+/// better.
 fn of_flux_densities(
     model: &FieldModel,
     mesh: &Mesh,
@@ -182,18 +215,11 @@ fn of_flux_densities(
     point: Point,
 ) -> Option<Weights> {
     let order = model.space().order();
-    let rule: &[Node] = match order {
-        Order::Linear => Rule::Centroid.nodes(),
-        Order::Quadratic => Rule::Degree2.nodes(),
-    };
-    let samples = || elements.iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda)));
-    let place = |(e, lambda): (ElementId, &[f64; 4])| -> Point {
-        let vertices = mesh.vertices(e);
-        std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>() - point[d])
-    };
-    let offsets: Vec<Point> = samples().map(place).collect();
-    let weights = Fit::new(order.degree(), &offsets)?.value();
-    Some(Weights::FluxDensities(samples().zip(weights).map(|((e, lambda), w)| (e, *lambda, w)).collect()))
+    let samples = super_convergent(order, elements);
+    let weights = Fit::new(order.degree(), &places::offsets(mesh, &samples, point))?.value();
+    Some(Weights::FluxDensities(
+        samples.into_iter().zip(weights).map(|((e, lambda), w)| (e, *lambda, w)).collect(),
+    ))
 }
 
 /// The recovered flux density [T] at the points of a probe.

@@ -283,6 +283,10 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
             let step = 1e-6;
             let (at, state, mut system) = solve(0.0);
             let sides = [solve(step), solve(-step)];
+            if elements.1 == Order::Linear {
+                // A model on a mesh that has moved, as an error estimate makes it, finds the conductor's walls connected still.
+                model.enriched(&sides[0].0, Effort::Any).expect("a sound problem");
+            }
             for functional in functionals {
                 let value = functional.evaluate(&model, &at, &state).expect("finite");
                 let mut gradient = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; direction.len()]);
@@ -347,7 +351,7 @@ fn the_error_of_a_bar_is_estimated() {
         let error = value(&of(Order::Quadratic)) - value(&coarse);
         let (state, _) = coarse.solve(&mesh).expect("a field");
         let fine = coarse.enriched(&mesh, Effort::Any).expect("a model");
-        let mut enriched = Enrichment::new(&coarse, fine, &mesh, &state).expect("a correction");
+        let mut enriched = Enrichment::new(&coarse, fine, (&mesh, &state), None).expect("a correction");
         let at = |enriched: &Enrichment, share: f64| {
             functional.evaluate(enriched.model(), &mesh, &enriched.state(share)).expect("finite")
         };

@@ -1,0 +1,205 @@
+//! Flux density at places that stay where they are while the mesh moves through them.
+//!
+//! `B(x) = Σ_a λ_a(x) P_a(x)` over the vertices of the element that holds `x`, with `P_a` the polynomial fitted to `B` in the
+//! elements around a vertex, of the degree of the elements: the blend of patches of Zienkiewicz and Zhu (Int. J. Numer. Methods
+//! Eng. 33 (1992) 1331). As a place passes into the next element, the weight of the vertex that it leaves behind is zero: the
+//! value is continuous in the positions of the nodes, and smooth while each place stays in its element; its derivative jumps there
+//! by what neighbouring patches differ in, of the order of the element's own error. Which elements a patch has follows from the
+//! topology and the mesh at the start, never from the design.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::{Located, locate};
+use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use rayon::prelude::*;
+
+use super::fit::Fit;
+use super::{LAYERS_LIMIT, around, has_the_material_of, scatter_flux, super_convergent};
+use crate::element::{Complex3, dot3};
+use crate::elements::Order;
+use crate::error::SolverError;
+use crate::model::FieldModel;
+use crate::solution::FieldSolution;
+
+/// Places in a mesh that moves.
+#[derive(Clone, Debug)]
+pub(crate) struct FixedPlaces {
+    start: Mesh,
+    order: Order,
+    /// With the element that holds each at the start.
+    places: Vec<(Point, ElementId)>,
+}
+
+/// The field at one of them as a linear function of the potentials, on one mesh.
+pub(crate) struct BlendedPoint {
+    element: ElementId,
+    /// `λ_a` and `∇λ_a` [1/m].
+    shares: [(f64, Point); 4],
+    patches: [Patch; 4],
+}
+
+/// A polynomial fitted around a vertex.
+struct Patch {
+    samples: Vec<(ElementId, &'static [f64; 4])>,
+    fit: Fit,
+    /// Of the samples in its value at the place.
+    weights: Vec<f64>,
+}
+
+impl FixedPlaces {
+    /// Places [m] with the elements that hold them on the mesh at the start; patches fit elements of an order.
+    pub(crate) fn new(start: &Mesh, order: Order, places: Vec<(Point, ElementId)>) -> Self {
+        Self { start: start.clone(), order, places }
+    }
+
+    /// The element that holds each place now.
+    ///
+    /// # Errors
+    /// [`SolverError::Covered`] for a place that something else than at the start has reached, and for one that the mesh has left.
+    pub(crate) fn locate(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<Located>, SolverError> {
+        let points: Vec<Point> = self.places.iter().map(|(point, _)| *point).collect();
+        let found = locate(mesh, &points).into_iter().zip(&self.places);
+        let holder = |(found, &(place, home)): (Option<Located>, &(Point, ElementId))| {
+            let covered = |by: String| SolverError::Covered { place, by };
+            let (e, lambda) = found.ok_or_else(|| covered("what is not meshed".to_owned()))?;
+            if !has_the_material_of(model, home)(e) {
+                return Err(covered(format!("`{}`", model.topology().region_name_at(e))));
+            }
+            Ok((e, lambda))
+        };
+        found.map(holder).collect()
+    }
+
+    /// The fields at all of them on a mesh.
+    ///
+    /// # Errors
+    /// As [`FixedPlaces::locate`].
+    pub(crate) fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<BlendedPoint>, SolverError> {
+        let located = self.locate(model, mesh)?;
+        let blend = |(located, (point, _)): (&Located, &(Point, ElementId))| {
+            self.blend(model, mesh, *located, *point)
+        };
+        Ok(located.par_iter().zip(&self.places).map(blend).collect())
+    }
+
+    fn blend(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        (element, lambda): Located,
+        point: Point,
+    ) -> BlendedPoint {
+        let gradients = Tet4::new(mesh.vertices(element)).gradients;
+        let vertices = model.topology().tet(element);
+        BlendedPoint {
+            element,
+            shares: std::array::from_fn(|a| (lambda[a], gradients[a])),
+            patches: vertices.map(|vertex| self.patch(model, mesh, (element, vertex), point)),
+        }
+    }
+
+    /// The patch around a vertex, as large as the mesh at the start needs it.
+    fn patch(
+        &self,
+        model: &FieldModel,
+        mesh: &Mesh,
+        (element, vertex): (ElementId, NodeId),
+        point: Point,
+    ) -> Patch {
+        let topology = model.topology();
+        let is_alike = has_the_material_of(model, element);
+        let of_vertex = topology.elements_around(vertex).iter().copied();
+        let mut elements: BTreeSet<ElementId> = of_vertex.filter(|&e| is_alike(e)).collect();
+        let fitted = |elements: &BTreeSet<ElementId>, degree| {
+            let samples = super_convergent(self.order, elements);
+            Fit::even(degree, &offsets(&self.start, &samples, self.start.point(vertex)))?;
+            let fit = Fit::even(degree, &offsets(mesh, &samples, point))?;
+            Some(Patch { samples, weights: fit.value(), fit })
+        };
+        for _ in 0..LAYERS_LIMIT {
+            if let Some(patch) = fitted(&elements, self.order.degree()) {
+                return patch;
+            }
+            elements = around(topology, &elements, &is_alike);
+        }
+        // In a part too small for any fit, the mean of its own.
+        let mean = fitted(&BTreeSet::from([element]), 0);
+        mean.expect("one value determines a constant")
+    }
+}
+
+/// Where samples lie [m], from a point.
+pub(super) fn offsets(mesh: &Mesh, samples: &[(ElementId, &[f64; 4])], origin: Point) -> Vec<Point> {
+    let place = |(e, lambda): &(ElementId, &[f64; 4])| {
+        let vertices = mesh.vertices(*e);
+        std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>() - origin[d])
+    };
+    samples.iter().map(place).collect()
+}
+
+impl BlendedPoint {
+    /// `B` [T] there.
+    pub(crate) fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+        let parts = self
+            .patches
+            .iter()
+            .zip(self.shares)
+            .map(|(patch, (lambda, _))| patch.flux_density(solution, model, mesh).map(|c| lambda * c));
+        parts.fold([c64::default(); 3], |sum, part| std::array::from_fn(|d| sum[d] + part[d]))
+    }
+
+    /// Adds `∂(q·B)/∂u` to a vector of unknowns, and `2 Re ∂(q·B)/∂x` [per m] at fixed potentials to one of nodes.
+    pub(crate) fn add_derivatives(
+        &self,
+        q: Complex3,
+        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+        (by_potentials, by_positions): (&mut [c64], &mut [Point]),
+    ) {
+        let vertices = model.topology().tet(self.element);
+        for (patch, (lambda, gradient)) in self.patches.iter().zip(self.shares) {
+            let along = dot3(q, patch.flux_density(solution, model, mesh));
+            // The place stays: δλ_a = −∇λ_a · v, with v = λ_k d.
+            for (node, (of_node, _)) in vertices.iter().zip(self.shares) {
+                let change = -2.0 * of_node * along.re;
+                (0..3).for_each(|d| by_positions[node.index()][d] += change * gradient[d]);
+            }
+            let own = q.map(|c| lambda * c);
+            patch.add_derivatives(own, (solution, model, mesh), (by_potentials, by_positions));
+        }
+    }
+}
+
+impl Patch {
+    fn values(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
+        self.samples.iter().map(|(e, lambda)| solution.at(model, mesh, *e, lambda).flux_density).collect()
+    }
+
+    fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+        let values = self.values(solution, model, mesh);
+        std::array::from_fn(|d| values.iter().zip(&self.weights).map(|(b, w)| *w * b[d]).sum())
+    }
+
+    fn add_derivatives(
+        &self,
+        q: Complex3,
+        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+        (by_potentials, by_positions): (&mut [c64], &mut [Point]),
+    ) {
+        let (space, topology) = (model.space(), model.topology());
+        let along: Vec<c64> = self.values(solution, model, mesh).into_iter().map(|b| dot3(q, b)).collect();
+        let by_points = self.fit.value_by_points(&self.weights, &along);
+        for (((e, lambda), weight), by_point) in self.samples.iter().zip(&self.weights).zip(by_points) {
+            let own = q.map(|c| *weight * c);
+            scatter_flux((model, mesh), (*e, lambda), own, by_potentials);
+            let field = solution.element(model, *e);
+            let changes = space.elements().flux_change(&space.cell(mesh, *e), lambda, field.values(), own);
+            for (a, node) in topology.tet(*e).iter().enumerate() {
+                for d in 0..3 {
+                    by_positions[node.index()][d] += 2.0 * (changes[a][d] + lambda[a] * by_point[d]).re;
+                }
+            }
+        }
+    }
+}
