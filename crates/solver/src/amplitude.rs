@@ -22,9 +22,10 @@ use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
 use crate::line_search;
 use crate::linear::gmres::{self, Ended};
-use crate::linear::{FieldSystem, LinearSolverCache, LinearSolverReport, PreparedSystem, RealLinear};
+use crate::linear::{FieldSystem, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
-use crate::newton::{self, MOST_STEPS, NewtonObserver, NewtonProgress, REQUIRED, STAGNATION};
+use crate::newton::{self, NewtonObserver, NewtonProgress};
+use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict};
 use crate::solution::FieldSolution;
 use crate::tangents::Tangents;
 
@@ -218,13 +219,13 @@ impl Problem<'_> {
     }
 
     /// Where to start: a share of the field of the linear parts, as in statics.
-    fn start(&self, cache: &mut LinearSolverCache) -> Result<(Iterate, usize), SolverError> {
-        let mut system = self.model.prepare_with(self.matrix.clone(), cache)?;
+    fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
+        let mut system = systems.prepare(self.matrix.clone())?;
         let (values, report) = system.solve_field(&self.load)?;
         let zero = self.at(vec![c64::default(); self.load.len()]);
         let mut nearest = system.into_field();
         let found = self.search(&zero, &values, &mut nearest)?;
-        *cache = nearest.into_cache().without_initial_guess();
+        systems.keep(nearest);
         Ok((found.map_or(zero, |(start, _)| start), report.iterations))
     }
 
@@ -302,27 +303,28 @@ impl Problem<'_> {
 pub(crate) fn solve(
     model: &FieldModel,
     mesh: &Mesh,
-    (cache, start): (&LinearSolverCache, Option<&[c64]>),
+    (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Problem { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
     let (scale, settings) = (norm(&problem.load), &model.setup().linear_solver);
-    let mut cache = LinearSolverCache::with_method(cache.method());
+    let mut descent = Descent::new(settings.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {
         Some(values) => (problem.at(values.to_vec()), 0, 0),
         None => {
-            let (iterate, iterations) = problem.start(&mut cache)?;
+            let (iterate, iterations) = problem.start(systems)?;
             (iterate, iterations, 1)
         }
     };
-    let (mut before, mut damping) = (f64::INFINITY, 1.0);
+    let mut damping = 1.0;
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: None, damping });
         let tangent = problem.tangent(&iterate.values);
         let nearest = model.assemble_tangent(mesh, &tangent.tensors());
-        let system = model.prepare_with(nearest, &mut cache)?;
-        if residual <= settings.tolerance || residual <= REQUIRED && residual > STAGNATION * before {
+        let system = systems.prepare(nearest)?;
+        let verdict = descent.after(residual);
+        if verdict == Verdict::Converged {
             let report = LinearSolverReport { iterations, residual };
             let state = FieldSolution::state(iterate.values, report).after_newton(steps);
             return Ok((state, system.with_tangent(tangent)));
@@ -332,16 +334,17 @@ pub(crate) fn solve(
         // As exact as the next residual is small.
         let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual);
         let (step, report) = tangent.invert(Side::State, &right_side, &mut field, tolerance)?;
-        let found = problem.search(&iterate, &step, &mut field)?;
-        let Some((next, length)) = found.filter(|_| steps < MOST_STEPS) else {
+        let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
+        let found = if goes_on { problem.search(&iterate, &step, &mut field)? } else { None };
+        systems.keep(field);
+        let Some((next, length)) = found else {
             let mut values = iterate.values.clone();
             axpy(c64::from(1.0), &step, &mut values);
             let [from, to] = [iterate.values, values].map(FieldSolution::of_state);
             return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
         };
-        cache = field.into_cache().without_initial_guess();
         iterations += report.iterations;
-        (steps, before, damping, iterate) = (steps + 1, residual, length, next);
+        (steps, damping, iterate) = (steps + 1, length, next);
     }
 }
 

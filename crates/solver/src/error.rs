@@ -169,11 +169,19 @@ pub enum SolverError {
         /// What is there.
         what: &'static str,
     },
+    /// A B–H law where the problem is shared out among ranks.
+    #[error(
+        "the region `{region}` has a B–H curve, which is solved for in one process: start the program without `mpirun`, or give \
+         the material a relative_permeability"
+    )]
+    CurveOnRanks {
+        /// Name of a region with a law.
+        region: String,
+    },
     /// Newton's method did not reach its residual.
     #[error(
         "Newton's method stopped after {steps} steps at the relative residual {residual:.1e}; least settled is the region \
-         `{region}` at ({:.3}, {:.3}, {:.3}) mm with |B| = {flux_density:.3} T: check the units of its B–H table and the \
-         currents",
+         `{region}` at ({:.3}, {:.3}, {:.3}) mm with |B| = {flux_density:.3} T: {failure}",
         place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
     )]
     Newton {
@@ -187,6 +195,8 @@ pub enum SolverError {
         place: [f64; 3],
         /// `|B|` there [T].
         flux_density: f64,
+        /// What it looks like.
+        failure: NewtonFailure,
     },
     /// A field or objective that is not a finite number.
     #[error("the {what} is {value}: the field problem has no usable solution")]
@@ -250,4 +260,16 @@ pub enum NonConvergence {
         "more memory or ranks for a direct factor, a larger overlap of the subdomains or complete factors on them may help"
     )]
     OnRanks,
+}
+
+/// What a state that Newton's method does not find looks like, and what may help.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NewtonFailure {
+    /// The law or the load keep it far off.
+    #[error("check the units of its B–H table and the currents")]
+    Law,
+    /// It is nearly there and does not come nearer, with the most robust linear method that there is memory for.
+    #[error("the mesh may hold nearly flat elements; more memory for a factor may help")]
+    Rounding,
 }

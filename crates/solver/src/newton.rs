@@ -4,8 +4,7 @@
 //! exact tangent; a step is as long as the energy falls along it, about (`line_search`), and halved until the energy falls by a small
 //! part of what its slope promises (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, or what the caller gives: the
 //! field on the reference mesh of a round, so that a state is a function of mesh, model and that reference, and not of the designs
-//! before. Within one solution a factor serves as long as it
-//! pays.
+//! before. Within one solution a factor serves as long as it pays.
 
 use fluxmorph_geometry::fem::scalar::{axpy, dot, norm};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
@@ -15,19 +14,14 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::line_search;
-use crate::linear::{LinearSolverCache, LinearSolverReport, PreparedSystem};
+use crate::linear::{LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
+use crate::newton_steps::{Descent, MOST_STEPS, REQUIRED, StepSystems, Verdict, failure};
 use crate::nonlinear::{self, Added};
 use crate::solution::FieldSolution;
 
-/// Steps after which there is no hope: five to fifteen are usual.
-pub(crate) const MOST_STEPS: usize = 60;
-
 /// Halvings of one step: the energy is convex, so that one of them is short enough unless rounding is all that is left.
 const MOST_HALVINGS: usize = 30;
-
-/// Relative residual above which a state is refused [1].
-pub(crate) const REQUIRED: f64 = 1e-10;
 
 /// The part of the promised decrease that is asked for (Nocedal and Wright: 1e-4).
 const ARMIJO: f64 = 1e-4;
@@ -35,8 +29,14 @@ const ARMIJO: f64 = 1e-4;
 /// Rounding of the energy relative to its terms: sums over some thousand elements.
 const ENERGY_ROUNDING: f64 = 1e-13;
 
-/// A residual that a step leaves at more than this part of itself is rounding, once it is below `REQUIRED`.
-pub(crate) const STAGNATION: f64 = 0.1;
+/// The same where elements are nearly flat, whose fluxes are small differences of large circulations. A step that can gain less is
+/// judged by the slope, which is the difference that an energy would have to be taken of (Hager and Zhang, SIAM J. Optim. 16 (2005)
+/// 170, approximate Wolfe conditions).
+const ENERGY_NOISE: f64 = 1e-9;
+
+/// Relative residual [1] above which the solution for a step is refused. Iterations go on to that of the settings where rounding
+/// lets them, so that the method stays quadratic; right sides that are rounding themselves have no better solution.
+const REQUIRED_OF_A_STEP: f64 = 1e-6;
 
 /// Where Newton's method stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,13 @@ struct Iterate {
     added: Added,
     /// `K u − f` and what the laws add.
     residual: Vec<c64>,
+}
+
+impl Iterate {
+    /// The state that it is, after so many steps.
+    fn into_state(self, report: LinearSolverReport, steps: usize) -> FieldSolution {
+        FieldSolution::state(self.solution.values().to_vec(), report).after_newton(steps)
+    }
 }
 
 /// The problem of one mesh.
@@ -95,10 +102,10 @@ impl Energy<'_> {
 
     /// Where to start: the share of the field of the linear parts that has the least energy. Newton's step from zero has the initial
     /// permeability, far below the largest, and creeps along the foot of a curve.
-    fn start(&self, cache: &mut LinearSolverCache) -> Result<(Iterate, usize), SolverError> {
-        let mut system = self.model.prepare_with(self.matrix.clone(), cache)?;
-        let (values, report) = system.solve(&self.load)?;
-        *cache = system.into_cache().without_initial_guess();
+    fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
+        let mut system = systems.prepare(self.matrix.clone())?;
+        let (values, report) = system.solve_within(REQUIRED_OF_A_STEP, &self.load)?;
+        systems.keep(system.into_field());
         let zero = self.at(vec![c64::default(); self.load.len()]);
         let found = self.search(&zero, &values);
         Ok((found.map_or(zero, |(start, _)| start), report.iterations))
@@ -122,6 +129,10 @@ impl Energy<'_> {
                 let trial = place(length);
                 (dot(&trial.residual, step).re, trial)
             });
+            let may_gain = -slope;
+            if along.is_level && may_gain <= ENERGY_NOISE / ENERGY_ROUNDING * from.rounding {
+                return Some((along.state, along.length));
+            }
             length = along.length;
             along.state
         } else {
@@ -145,42 +156,46 @@ impl Energy<'_> {
 pub(crate) fn solve(
     model: &FieldModel,
     mesh: &Mesh,
-    (cache, start): (&LinearSolverCache, Option<&[c64]>),
+    (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Energy { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
     let scale = norm(&problem.load);
-    let tolerance = model.setup().linear_solver.tolerance;
-    let mut cache = LinearSolverCache::with_method(cache.method());
+    let mut descent = Descent::new(model.setup().linear_solver.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {
         Some(values) => (problem.at(values.to_vec()), 0, 0),
         None => {
-            let (iterate, iterations) = problem.start(&mut cache)?;
+            let (iterate, iterations) = problem.start(systems)?;
             (iterate, iterations, 1)
         }
     };
-    let (mut before, mut damping) = (f64::INFINITY, 1.0);
+    let mut damping = 1.0;
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: Some(iterate.energy), damping });
         let tangent = model.assemble_tangent(mesh, &iterate.added.tangents);
-        let mut system = model.prepare_with(tangent, &mut cache)?;
-        if residual <= tolerance || residual <= REQUIRED && residual > STAGNATION * before {
-            let report = LinearSolverReport { iterations, residual };
-            let values = iterate.solution.values().to_vec();
-            return Ok((FieldSolution::state(values, report).after_newton(steps), system));
+        let mut system = systems.prepare(tangent)?;
+        let verdict = descent.after(residual);
+        if verdict == Verdict::Converged {
+            return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
         }
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
-        let (step, report) = system.solve(&right_side)?;
-        let Some((next, length)) = problem.search(&iterate, &step).filter(|_| steps < MOST_STEPS) else {
+        let (step, report) = system.solve_within(REQUIRED_OF_A_STEP, &right_side)?;
+        let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
+        let found = if goes_on { problem.search(&iterate, &step) } else { None };
+        let Some((next, length)) = found else {
+            if residual <= REQUIRED {
+                return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
+            }
+            systems.keep(system.into_field());
             let mut values = iterate.solution.values().to_vec();
             axpy(c64::from(1.0), &step, &mut values);
             let to = FieldSolution::of_state(values);
             return Err(refused(model, mesh, (steps, residual), &iterate.solution, &to));
         };
-        cache = system.into_cache().without_initial_guess();
+        systems.keep(system.into_field());
         iterations += report.iterations;
-        (steps, before, damping, iterate) = (steps + 1, residual, length, next);
+        (steps, damping, iterate) = (steps + 1, length, next);
     }
 }
 
@@ -200,6 +215,7 @@ pub(crate) fn refused(
         region: model.topology().region_names()[region.index()].clone(),
         place: centroid(mesh.vertices(element)),
         flux_density,
+        failure: failure(residual),
     }
 }
 

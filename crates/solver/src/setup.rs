@@ -130,7 +130,7 @@ pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverEr
     if setup.frequency > 0.0 && setup.remanence.iter().any(|b| *b != [0.0; 3]) {
         return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
     }
-    check_laws(setup)?;
+    check_laws(mesh, setup)?;
     check_solids(setup)?;
     for conductor in &setup.conductors {
         if conductor.surface.is_empty() {
@@ -165,7 +165,7 @@ fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
 }
 
 /// Refuses B–H laws where they have no meaning.
-fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
+fn check_laws(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
     let refuse = |what: &str, value: String, expected: &str| {
         Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
     };
@@ -173,9 +173,7 @@ fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
     if setup.bh.len() > setup.materials.len() {
         return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");
     }
-    if !setup.bh.iter().any(Option::is_some) {
-        return Ok(());
-    }
+    let Some(first) = setup.bh.iter().position(Option::is_some) else { return Ok(()) };
     let is_driven = setup.windings.iter().flatten().any(|winding| winding.voltage.is_some());
     if setup.frequency > 0.0 && is_driven {
         return refuse(
@@ -185,11 +183,8 @@ fn check_laws(setup: &FieldModelSetup) -> Result<(), SolverError> {
         );
     }
     if setup.ownership.is_some() {
-        return refuse(
-            "ranks",
-            "several".to_owned(),
-            "one process: a B–H curve is solved by Newton's method in one",
-        );
+        let region = mesh.topology().region_names()[first].clone();
+        return Err(SolverError::CurveOnRanks { region });
     }
     if let Some(r) = (0..setup.remanence.len()).find(|&r| has_law(r) && setup.remanence[r] != [0.0; 3]) {
         let remanence = format!("{:?}", setup.remanence[r]);

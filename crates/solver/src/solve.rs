@@ -9,6 +9,7 @@ use crate::error::SolverError;
 use crate::linear::{LinearSolverCache, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver};
+use crate::newton_steps::StepSystems;
 use crate::solution::FieldSolution;
 
 impl FieldModel {
@@ -27,7 +28,8 @@ impl FieldModel {
 
     /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
     /// adjoint. Of `cache` only the method that worked last takes part; Newton's method begins with `start`, the unknowns of a
-    /// similar state, and where there is none with the field of the linear parts.
+    /// similar state, and where there is none with the field of the linear parts. Where its residual stays for rounding a more
+    /// robust method of the linear solver follows.
     ///
     /// # Errors
     /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].
@@ -42,9 +44,15 @@ impl FieldModel {
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
         let solve = if self.angular_frequency() > 0.0 { amplitude::solve } else { newton::solve };
-        match solve(self, mesh, (cache, start), observer) {
-            Err(SolverError::Newton { .. }) if start.is_some() => solve(self, mesh, (cache, None), observer),
-            solved => solved,
+        let (mut systems, mut start) = (StepSystems::new(self, cache.method()), start);
+        loop {
+            match solve(self, mesh, (&mut systems, start), observer) {
+                Err(error) if systems.escalate(&error) => {}
+                Err(SolverError::Newton { .. }) if start.is_some() => start = None,
+                solved => {
+                    return solved.map(|(state, system)| (state, system.with_events(systems.into_events())));
+                }
+            }
         }
     }
 

@@ -8,7 +8,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::functional::{Follow, Observed, Weighting};
-use fluxmorph_solver::linear::{LinearSolverCache, LinearSolverSettings};
+use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::newton::NewtonProgress;
 use fluxmorph_solver::{
@@ -307,4 +307,62 @@ fn laws_are_refused_where_they_have_no_meaning() {
     assert_eq!(refused(&driven), "voltage");
     assert_eq!(refused(&|setup| setup.remanence = vec![[0.0; 3], [0.0, 0.0, 1.0]]), "remanence");
     assert_eq!(refused(&|setup| setup.bh.extend([None, None])), "number of B–H laws");
+}
+
+/// The iron under the coil, cut by a slit so narrow that its elements are nearly flat.
+fn slit_mesh(width: f64) -> Mesh {
+    let line = |n: usize, h: f64| (0..=n).map(|i| h * i as f64).collect::<Vec<_>>();
+    let mut z = line(7, 0.01);
+    z.extend([0.03 + width, 0.03 + 2.0 * width]);
+    z.sort_by(f64::total_cmp);
+    let grid = Grid::new("grid", [line(5, 0.012), line(5, 0.012), z]).expect("a grid");
+    let region = |x: Point| {
+        let iron = (0.02..0.04).contains(&x[2]) && !(0.03..0.03 + width).contains(&x[2]);
+        RegionId(u32::from(iron && x[0] > 0.012 && x[1] > 0.012 && x[0] < 0.048))
+    };
+    let topology = grid.topology(&["air", "iron"], region).expect("a topology");
+    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+}
+
+/// Its own solutions are as good as rounding lets them be: right sides that are rounding themselves have none to the last digit.
+#[test]
+fn a_state_beside_nearly_flat_elements_is_found_whatever_the_linear_method() {
+    let mesh = slit_mesh(1e-7);
+    for elements in [ALL[0], ALL[2]] {
+        let fields = [Method::RealFactorSingle, Method::Direct].map(|method| {
+            let mut setup = setup(elements, SOFT, Some(law()));
+            setup.materials.truncate(2);
+            setup.linear_solver = LinearSolverSettings {
+                method: LinearSolver::Fixed(method),
+                ..LinearSolverSettings::default()
+            };
+            let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+            let (state, system) =
+                model.solve(&mesh).unwrap_or_else(|e| panic!("{elements:?} {method:?}: {e}"));
+            println!("{elements:?} {method:?}: {:?}, {:?}", state.report(), system.events());
+            state.flux_densities(&model, &mesh)
+        });
+        let largest = fields[1].iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
+        let off = fields[0].iter().flatten().zip(fields[1].iter().flatten()).map(|(a, b)| (a - b).norm());
+        let worst = off.fold(0.0, f64::max) / largest;
+        println!("{elements:?}: {worst:.1e}");
+        assert!(worst < 1e-4, "{elements:?}: {worst:e}");
+    }
+}
+
+/// What happened in the system of a step is said with the state.
+#[test]
+fn a_method_that_fails_within_a_step_is_named() {
+    let mesh = mesh();
+    let mut setup = setup(ALL[2], SOFT, Some(law()));
+    setup.linear_solver = LinearSolverSettings {
+        method: LinearSolver::Fixed(Method::Incomplete),
+        max_iterations: Some(4),
+        ..LinearSolverSettings::default()
+    };
+    let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+    let (_, system) = model.solve(&mesh).expect("factors need no more");
+    let SolverEvent::FellBack { from, to, .. } = &system.events()[0];
+    assert_eq!((*from, *to), (Method::Incomplete, Method::RealFactorSingle));
+    assert_eq!(system.events().len(), 1, "{:?}", system.events());
 }

@@ -187,6 +187,12 @@ impl SystemAnalysis {
         self.preconditioner_bytes(method).is_ok_and(|bytes| bytes <= self.settings.factor_bytes)
     }
 
+    /// The next more robust method that fits.
+    pub(crate) fn more_robust(&self, method: Method) -> Option<Method> {
+        std::iter::successors(method.more_robust(), |method| method.more_robust())
+            .find(|&method| self.fits(method))
+    }
+
     /// Costs of a method on this pattern.
     pub(super) fn costs(&self, method: Method) -> Result<Costs, MeshError> {
         let mut sizes = Sizes { matrix_entries: self.structure.columns.len(), ..Sizes::default() };

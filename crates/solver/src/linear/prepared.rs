@@ -108,10 +108,30 @@ impl PreparedSystem {
 
     /// What the solver did beside solving.
     pub fn events(&self) -> &[SolverEvent] {
-        match &self.field {
-            FieldSystem::Local(system) => system.events(),
-            FieldSystem::Distributed(_) => &[],
+        self.field.events()
+    }
+
+    /// Solves as [`PreparedSystem::solve`], and refuses a solution above a relative residual, not above that of the settings.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub(crate) fn solve_within(
+        &mut self,
+        required: f64,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        self.field.require(Some(required));
+        let solved = self.solve(right_side);
+        self.field.require(None);
+        solved
+    }
+
+    /// The same after what was done in systems before it.
+    pub(crate) fn with_events(mut self, before: Vec<SolverEvent>) -> Self {
+        if let FieldSystem::Local(system) = &mut self.field {
+            system.precede_events(before);
         }
+        self
     }
 
     /// What the next design may start from.
@@ -177,6 +197,21 @@ impl PreparedSystem {
 }
 
 impl FieldSystem {
+    /// What the solver did beside solving.
+    pub(crate) fn events(&self) -> &[SolverEvent] {
+        match self {
+            Self::Local(system) => system.events(),
+            Self::Distributed(_) => &[],
+        }
+    }
+
+    /// Refuses solutions above a relative residual; `None` is that of the settings.
+    fn require(&mut self, residual: Option<f64>) {
+        if let Self::Local(system) = self {
+            system.require(residual);
+        }
+    }
+
     /// What the next design may start from.
     pub(crate) fn into_cache(self) -> LinearSolverCache {
         match self {

@@ -81,6 +81,8 @@ pub struct LocalSystem {
     before: Vec<Vec<c64>>,
     solutions: Vec<Vec<c64>>,
     events: Vec<SolverEvent>,
+    /// Relative true residual above which a solution is refused [1].
+    required: f64,
 }
 
 /// How one run of iterations ended.
@@ -128,6 +130,7 @@ impl LocalSystem {
             before: if reuse { before } else { Vec::new() },
             solutions: Vec::new(),
             events,
+            required: analysis.settings.required,
         })
     }
 
@@ -149,6 +152,16 @@ impl LocalSystem {
     /// What the solver did beside solving.
     pub fn events(&self) -> &[SolverEvent] {
         &self.events
+    }
+
+    /// Refuses solutions above a relative true residual; `None` is that of the settings.
+    pub(super) fn require(&mut self, residual: Option<f64>) {
+        self.required = residual.unwrap_or(self.analysis.settings.required);
+    }
+
+    /// Puts what was done in other systems first.
+    pub(super) fn precede_events(&mut self, before: Vec<SolverEvent>) {
+        self.events.splice(..0, before);
     }
 
     /// What the next design may start from.
@@ -188,7 +201,7 @@ impl LocalSystem {
             let before = report.iterations;
             let ended = self.attempt(right_side, scale, &mut x, &mut report.iterations);
             if let Attempt::Ended(residual) = ended
-                && residual <= self.analysis.settings.required
+                && residual <= self.required
             {
                 report.residual = residual;
                 self.served.0 += report.iterations - before;
@@ -234,7 +247,7 @@ impl LocalSystem {
         let method = self.method();
         let most = settings.max_iterations.unwrap_or_else(|| {
             let typical = self.analysis.typical_iterations(method);
-            let single = method == Method::DirectSingle && next(&self.analysis, method).is_some();
+            let single = method == Method::DirectSingle && self.analysis.more_robust(method).is_some();
             10 * if single { typical.max(LEAST_SINGLE) } else { typical.max(30) }
         });
         let affordable = (settings.most_work / preconditioner.costs.iteration) as usize;
@@ -309,12 +322,11 @@ impl LocalSystem {
     /// Takes the next more robust method, if there is one and it fits.
     fn fall_back(&mut self, report: &LinearSolverReport) -> Result<(), SolverError> {
         let LinearSolverReport { residual, iterations } = *report;
-        let settings = &self.analysis.settings;
         let from = self.method();
-        let Some(to) = next(&self.analysis, from) else {
+        let Some(to) = self.analysis.more_robust(from) else {
             let cause =
                 if residual.is_finite() { NonConvergence::IllConditioned } else { NonConvergence::Breakdown };
-            let required = settings.required;
+            let required = self.required;
             return Err(SolverError::NotConverged { residual, required, iterations, cause });
         };
         let cause = format!("relative residual {residual:.1e} after {iterations} iterations");
@@ -348,16 +360,10 @@ fn factor(
                 return Ok((Arc::new(own), ledger));
             }
             Err(error) => {
-                let Some(to) = next(analysis, method) else { return Err(error.into()) };
+                let Some(to) = analysis.more_robust(method) else { return Err(error.into()) };
                 events.push(SolverEvent::FellBack { from: method, to, cause: error.to_string() });
                 method = to;
             }
         }
     }
-}
-
-/// The next more robust method that fits.
-fn next(analysis: &SystemAnalysis, method: Method) -> Option<Method> {
-    std::iter::successors(method.more_robust(), |method| method.more_robust())
-        .find(|&method| analysis.fits(method))
 }
