@@ -8,7 +8,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::geometric::GeometricError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::coil::{PlaneFault, RegionFault};
-use fluxmorph_solver::{NonConvergence, SolverError};
+use fluxmorph_solver::{NewtonFailure, NonConvergence, SolverError};
 
 use super::references::{regions, surface_names};
 use crate::config::{CoilShape, Config, ConfigError, Diagnostic, RemeshExtent, SourceMap};
@@ -46,7 +46,8 @@ pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
         _ => return None,
     };
     match solver {
-        SolverError::NotConverged { cause: NonConvergence::IllConditioned, .. } => {
+        SolverError::NotConverged { cause: NonConvergence::IllConditioned, .. }
+        | SolverError::Newton { failure: NewtonFailure::Rounding, .. } => {
             Some("analysis.linear_solver.factor_gib")
         }
         SolverError::NotConverged { cause: NonConvergence::OnRanks, .. } => {
@@ -181,6 +182,16 @@ impl Blame<'_> {
                 self.at(if is_region { "open.region" } else { "open.surfaces" }, error)
             }
             SolverError::EmptyRegion { region, .. } => self.region(region, error),
+            SolverError::CurveOnRanks { region } => {
+                let name = &self.config.regions.get(region)?.material;
+                let material = self.config.materials.get(name)?;
+                let key = match (&material.bh, &material.bh_file) {
+                    (Some(_), _) => "bh",
+                    (None, Some(_)) => "bh_file",
+                    (None, None) => "saturation",
+                };
+                self.at(&format!("materials.{name}.{key}"), error)
+            }
             SolverError::ProbeOutside { probe, .. } => {
                 let index = self.config.probes.iter().position(|own| own.name == *probe)?;
                 self.at(&format!("probes[{index}].points"), error)

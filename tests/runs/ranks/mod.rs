@@ -7,7 +7,7 @@ mod runs;
 use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SolverCache};
 use fluxmorph_remesh::StiffnessPolicy;
 use fluxmorph_solver::Order;
-use group::led;
+use group::{attempted, led};
 
 use crate::support::{self, relative_difference};
 
@@ -99,6 +99,12 @@ fn so_are_those_of_a_magnet_and_of_every_stiffness() {
         let stiffness = format!("remesh.stiffness=\"{}\"", policy.name());
         ranks_agree("pole.toml", &["mesh.boxes.refinement=0.5", &stiffness], &[2]);
     }
+}
+
+#[test]
+fn a_curve_is_refused_at_its_key() {
+    let refused = attempted(2, "actuator.toml", &[], |setup| setup.err().expect("a B–H curve").to_string());
+    assert!(refused.contains("materials.steel.bh_file") && refused.contains("without `mpirun`"), "{refused}");
 }
 
 #[test]

@@ -65,6 +65,8 @@ choice! {
         Team20 = "team20_steel",
         /// The cold-rolled steel of TEAM workshop problems 10 and 13.
         Team13 = "team13_steel",
+        /// The electrical steel M400-50A, not oriented.
+        M40050A = "m400_50a",
     }
 }
 
