@@ -59,7 +59,8 @@ pub(super) fn faults(
         .filter(|(_, errors)| errors.field > FIELD[1] || (!errors.is_filled && errors.losses > LOSSES[1]));
     let conductors =
         conductors.map(|(audited, errors)| nodal_fault(source, coarse(config, audited, &errors)));
-    weak.chain(iron).chain(conductors).collect()
+    let surfaces = nodal_surfaces(config, audits, LOSSES[1]).map(|message| nodal_fault(source, message));
+    weak.chain(iron).chain(conductors).chain(surfaces).collect()
 }
 
 /// What is doubtful beside iron and conductors.
@@ -67,7 +68,8 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Vec<
     let conductors = nodal_conductors(config, audits)
         .filter(|(_, errors)| errors.field > FIELD[0] || errors.losses > LOSSES[0])
         .map(|(audited, errors)| format!("{}. Set {CURE}", coarse(config, audited, &errors)));
-    beside_iron(config, mesh, audits).into_iter().chain(conductors).collect()
+    let surfaces = nodal_surfaces(config, audits, LOSSES[0]).map(|message| format!("{message}. Set {CURE}"));
+    beside_iron(config, mesh, audits).into_iter().chain(conductors).chain(surfaces).collect()
 }
 
 /// What nodal elements lack.
@@ -91,6 +93,23 @@ fn nodal_conductors<'a>(
     let order = field::order(config);
     let of = move |audited: &'a Audited| (audited, audited.audit.nodal_errors(order));
     meshed(audits).filter(move |_| is_nodal).map(of)
+}
+
+/// Impedance surfaces on which the losses of nodal elements may be off by more than a limit.
+fn nodal_surfaces(config: &Config, audits: &[Audited], limit: f64) -> impl Iterator<Item = String> {
+    let is_nodal = config.analysis.elements == Elements::Nodal;
+    let order = field::order(config);
+    let surfaces = audits.iter().filter(move |audited| is_nodal && audited.model == RegionModel::Impedance);
+    surfaces.filter(move |audited| audited.audit.nodal_surface_losses(order) > limit).map(|Audited { audit, .. }| {
+        format!(
+            "the cells of `{}` are {:.3} mm wide on average at a skin depth of {:.3} mm, and on its impedance surface nodal \
+             elements of order 1 cannot make A + grad(psi) zero: its losses may be wrong by a tenth to factors, though the \
+             field is not",
+            audit.region,
+            audit.edge_length * 1e3,
+            audit.skin_depth * 1e3,
+        )
+    })
 }
 
 /// What nodal elements make of a conductor.
