@@ -4,7 +4,7 @@ use fluxmorph::config::{Config, ConfigError, DiagnosticReport};
 use fluxmorph::diagnostics::{Style, render};
 
 use crate::case::read;
-use crate::program::{assert_holds, limited, write};
+use crate::program::{assert_holds, limited};
 use crate::support::program::folder;
 use crate::support::repository_text;
 

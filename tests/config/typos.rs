@@ -85,7 +85,6 @@ const WORDS: &[(&str, &str)] = &[
     ("[[design.symmetry]]\n", "axis"),
     ("[remesh]\n", "motion"),
     ("[remesh]\n", "stiffness"),
-    ("[morph]\n", "least_quality"),
     ("[[morph.motion]]\n", "design"),
     ("[optimizer]\n", "algorithm"),
     ("[output]\n", "fields"),

@@ -98,7 +98,7 @@ mod tests {
             .and_then(|mut history| history.append(&evaluation()))
             .expect("written");
 
-        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,0,-0.5,0.5,0.0,-1.25,0.0,0.0,0.0\n";
+        let row = "3,2,0.30000000000000004,1.0,1.25e-300,0.0,0.104,0.005,,57,4.2,1.25,17,\"air, \"\"near\"\"\",0,-0.5,0.5,0.0,-1.25,0.0,0.0,0.0\n";
         let header = "evaluation,iteration,objective,ratio,gradient_norm,step_norm,worst_quality,\
                       min_thickness_m,max_thickness_m,linear_iterations,seconds,step_to_inversion,inversion_element,inversion_region,\
                       level,c_volume,force_pole_x_n_closed,force_pole_y_n_closed,force_pole_z_n_closed,torque_pole_x_nm_closed,\
