@@ -172,6 +172,7 @@ fn a_poor_conductor_has_the_same_loss_by_an_incomplete_and_a_complete_factor() {
         "sphere.toml",
         &[
             "materials.metal.conductivity=1",
+            "materials.metal.relative_permeability=1",
             "analysis.elements=\"nodal\"",
             "analysis.order=1",
             "mesh.sphere.divisions=4",

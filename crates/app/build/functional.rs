@@ -359,7 +359,7 @@ pub(super) fn constraints(
         match &written.limit {
             Written::Field { functional, bound } => {
                 let term = term(config, functional, mesh, states)?;
-                add(written.name.clone(), Quantity::Field(term), limit(*bound));
+                add(written.name.clone(), Quantity::Field(Box::new(term)), limit(*bound));
             }
             Written::Body { kind, region, bound } => {
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);

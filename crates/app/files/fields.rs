@@ -60,7 +60,7 @@ pub fn thickness(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
 /// The functionals of a problem: the terms of its objective, and its constraints of the field.
 fn functionals(problem: &Problem) -> impl Iterator<Item = &Term> {
     let of_constraints = problem.constraints().iter().filter_map(|constraint| match &constraint.quantity {
-        Quantity::Field(term) => Some(term),
+        Quantity::Field(term) => Some(&**term),
         _ => None,
     });
     problem.objective().into_iter().flat_map(|sum| &sum.terms).chain(of_constraints)

@@ -26,7 +26,7 @@ pub struct Constraint {
 #[derive(Debug)]
 pub enum Quantity {
     /// A functional of the field; its weight is one.
-    Field(Term),
+    Field(Box<Term>),
     /// A volume [m³] or mass [kg].
     Volume(geometric::Volume),
     /// The least or greatest thickness [m] of the designed body, where the measure counts from `bound`.
@@ -134,7 +134,7 @@ mod tests {
         let label =
             Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None, load: None };
         let term = Term { functional, states: vec![0], weight: 1.0, label };
-        Constraint { name: "field".to_owned(), quantity: Quantity::Field(term), limit }
+        Constraint { name: "field".to_owned(), quantity: Quantity::Field(Box::new(term)), limit }
     }
 
     #[test]

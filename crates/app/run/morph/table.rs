@@ -119,8 +119,11 @@ fn places(case: &CaseReport) -> [String; PLACES.len()] {
     ]
 }
 
+/// A column: its name, and its value in a row.
+type Column<T> = (&'static str, fn(&T) -> String);
+
 /// Columns of `morph.csv` that say what came out of a motion.
-const RESULT: [(&str, fn(&CaseResult) -> String); 17] = [
+const RESULT: [Column<CaseResult>; 17] = [
     ("equations", |r| r.equations.to_string()),
     ("elements", |r| r.after.elements.to_string()),
     ("worst_before", |r| number(Some(r.before.worst))),
@@ -141,7 +144,7 @@ const RESULT: [(&str, fn(&CaseResult) -> String); 17] = [
 ];
 
 /// Columns of published values.
-const PAPER: [(&str, fn(&Paper) -> String); 6] = [
+const PAPER: [Column<Paper>; 6] = [
     ("paper_worst_quality", |p| number(p.worst_quality)),
     ("paper_poor", |p| count(p.poor)),
     ("paper_share_poor_percent", |p| number(p.share_poor_percent)),

@@ -1,6 +1,6 @@
 //! The bound on all terms of a worst case, which is a variable of the method.
 
-use super::gradient::SCALED_SPAN;
+use super::scaling::SCALED_SPAN;
 
 /// The bound `t` on the terms of a worst case as NLopt sees it: in units that make its range as wide as that of a variable.
 #[derive(Clone, Copy, Debug)]

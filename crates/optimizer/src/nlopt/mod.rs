@@ -5,6 +5,7 @@ mod derivative_free;
 mod first_step;
 mod gradient;
 mod level;
+mod scaling;
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

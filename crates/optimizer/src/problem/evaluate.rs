@@ -323,7 +323,7 @@ impl Problem {
     /// Constraints on functionals of the field, with their numbers.
     pub(super) fn field_constraints(&self) -> impl Iterator<Item = (usize, &Term)> {
         self.constraints.iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
-            Quantity::Field(term) => Some((k, term)),
+            Quantity::Field(term) => Some((k, &**term)),
             _ => None,
         })
     }

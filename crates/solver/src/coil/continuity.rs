@@ -46,7 +46,7 @@ pub(crate) fn check(
 /// Where current gathers.
 fn gathered(mesh: &Mesh, current: &RegionCurrent, joined: &mut DisjointSets) -> Option<RegionFault> {
     let mut left = vec![0.0; mesh.topology().node_count()];
-    for ((e, _), into) in current.current_density().iter().zip(current.into_vertices()) {
+    for ((e, _), into) in current.current_density().iter().zip(current.brought_to_vertices()) {
         for (node, share) in mesh.topology().tet(*e).into_iter().zip(into) {
             left[joined.root(node.index())] += share;
         }
@@ -66,7 +66,7 @@ fn encircled(
         return None;
     }
     let mut load = vec![0.0; space.edges().len()];
-    for ((e, _), into) in current.current_density().iter().zip(current.into_vertices()) {
+    for ((e, _), into) in current.current_density().iter().zip(current.brought_to_vertices()) {
         let into = space.cell(mesh, *e).order.map(|place| into[usize::from(place)]);
         // `∫J·(λ_i∇λ_j − λ_j∇λ_i)` of a constant J.
         for (carrier, [i, j]) in space.carriers_of(*e).iter().zip(EDGES) {

@@ -133,7 +133,7 @@ impl RegionCurrent {
 
     /// What it brings to the vertices of every element in the same order, for one ampere-turn; of a current that is carried along with the
     /// mesh the same on all meshes.
-    pub(super) fn into_vertices(&self) -> &[[f64; 4]] {
+    pub(super) fn brought_to_vertices(&self) -> &[[f64; 4]] {
         &self.into_vertices
     }
 

@@ -50,14 +50,16 @@ enum Places {
 /// What gives the field at one of them on a mesh.
 enum At<'a> {
     Held(&'a RecoveredPoint),
-    InSpace(BlendedPoint),
+    InSpace(Box<BlendedPoint>),
 }
 
 impl Places {
     fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<At<'_>>, SolverError> {
         Ok(match self {
             Self::Held(points) => points.iter().map(At::Held).collect(),
-            Self::InSpace(places) => places.on(model, mesh)?.into_iter().map(At::InSpace).collect(),
+            Self::InSpace(places) => {
+                places.on(model, mesh)?.into_iter().map(|point| At::InSpace(Box::new(point))).collect()
+            }
         })
     }
 }

@@ -112,9 +112,9 @@ impl Fit {
     pub(super) fn value_by_points(&self, weights: &[f64], values: &[c64]) -> Vec<[c64; 3]> {
         let terms = self.columns.len();
         let projected = self.columns.iter().map(|q| q.iter().zip(values).map(|(q, v)| q * v).sum::<c64>());
-        let coefficients = self.from_the_bottom(projected.collect());
-        let unit = self.from_the_top(0).into_iter().map(c64::from).collect();
-        let dual = self.from_the_bottom(unit);
+        let coefficients = self.backward(projected.collect());
+        let unit = self.forward(0).into_iter().map(c64::from).collect();
+        let dual = self.backward(unit);
         let at = |(p, (&w, v)): (&Point, (&f64, &c64))| -> [c64; 3] {
             let value = |[i, j, k]: [i32; 3]| p[0].powi(i) * p[1].powi(j) * p[2].powi(k);
             let fitted: c64 = (0..terms).map(|t| value(self.monomials[t]) * coefficients[t]).sum();
@@ -132,7 +132,7 @@ impl Fit {
     }
 
     /// The solution of `Ry = b`.
-    fn from_the_bottom(&self, mut b: Vec<c64>) -> Vec<c64> {
+    fn backward(&self, mut b: Vec<c64>) -> Vec<c64> {
         for k in (0..b.len()).rev() {
             let known: c64 = (k + 1..b.len()).map(|j| self.upper[k][j] * b[j]).sum();
             b[k] = (b[k] - known) / self.upper[k][k];
@@ -142,13 +142,13 @@ impl Fit {
 
     /// Weights of the values in the coefficient of a monomial: the row of `R⁻¹ Qᵀ W`.
     fn coefficient(&self, of: usize) -> Vec<f64> {
-        let y = self.from_the_top(of);
+        let y = self.forward(of);
         let at = |i: usize| self.columns.iter().zip(&y).map(|(q, y)| q[i] * y).sum::<f64>();
         (0..self.weights.len()).map(|i| self.weights[i] * at(i)).collect()
     }
 
     /// The solution of `Rᵀy = e` for a unit vector.
-    fn from_the_top(&self, of: usize) -> Vec<f64> {
+    fn forward(&self, of: usize) -> Vec<f64> {
         let mut y: Vec<f64> = Vec::with_capacity(self.columns.len());
         for k in 0..self.columns.len() {
             let known: f64 = y.iter().enumerate().map(|(i, y)| self.upper[i][k] * y).sum();
