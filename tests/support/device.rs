@@ -14,7 +14,7 @@ pub(crate) const BLOCK: &str = include_str!("block.toml");
 
 /// A bound on the volume of the block.
 pub(crate) const CONSTRAINT: (&str, &str) =
-    ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nupper_ratio = 1.02\n\n[design]");
+    ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nlower_ratio = 0.98\n\n[design]");
 
 /// The block's mesh by the paper's law.
 pub(crate) const LINEAR: (&str, &str) = ("slide = [", "law = \"linear\"\nslide = [");

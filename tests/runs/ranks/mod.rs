@@ -104,7 +104,10 @@ fn so_are_those_of_a_magnet_and_of_every_stiffness() {
 #[test]
 fn a_curve_is_refused_at_its_key() {
     let refused = attempted(2, "actuator.toml", &[], |setup| setup.expect_err("a B–H curve").to_string());
-    assert!(refused.contains("materials.steel.bh_file") && refused.contains("without `mpirun`"), "{refused}");
+    assert!(
+        refused.contains("bh_file = \"steel_team20.csv\"") && refused.contains("without `mpirun`"),
+        "{refused}"
+    );
 }
 
 #[test]
