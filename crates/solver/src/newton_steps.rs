@@ -143,7 +143,7 @@ mod tests {
         assert_eq!(verdicts(&[1e-4, 1.3e-8, 1.2e-8, 1.3e-8, 1.3e-8])[3..], [Falling, Stays]);
         // Far from the solution a law may keep it, and a kink one step near it.
         assert!(verdicts(&[0.9; 50]).iter().all(|&v| v == Falling));
-        assert!(verdicts(&[1e-7, 9e-8, 1e-9, 9e-10, 1e-10]).iter().all(|&v| v == Falling));
+        assert!(verdicts(&[1e-7, 9e-8, 1e-9, 9e-10, 2e-10]).iter().all(|&v| v == Falling));
     }
 
     #[test]
