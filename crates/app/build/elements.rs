@@ -59,8 +59,7 @@ pub(super) fn faults(
         .filter(|(_, errors)| errors.field > FIELD[1] || (!errors.is_filled && errors.losses > LOSSES[1]));
     let conductors =
         conductors.map(|(audited, errors)| nodal_fault(source, coarse(config, audited, &errors)));
-    let surfaces = nodal_surfaces(config, audits, LOSSES[1]).map(|message| nodal_fault(source, message));
-    weak.chain(iron).chain(conductors).chain(surfaces).collect()
+    weak.chain(iron).chain(conductors).collect()
 }
 
 /// What is doubtful beside iron and conductors.
@@ -68,8 +67,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Vec<
     let conductors = nodal_conductors(config, audits)
         .filter(|(_, errors)| errors.field > FIELD[0] || errors.losses > LOSSES[0])
         .map(|(audited, errors)| format!("{}. Set {CURE}", coarse(config, audited, &errors)));
-    let surfaces = nodal_surfaces(config, audits, LOSSES[0]).map(|message| format!("{message}. Set {CURE}"));
-    beside_iron(config, mesh, audits).into_iter().chain(conductors).chain(surfaces).collect()
+    beside_iron(config, mesh, audits).into_iter().chain(conductors).collect()
 }
 
 /// What nodal elements lack.
@@ -84,36 +82,30 @@ fn meshed(audits: &[Audited]) -> impl Iterator<Item = &Audited> {
     audits.iter().filter(|audited| audited.model == RegionModel::Volume)
 }
 
-/// Those of nodal elements, and what these make of them.
+/// Conductors of nodal elements, and what these make of them.
 fn nodal_conductors<'a>(
     config: &Config,
     audits: &'a [Audited],
 ) -> impl Iterator<Item = (&'a Audited, NodalErrors)> {
     let is_nodal = config.analysis.elements == Elements::Nodal;
     let order = field::order(config);
-    let of = move |audited: &'a Audited| (audited, audited.audit.nodal_errors(order));
-    meshed(audits).filter(move |_| is_nodal).map(of)
-}
-
-/// Impedance surfaces on which the losses of nodal elements may be off by more than a limit.
-fn nodal_surfaces(config: &Config, audits: &[Audited], limit: f64) -> impl Iterator<Item = String> {
-    let is_nodal = config.analysis.elements == Elements::Nodal;
-    let order = field::order(config);
-    let surfaces = audits.iter().filter(move |audited| is_nodal && audited.model == RegionModel::Impedance);
-    surfaces.filter(move |audited| audited.audit.nodal_surface_losses(order) > limit).map(|Audited { audit, .. }| {
-        format!(
-            "the cells of `{}` are {:.3} mm wide on average at a skin depth of {:.3} mm, and on its impedance surface nodal \
-             elements of order 1 cannot make A + grad(psi) zero: its losses may be wrong by a tenth to factors, though the \
-             field is not",
-            audit.region,
-            audit.edge_length * 1e3,
-            audit.skin_depth * 1e3,
-        )
-    })
+    let of = move |audited: &'a Audited| {
+        let errors = match audited.model {
+            RegionModel::Volume => audited.audit.nodal_errors(order),
+            RegionModel::Impedance => audited.audit.nodal_surface_errors(order),
+            RegionModel::Perfect => return None,
+        };
+        Some((audited, errors))
+    };
+    audits.iter().filter(move |_| is_nodal).filter_map(of)
 }
 
 /// What nodal elements make of a conductor.
-fn coarse(config: &Config, Audited { audit, .. }: &Audited, errors: &NodalErrors) -> String {
+fn coarse(config: &Config, Audited { audit, model }: &Audited, errors: &NodalErrors) -> String {
+    let [place, beside] = match model {
+        RegionModel::Impedance => ["and on its impedance surface", ", though the field is not"],
+        RegionModel::Volume | RegionModel::Perfect => ["in which", ""],
+    };
     let wrong = if errors.field > FIELD[0] {
         "the field beside it and its losses"
     } else if errors.is_filled {
@@ -122,8 +114,8 @@ fn coarse(config: &Config, Audited { audit, .. }: &Audited, errors: &NodalErrors
         "its losses"
     };
     format!(
-        "the cells of `{}` are {:.3} mm wide on average at a skin depth of {:.3} mm, in which nodal elements of order {} cannot \
-         make A + grad(psi) zero: {wrong} may be wrong by a tenth to factors",
+        "the cells of `{}` are {:.3} mm wide on average at a skin depth of {:.3} mm, {place} nodal elements of order {} cannot \
+         make A + grad(psi) zero: {wrong} may be wrong by a tenth to factors{beside}",
         audit.region,
         audit.edge_length * 1e3,
         audit.skin_depth * 1e3,

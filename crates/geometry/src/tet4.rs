@@ -89,6 +89,12 @@ pub fn area_vector(vertices: [Point; 3]) -> Point {
     [0.5 * n[0], 0.5 * n[1], 0.5 * n[2]]
 }
 
+/// The point of a tetrahedron with these barycentric coordinates [m].
+#[inline]
+pub fn point_at(vertices: &[Point; 4], lambda: &[f64; 4]) -> Point {
+    std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum())
+}
+
 /// Centroid of a set of vertices [m].
 #[inline]
 pub fn centroid<const N: usize>(vertices: [Point; N]) -> Point {

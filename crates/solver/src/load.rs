@@ -73,7 +73,7 @@ impl Sources {
 
     /// Whether nothing is excited.
     pub(crate) fn is_empty(&self) -> bool {
-        self.coils.elements().is_empty() && self.magnets.is_empty()
+        self.coils == SourceTerms::default() && self.magnets.is_empty()
     }
 
     /// The load [A m; of edge elements A m²], added to `load`: element loads in parallel, then added in their order.

@@ -18,7 +18,7 @@ use std::collections::btree_map::Entry;
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4, centroid, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, Tet4, centroid, cross, dot, norm, point_at, sub};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use crate::element::Complex3;
@@ -61,7 +61,7 @@ impl Stretch {
 
     /// `J` and `det J` at a point given by its barycentric coordinates.
     fn jacobian(&self, lambda: &[f64; 4]) -> (Tensor, f64) {
-        let y: Point = std::array::from_fn(|d| (0..4).map(|a| lambda[a] * self.offsets[a][d]).sum());
+        let y = point_at(&self.offsets, lambda);
         let r: f64 = (0..4).map(|a| lambda[a] * self.gauge[a]).sum();
         let (f, theta) = (1.0 / (r * (2.0 - r)), (2.0 - 2.0 * r) / (2.0 - r));
         let jacobian = std::array::from_fn(|i| {

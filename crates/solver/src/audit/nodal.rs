@@ -64,16 +64,17 @@ impl SkinAudit {
         NodalErrors { field: finer[0] * field, losses: finer[1] * losses, is_filled }
     }
 
-    /// Relative error of the losses of this conductor where nodal elements of an order have its impedance surface: there `A + ∇ψ`
-    /// is not zero either, but is left with `h|∇A|` in first order.
-    pub fn nodal_surface_losses(&self, order: Order) -> f64 {
-        match order {
+    /// What nodal elements of an order make of its impedance surface: there `A + ∇ψ` is not zero either, but is left with `h|∇A|` in
+    /// first order.
+    pub fn nodal_surface_errors(&self, order: Order) -> NodalErrors {
+        let losses = match order {
             Order::Linear => {
                 SURFACE * (self.edge_length / (self.skin_depth * self.relative_permeability)).powi(2)
             }
             // At most 0.2 % of all that was measured.
             Order::Quadratic => 0.0,
-        }
+        };
+        NodalErrors { field: 0.0, losses, is_filled: false }
     }
 
     /// The relative permeability of iron without eddy currents that would carry as much flux along this conductor, up to its

@@ -170,6 +170,8 @@ fn eighths(tet: [Point; 4]) -> [[Point; 4]; 8] {
 
 #[cfg(test)]
 mod tests {
+    use fluxmorph_geometry::tet4::point_at;
+
     use super::*;
     use crate::coil::frame::Frame;
     use crate::coil::total;
@@ -276,8 +278,7 @@ mod tests {
                     continue;
                 }
                 let lambda = [first, l[0], l[1], l[2]];
-                let x = std::array::from_fn(|d| (0..4).map(|a| lambda[a] * tet[a][d]).sum());
-                let t = coil.potential(x);
+                let t = coil.potential(point_at(&tet, &lambda));
                 count += 1.0;
                 for (s, lambda) in sum.iter_mut().zip(lambda) {
                     *s += t * lambda;

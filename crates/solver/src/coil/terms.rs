@@ -44,9 +44,10 @@ impl SourceTerms {
                     }
                     let potential = times(&racetrack.axis().map(|e| racetrack.plateau() * e));
                     for (e, moment) in moments {
-                        match racetrack.encloses(&mesh.vertices(e)) {
-                            true => windows.push((e, [potential])),
-                            false => cut.push(e),
+                        if racetrack.encloses(&mesh.vertices(e)) {
+                            windows.push((e, [potential]));
+                        } else {
+                            cut.push(e);
                         }
                         all.push((e, moment.each_ref().map(times)));
                     }

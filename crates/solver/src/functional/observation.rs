@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, volume as volume_of};
+use fluxmorph_geometry::tet4::{Point, point_at, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use rayon::prelude::*;
 
@@ -373,9 +373,8 @@ impl FixedCells {
             for &e in cell {
                 let (vertices, volume) = (mesh.vertices(e), volume_of(mesh.vertices(e)));
                 for (lambda, share) in rule {
-                    let place = |d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>();
                     parts.push((places.len(), share * volume));
-                    places.push((std::array::from_fn(place), e));
+                    places.push((point_at(&vertices, lambda), e));
                 }
             }
             let groups =

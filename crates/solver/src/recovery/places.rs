@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
-use fluxmorph_geometry::tet4::{Point, Tet4};
+use fluxmorph_geometry::tet4::{Point, Tet4, point_at, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
@@ -132,21 +132,16 @@ impl FixedPlaces {
 
 /// Where samples lie [m], from a point.
 pub(super) fn offsets(mesh: &Mesh, samples: &[(ElementId, &[f64; 4])], origin: Point) -> Vec<Point> {
-    let place = |(e, lambda): &(ElementId, &[f64; 4])| {
-        let vertices = mesh.vertices(*e);
-        std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum::<f64>() - origin[d])
-    };
-    samples.iter().map(place).collect()
+    samples.iter().map(|(e, lambda)| sub(point_at(&mesh.vertices(*e), lambda), origin)).collect()
 }
 
 impl BlendedPoint {
     /// `B` [T] there.
     pub(crate) fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
-        let parts = self
-            .patches
-            .iter()
-            .zip(self.shares)
-            .map(|(patch, (lambda, _))| patch.flux_density(solution, model, mesh).map(|c| lambda * c));
+        let part = |(patch, (lambda, _)): (&Patch, (f64, Point))| {
+            patch.blend(&patch.values(solution, model, mesh)).map(|c| lambda * c)
+        };
+        let parts = self.patches.iter().zip(self.shares).map(part);
         parts.fold([c64::default(); 3], |sum, part| std::array::from_fn(|d| sum[d] + part[d]))
     }
 
@@ -159,36 +154,38 @@ impl BlendedPoint {
     ) {
         let vertices = model.topology().tet(self.element);
         for (patch, (lambda, gradient)) in self.patches.iter().zip(self.shares) {
-            let along = dot3(q, patch.flux_density(solution, model, mesh));
+            let values = patch.values(solution, model, mesh);
+            let along = dot3(q, patch.blend(&values));
             // The place stays: δλ_a = −∇λ_a · v, with v = λ_k d.
             for (node, (of_node, _)) in vertices.iter().zip(self.shares) {
                 let change = -2.0 * of_node * along.re;
                 (0..3).for_each(|d| by_positions[node.index()][d] += change * gradient[d]);
             }
             let own = q.map(|c| lambda * c);
-            patch.add_derivatives(own, (solution, model, mesh), (by_potentials, by_positions));
+            patch.add_derivatives((own, &values), (solution, model, mesh), (by_potentials, by_positions));
         }
     }
 }
 
 impl Patch {
+    /// `B` [T] at the samples.
     fn values(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
         self.samples.iter().map(|(e, lambda)| solution.at(model, mesh, *e, lambda).flux_density).collect()
     }
 
-    fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
-        let values = self.values(solution, model, mesh);
+    /// `B` [T] at the place, of the values at the samples.
+    fn blend(&self, values: &[Complex3]) -> Complex3 {
         std::array::from_fn(|d| values.iter().zip(&self.weights).map(|(b, w)| *w * b[d]).sum())
     }
 
     fn add_derivatives(
         &self,
-        q: Complex3,
+        (q, values): (Complex3, &[Complex3]),
         (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
         (by_potentials, by_positions): (&mut [c64], &mut [Point]),
     ) {
         let (space, topology) = (model.space(), model.topology());
-        let along: Vec<c64> = self.values(solution, model, mesh).into_iter().map(|b| dot3(q, b)).collect();
+        let along: Vec<c64> = values.iter().map(|b| dot3(q, *b)).collect();
         let by_points = self.fit.value_by_points(&self.weights, &along);
         for (((e, lambda), weight), by_point) in self.samples.iter().zip(&self.weights).zip(by_points) {
             let own = q.map(|c| *weight * c);
