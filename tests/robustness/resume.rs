@@ -84,8 +84,7 @@ fn cut_everywhere(name: &str, device: &(Config, SourceMap)) -> journal::Contents
     let journal = journal::parse(&files[Path::new("journal.jsonl")]).expect("a journal");
     for cut in 0..=journal.records.len() {
         let disk = cut_behind(&files, cut);
-        resume(&disk.shared(), RunLimits::default())
-            .unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
+        resume(&disk.shared(), RunLimits::default()).unwrap_or_else(|e| panic!("{name}, cut at {cut}: {e}"));
         assert_same(&essence(&disk.files(FOLDER.as_ref())), &expected, &format!("{name}, cut at {cut}"));
     }
     journal
