@@ -38,6 +38,8 @@ pub struct Carried {
     pub moved: Moved,
     /// Room at the end of the path, whether or not it is reached.
     pub room: Room,
+    /// Where the nodes come to rest at the end of the path, if they do.
+    asked: Option<Equilibrium>,
 }
 
 /// A smooth lower bound of the least stretch.
@@ -79,21 +81,30 @@ impl Motion {
             Some(near) => law.near(near, design),
             None => law.equilibrium(design),
         };
-        let Some(equilibrium) = settled(own)? else { return Ok(None) };
+        settled(own)?.map(|own| self.shortfall_at(own)).transpose()
+    }
+
+    /// As [`Motion::shortfall`], of the end of a path.
+    ///
+    /// # Errors
+    /// [`RemeshError::NotFinite`].
+    pub fn shortfall_at_end(&self, carried: &Carried) -> Result<Option<Shortfall>, RemeshError> {
+        carried.asked.clone().map(|own| self.shortfall_at(own)).transpose()
+    }
+
+    fn shortfall_at(&self, equilibrium: Equilibrium) -> Result<Shortfall, RemeshError> {
+        let law = self.energy_law();
         let stretches = law.stretches(&equilibrium.displacement);
         if soft_minimum(&stretches).0 >= LEAST_ROOM {
-            return Ok(Some(Shortfall {
-                value: 0.0,
-                gradient: vec![[0.0; 3]; design.len()],
-                equilibrium: None,
-            }));
+            let gradient = vec![[0.0; 3]; law.rest().design_nodes().len()];
+            return Ok(Shortfall { value: 0.0, gradient, equilibrium: None });
         }
         let missing: Vec<f64> = stretches.iter().map(|j| (INTENDED_STRETCH - j).max(0.0)).collect();
         let value = ordered_sum(missing.len(), |i| 0.5 * missing[i] * missing[i]);
         let shares: Vec<f64> = missing.iter().map(|m| -m).collect();
         let nodal = law.stretch_derivative(&equilibrium.displacement, &shares);
         let gradient = equilibrium.tangent.gradient(&nodal)?;
-        Ok(Some(Shortfall { value, gradient, equilibrium: Some(equilibrium) }))
+        Ok(Shortfall { value, gradient, equilibrium: Some(equilibrium) })
     }
 
     /// How far the mesh follows a path `t → Δx_b(t)` of design displacements [m], `0 ≤ t ≤ 1`, whose beginning it carries.
@@ -110,9 +121,9 @@ impl Motion {
             && room.value >= LEAST_ROOM
             && let Ok(moved) = self.at(asked.clone())
         {
-            return Ok(Carried { share: 1.0, moved, room: room.clone() });
+            return Ok(Carried { share: 1.0, moved, room: room.clone(), asked: Some(asked.clone()) });
         }
-        let (share, moved) = self.longest_part(law, path, asked)?;
+        let (share, moved) = self.longest_part(law, path, asked.clone())?;
         let room = match (room, &moved.tangent) {
             (None, Some(tangent)) => {
                 let near = room_of(law, &moved.displacement, tangent)?;
@@ -120,7 +131,7 @@ impl Motion {
             }
             (room, _) => room.expect("an equilibrium has a tangent"),
         };
-        Ok(Carried { share, moved, room })
+        Ok(Carried { share, moved, room, asked })
     }
 
     /// The longest part of a path that is carried, and the mesh there; `near` is an equilibrium near the path.

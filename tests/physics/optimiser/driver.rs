@@ -7,6 +7,8 @@ use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::problem::{Problem, Shape};
 
 use crate::problems::{optimised, quick};
+use crate::support::device::{BLOCK, HYPERELASTIC};
+use crate::support::{changed, setup_of};
 
 #[test]
 fn every_algorithm_improves_the_shield_within_its_bounds() {
@@ -132,5 +134,29 @@ fn other_methods_do_not_converge_at_the_lid_either() {
         check_rows(&optimised, &rows, 0.0);
         assert!(rows.iter().all(|row| row.worst_quality > 0.0));
         assert!(!optimised.stop_reason.is_converged(), "{algorithm:?}: {:?}", optimised.stop_reason);
+    }
+}
+
+/// A face that moves in the middle of a mesh that ends on all sides, by as much as the gap below it.
+const AMID: [(&str, &str); 5] = [
+    ("cells = [2, 2, 1]", "cells = [4, 4, 4]"),
+    ("lower = \"-4 mm\"", "lower = \"-9.4 mm\""),
+    ("upper = \"4 mm\"", "upper = \"9.4 mm\""),
+    ("region = [\"gap\", \"iron\"]", "region = [\"gap\", \"iron\", \"air\"]"),
+    HYPERELASTIC,
+];
+
+#[test]
+fn what_would_help_a_squeezed_mesh_is_chosen_by_where_and_why() {
+    let rim = "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)";
+    let [rough, lid] = ["a filter (design.filter_radius) or", "a larger remesh region or narrower bounds"];
+    let raw = ("[design]", "[design]\nfilter_radius = 0");
+    for (changes, expected, other) in [(vec![raw], [rim, rough], lid), (vec![], [rim, lid], rough)] {
+        let mut problem = setup_of(&changed(BLOCK, &[&AMID, &changes[..]].concat())).problem;
+        let settings = Optimizer { max_evaluations: 15, ftol_rel: 0.0, ..Optimizer::default() };
+        let mut notes = Notes::default();
+        optimised(&mut problem, &settings, &mut notes);
+        let said = |words: &str| notes.0.iter().filter(|note| note.contains(words)).count();
+        assert_eq!((expected.map(said), said(other)), ([1, 1], 0), "{:?}", notes.0);
     }
 }

@@ -60,3 +60,37 @@ fn iron_loses_by_the_permeability_of_its_skin() {
         assert!(field < most && field > 0.4 * most, "{depth} m: {field}");
     }
 }
+
+/// Plates and blocks of iron, free and on a wall: what nothing is said of has its losses right to a tenth. The limits are those of
+/// `crates/app/build/elements.rs`: of any iron 4, of iron that currents fill 1 (10 in second order).
+#[test]
+fn losses_of_iron_are_right_where_nothing_is_said() {
+    let blocks = [[[-0.4, -1.0], [1.0, -0.95]], [[-0.3, -0.3], [0.1, 0.1]], [[-0.3, -0.1], [0.1, 0.0]]];
+    let mut said_of = Vec::new();
+    for (block, permeability) in blocks.into_iter().flat_map(|block| [10.0, 100.0].map(|mu| (block, mu))) {
+        for depth in [1.0, 0.3, 0.1, 0.03] {
+            let prism = cases::meshed(block, depth, permeability);
+            let (_, loss, expected, carrying) = seen_and_expected(&prism, Order::Linear);
+            let drawn_in = carrying * (1.0 - 1.0 / permeability);
+            let is_said = carrying > 4.0 || expected.losses > 0.1 || (expected.is_filled && drawn_in > 1.0);
+            assert!(is_said || loss < 0.1, "{}: {loss}", prism.name);
+            if is_said {
+                said_of.push(loss);
+            }
+        }
+    }
+    // A warning too many is better than none; those of half of them are needed.
+    let needed = said_of.iter().filter(|loss| **loss > 0.1).count();
+    assert!(2 * needed >= said_of.len(), "{said_of:?}");
+}
+
+/// Of second order a free plate that carries as 1.9 has its losses right, and is silent; of one that carries as 19 it is said.
+#[test]
+fn losses_of_iron_of_second_order_are_right_where_nothing_is_said() {
+    for (permeability, depth, within) in [(10.0, 1.0, 0.1), (10.0, 0.1, 0.1), (100.0, 1.0, 0.2)] {
+        let prism = cases::meshed([[-0.3, -0.1], [0.1, 0.0]], depth, permeability);
+        let (_, loss, _, carrying) = seen_and_expected(&prism, Order::Quadratic);
+        assert_eq!(carrying * (1.0 - 1.0 / permeability) > 10.0, within > 0.1);
+        assert!(loss < within && loss > within - 0.1, "{}: {loss}", prism.name);
+    }
+}

@@ -81,12 +81,13 @@ impl Run<'_> {
         let from = self.best.as_ref().map_or_else(|| vec![0.0; p.len()], |best| best.values.clone());
         let shape = self.shape();
         let carried_to = |p: &[f64]| shape.carried(&from, p).map_err(Error::from);
-        let Carried { mut share, mut moved, room } = carried_to(p)?;
-        let room_gradient = shape.surface().gradient(&room.gradient);
-        let (mut goal, mut cut) = (p.to_vec(), None);
-        if share < 1.0 {
-            cut = Some(self.why_cut(p, room.element));
-            let pushed = shape.pushed_back(p).map_err(Error::from)?;
+        let asked = carried_to(p)?;
+        let room_gradient = shape.surface().gradient(&asked.room.gradient);
+        let pushed = if asked.share < 1.0 { shape.pushed_back(p, &asked).map_err(Error::from)? } else { p.to_vec() };
+        let Carried { mut share, mut moved, room, .. } = asked;
+        let cut = (share < 1.0).then(|| self.why_cut(p, room.element));
+        let mut goal = p.to_vec();
+        if pushed != p {
             let nearer = carried_to(&pushed)?;
             let distance = |other: &[f64]| p.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
             if distance(&between(&from, &pushed, nearer.share)) < distance(&between(&from, p, share)) {

@@ -1,7 +1,7 @@
 //! What moves: design variables to surface, surface to mesh, within bounds.
 
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError, Shortfall};
+use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError};
 
 use super::finite;
 use crate::design::DesignSurface;
@@ -122,31 +122,32 @@ impl Shape {
         self.motion.carried_along(&path)
     }
 
-    /// A design near `p` and between the bounds that the mesh carries, or nearly does: every element that is squeezed too much
-    /// pushes the variables around it back, by subgradient steps of Polyak's length, which come nearer to *every* carried design.
+    /// A design near `p`, the end of a way that is `carried` in part, and between the bounds that the mesh carries, or nearly does:
+    /// every element that is squeezed too much pushes the variables around it back, by subgradient steps of Polyak's length, which
+    /// come nearer to *every* carried design. `p` itself where the nodes do not come to rest there.
     ///
     /// # Errors
     /// As [`Motion::shortfall`].
     ///
     /// # Panics
     /// If `p` has another length than there are variables.
-    pub fn pushed_back(&self, p: &[f64]) -> Result<Vec<f64>, RemeshError> {
+    pub fn pushed_back(&self, p: &[f64], carried: &Carried) -> Result<Vec<f64>, RemeshError> {
         let mut design = p.to_vec();
-        let mut near: Option<Shortfall> = None;
-        for _ in 0..MOST_PUSHES {
-            let Some(shortfall) = self.motion.shortfall(&self.displacement(&design), near.as_ref())? else {
-                break;
-            };
-            let (value, gradient) = (shortfall.value, self.surface.gradient(&shortfall.gradient));
-            near = Some(shortfall);
+        let mut shortfall = self.motion.shortfall_at_end(carried)?;
+        for push in 1..=MOST_PUSHES {
+            let Some(own) = shortfall.take() else { break };
+            let gradient = self.surface.gradient(&own.gradient);
             let square: f64 = gradient.iter().map(|g| g * g).sum();
             if square == 0.0 {
                 break;
             }
             // Of the root of the shortfall, whose least value is known to be zero.
-            let length = 2.0 * value / square;
+            let length = 2.0 * own.value / square;
             for (k, x) in design.iter_mut().enumerate() {
                 *x = (*x - length * gradient[k]).clamp(self.lower[k], self.upper[k]);
+            }
+            if push < MOST_PUSHES {
+                shortfall = self.motion.shortfall(&self.displacement(&design), Some(&own))?;
             }
         }
         Ok(design)

@@ -116,13 +116,13 @@ pub(crate) fn table() -> String {
     for (device, kinds) in [(&ball, of_ball(&ball)), (&rotor, of_rotor(&rotor)), (&block, lines.into())] {
         let laws = [MotionLaw::Linear, MotionLaw::Hyperelastic].map(|law| device.motion(law));
         for kind in kinds {
-            let [linear, own] = laws.each_ref().map(|motion| measured(motion, &kind));
+            let [linear, own] = laws.each_ref().map(|motion| measured(motion, &kind.designs));
             let line = format!(
                 "| {} | {} | {} | {} |\n",
                 kind.name,
                 kind.designs.len(),
-                linear.cells(),
-                own.cells()
+                linear.cells(kind.designs.len()),
+                own.cells(kind.designs.len())
             );
             print!("{line}");
             assert_eq!(own.carried, kind.designs.len(), "{}", kind.name);

@@ -21,6 +21,8 @@ pub(crate) struct Kind {
 
 /// What a law makes of them.
 pub(crate) struct Row {
+    /// Designs that were tried, and of these those that are carried.
+    tried: usize,
     pub(crate) carried: usize,
     /// Least ratio of an element's volumes and worst quality over the carried designs, and most Newton steps.
     pub(crate) stretch: f64,
@@ -49,13 +51,14 @@ fn least_stretch(mesh: &Mesh, moved: &Moved) -> f64 {
     mesh.topology().elements().map(ratio).fold(f64::INFINITY, f64::min)
 }
 
-/// What a motion makes of the designs of a kind, each on its own.
-pub(crate) fn measured(motion: &Motion, kind: &Kind) -> Row {
-    let mut row = Row { carried: 0, stretch: f64::INFINITY, quality: f64::INFINITY, steps: 0, time: 0.0 };
-    for design in &kind.designs {
+/// What a motion makes of designs of a kind, each on its own.
+pub(crate) fn measured(motion: &Motion, designs: &[Vec<Point>]) -> Row {
+    let (tried, least) = (designs.len(), f64::INFINITY);
+    let mut row = Row { tried, carried: 0, stretch: least, quality: least, steps: 0, time: 0.0 };
+    for design in designs {
         let clock = ProcessTime::now();
         let moved = motion.moved(design);
-        row.time += clock.elapsed().as_secs_f64() / kind.designs.len() as f64;
+        row.time += clock.elapsed().as_secs_f64() / tried as f64;
         match moved {
             Ok(moved) => {
                 row.carried += 1;
@@ -71,13 +74,15 @@ pub(crate) fn measured(motion: &Motion, kind: &Kind) -> Row {
 }
 
 impl Row {
-    /// Its cells of the table: carried, least ratio of volumes, worst quality, Newton steps, CPU time.
-    pub(crate) fn cells(&self) -> String {
-        let Self { carried, stretch, quality, steps, time } = self;
+    /// Its cells of the table: carried, of how many where that is not the `of` of the row, least ratio of volumes, worst
+    /// quality, Newton steps, CPU time.
+    pub(crate) fn cells(&self, of: usize) -> String {
+        let Self { tried, carried, stretch, quality, steps, time } = self;
+        let share = if *tried < of { format!("{carried} of {tried}") } else { carried.to_string() };
         if *carried == 0 {
-            return format!("0 | – | – | – | {time:.3}");
+            return format!("{share} | – | – | – | {time:.3}");
         }
         let short = |x: f64| if x < 1e-3 { format!("{x:.0e}") } else { format!("{x:.3}") };
-        format!("{carried} | {} | {} | {steps} | {time:.3}", short(*stretch), short(*quality))
+        format!("{share} | {} | {} | {steps} | {time:.3}", short(*stretch), short(*quality))
     }
 }
