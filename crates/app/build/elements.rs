@@ -72,7 +72,11 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Vec<
     let conductors = nodal_conductors(config, audits)
         .filter(|(_, errors)| errors.field > FIELD[0] || errors.losses > LOSSES[0])
         .map(|(audited, errors)| format!("{}. Set {CURE}", coarse(config, audited, &errors)));
-    beside_iron(config, mesh, audits).into_iter().chain(filled_iron(config, audits)).chain(conductors).collect()
+    beside_iron(config, mesh, audits)
+        .into_iter()
+        .chain(filled_iron(config, audits))
+        .chain(conductors)
+        .collect()
 }
 
 /// Iron that is no thicker than its skin, whose losses go with the flux that it draws in, of which nodal elements lose a part.

@@ -83,7 +83,8 @@ impl Run<'_> {
         let carried_to = |p: &[f64]| shape.carried(&from, p).map_err(Error::from);
         let asked = carried_to(p)?;
         let room_gradient = shape.surface().gradient(&asked.room.gradient);
-        let pushed = if asked.share < 1.0 { shape.pushed_back(p, &asked).map_err(Error::from)? } else { p.to_vec() };
+        let pushed =
+            if asked.share < 1.0 { shape.pushed_back(p, &asked).map_err(Error::from)? } else { p.to_vec() };
         let Carried { mut share, mut moved, room, .. } = asked;
         let cut = (share < 1.0).then(|| self.why_cut(p, room.element));
         let mut goal = p.to_vec();
