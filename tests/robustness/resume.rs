@@ -9,7 +9,7 @@ use fluxmorph::run::{RunLimits, journal};
 
 use crate::disk::SimulatedDisk;
 use crate::in_memory::{FOLDER, block, constrained, moved_by, resume, run, shipped, throttled};
-use crate::support::device::{HYPERELASTIC, LINEAR, SATURATED};
+use crate::support::device::{HYPERELASTIC, IN_A_MOVING_GAP, LINEAR, SATURATED};
 use crate::support::essence::{Essence, assert_same, essence};
 
 /// A disk on which a run has just lost its power behind `evaluations`: the journal ends there, and the rest is as it was.
@@ -68,6 +68,7 @@ fn a_run_cut_at_any_evaluation_goes_on_as_if_it_had_not_been() {
         ("saturated", block(&[SATURATED[0], SATURATED[1], SATURATED[2], SATURATED[3]])),
         ("saturated at 50 Hz", block(&SATURATED[..3])),
         ("throttled", throttled()),
+        ("observed where it moves", block(&IN_A_MOVING_GAP)),
         ("last", kept("first_last")),
         ("none", kept("none")),
         ("shield", shipped("shield_quick.toml")),

@@ -56,11 +56,34 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let home = folder();
     let out = home.path().join("out");
     let options = ["--max-evaluations", "2", "--set", "analysis.order=1"];
-    finish(&mut shipped("inductor", &options).command("run", &out))
-        .with(1, &["checking the best shape on finer elements", "F/F0 on a fresh mesh"]);
+    finish(&mut shipped("inductor", &options).command("run", &out)).with(
+        1,
+        &["checking the best shape on finer elements", "F/F0 on a fresh mesh", "is curved, and its facets"],
+    );
     let result = read_json(&out.join("result.json"));
     assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);
     assert!(result["accuracy"]["verdict"].is_string());
+    // A round core and a round coil, of which no refinement of the mesh knows.
+    let facets = &result["accuracy"]["facets"];
+    println!("{facets}");
+    assert!(number(facets, "/off_m") > 1e-5 && number(facets, "/off_m") < 1e-2, "{facets}");
+}
+
+/// A tolerance that so many refinements do not keep: the run says so, and what would.
+#[test]
+fn a_tolerance_that_the_refinements_do_not_reach_is_said_to_be_missed() {
+    let home = folder();
+    let out = home.path().join("out");
+    let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
+    let tight = ("[analysis]", "[accuracy]\ntolerance = \"0.1 %\"\nmax_refinements = 1\n\n[analysis]");
+    let device = written("block", home.path(), &[edges, tight]);
+    finish(&mut device.command("run", &out))
+        .says(&["all 1 refinements are used", "allow more accuracy.max_refinements"]);
+    let result = read_json(&out.join("result.json"));
+    assert_eq!(count(&result, "/accuracy/refinements"), 1);
+    assert_eq!(result["accuracy"]["within_tolerance"], false);
+    let page = std::fs::read_to_string(out.join("report.html")).expect("a report");
+    assert!(page.contains("beyond the tolerance"));
 }
 
 /// A pole of coarse first-order elements, with a tolerance: what it reports of itself has to hold against second order.

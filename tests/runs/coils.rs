@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::changed;
 use crate::support::folder::{read_json, read_text};
 use crate::support::program::{Finished, fluxmorph, folder};
+use crate::support::{changed, with_mesh_file};
 
 const COILS: &str = include_str!("../support/coils.toml");
 
@@ -57,6 +57,31 @@ fn the_energy_is_that_of_the_inductances_and_the_matrix_is_symmetric() {
     assert!((l(0, 1) / l(1, 0) - 1.0).abs() < 1e-9);
     let coupling = l(0, 1) / (l(0, 0) * l(1, 1)).sqrt();
     assert!((number(&result["coupling"][0][1]) / coupling - 1.0).abs() < 1e-12);
+}
+
+/// A shell that a mesh file has is that which is put around a mesh.
+#[test]
+fn a_shell_of_a_mesh_file_is_open_space() {
+    let home = folder();
+    let walls = "flux_parallel = [\"x_min\", \"y_min\", \"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
+    let around = "flux_parallel = [\"x_min\", \"y_min\"]\n\n[open]\nsurfaces = [\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
+    execute("solve", home.path(), &[(walls, around)]).completed();
+    let run = home.path().join("run");
+    let expected = read_json(&run.join("result.json"));
+    std::fs::copy(run.join("optimum.msh"), home.path().join("shell.msh")).expect("copied");
+    let own = "flux_parallel = [\"x_min\", \"y_min\", \"infinity\"]\n\n[open]\nregion = \"open\"";
+    let text = with_mesh_file(&changed(COILS, &[(walls, own)]), "shell.msh");
+    let config = home.path().join("file.toml");
+    std::fs::write(&config, text).expect("written");
+    fluxmorph(&[&"solve", &config, &"--out", &run, &"--quiet", &"--force"]).completed();
+    let found = read_json(&run.join("result.json"));
+    for (j, k) in [(0, 0), (0, 1), (1, 1)] {
+        let [a, b] = [&found, &expected].map(|result| number(&result["inductance_h"][j][k]));
+        // Coordinates of the file are within a rounding.
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    let share = |result: &Value| number(&result["open"]["energy_share"][0]);
+    assert!(share(&expected) > 1e-3 && (share(&found) / share(&expected) - 1.0).abs() < 1e-9);
 }
 
 #[test]

@@ -69,3 +69,21 @@ fn a_design_that_acts_at_other_places_is_refused_whatever_its_count() {
     finish(other.command("solve", &solved).arg("--design").arg(&list)).exits_with(0);
     assert_eq!(count(&RunFolder(solved).result(), "/evaluations"), 1);
 }
+
+/// A place that stays is of use where the body does not come: a search that meets one goes on nearer, a design that covers one is
+/// refused with the place and what is there.
+#[test]
+fn a_face_that_reaches_an_observed_place_is_cut_short() {
+    let home = folder();
+    let changes = [
+        ("region = \"observation\"", "region = \"gap\"\nfollow = \"space\"\ngoal = \"maximise\""),
+        ("max_evaluations = 6", "max_evaluations = 12"),
+    ];
+    let device = written("device", home.path(), &changes);
+    let reached = &["would lie in `iron`", "narrow the bounds of the design"];
+    finish(&mut device.command("run", &home.path().join("run"))).with(1, reached);
+    let result = RunFolder(home.path().join("run")).result();
+    assert!(number(&result, "/objective/ratio") > 1.0, "it goes on nearer");
+    let covered = device.with("design.initial=\"4 mm\"");
+    finish(&mut covered.command("solve", &home.path().join("solved"))).with(3, reached);
+}

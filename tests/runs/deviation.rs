@@ -4,7 +4,7 @@ use std::path::Path;
 
 use fluxmorph_geometry::tet4::{centroid, volume};
 
-use crate::support::device::written;
+use crate::support::device::{IN_A_MOVING_GAP, written};
 use crate::support::folder::{RunFolder, number, scalars, vectors};
 use crate::support::markup::elements;
 use crate::support::program::{finish, folder};
@@ -93,10 +93,45 @@ fn the_deviation_of_an_expansion_is_what_its_main_terms_leave_inside_the_ball() 
     ];
     let out = home.path().join("out");
     finish(&mut written("block", home.path(), &changes).command("run", &out)).completed();
-    let all = deviations(&RunFolder(out), 0);
+    let run = RunFolder(out);
+    let page = run.text("report.html");
+    let figures = elements(&page);
+    let of_terms = |e: &&str| e.starts_with("Terms of the expansion ball, the largest");
+    assert_eq!(figures.iter().filter_map(|e| e.get("aria-label")).filter(of_terms).count(), 1);
+    assert!(page.contains("before above, after below"));
+    let result = run.result();
+    let terms = |at: &str| result.pointer(at).and_then(|terms| terms.as_array()).map(Vec::len);
+    assert_eq!(terms("/initial/0/multipoles/0/terms"), terms("/multipoles/0/terms"));
+    let all = deviations(&run, 0);
     let largest = all.iter().map(|(d, ..)| d.abs()).fold(0.0, f64::max);
     let along = all.iter().map(|(.., b)| b[2].abs()).fold(0.0, f64::max);
     println!("{} elements, deviation up to {largest:.2e} of {along:.2e} T", all.len());
     assert!(all.len() > 20 && all.iter().all(|(_, _, x, _)| x[0].hypot(x[1]).hypot(x[2]) <= 0.005));
     assert!(largest > 1e-4 * along && largest < 0.3 * along, "{largest} {along}");
+}
+
+/// The holders of places that stay have the deviation of their own field; the page says that the places stay.
+#[test]
+fn the_deviation_where_the_mesh_moves_lies_in_the_elements_that_hold_the_places() {
+    let home = folder();
+    let out = home.path().join("out");
+    let device = written("block", home.path(), &[&[AT_REST[0]], &IN_A_MOVING_GAP[..]].concat());
+    finish(&mut device.command("run", &out)).completed();
+    let run = RunFolder(out);
+    let best = number(&run.result(), "/objective/best_evaluation") as u64;
+    assert!(best > 0 && number(&run.result(), "/objective/ratio") < 1.0);
+    for evaluation in [0, best] {
+        let all = deviations(&run, evaluation);
+        // The places are at most 10 mm off the middle, and cells 5 mm wide.
+        assert!(all.len() > 20 && all.iter().all(|(_, _, x, _)| x.iter().all(|c| *c < 15e-3)));
+        let total: f64 = all.iter().map(|(_, v, ..)| v).sum();
+        let mean = all.iter().map(|(_, v, _, b)| v * b[2]).sum::<f64>() / total;
+        let level = all.iter().map(|(d, _, _, b)| b[2] - d).sum::<f64>() / all.len() as f64;
+        println!("{} elements, mean {mean:.6} T, {level:.6} T is compared with", all.len());
+        // One mean for all, near that of the elements.
+        assert!(all.iter().all(|(d, _, _, b)| (b[2] - d - level).abs() < 1e-13));
+        assert!((level / mean - 1.0).abs() < 0.01, "{level} {mean}");
+    }
+    let page = run.text("report.html");
+    assert!(page.contains("at places that stay") && page.contains("Deviation of the field"));
 }

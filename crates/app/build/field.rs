@@ -366,7 +366,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
             let fault = source.diagnostic(&path, format!("`{name}` is replaced by its surface"));
             faults.push(fault.expected("a region that is meshed"));
         } else if coil.is_solid() {
-            faults.extend(solid_fault(config, source, &path, name));
+            faults.extend(solid_fault(config, source, i, name));
         } else if config.frequencies().iter().any(|&f| f > 0.0) && material(config, name).conductivity > 0.0 {
             let message = format!(
                 "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
@@ -379,13 +379,22 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
     faults
 }
 
-/// A solid conductor that does not conduct.
-fn solid_fault(config: &Config, source: &SourceMap, path: &str, region: &str) -> Option<Diagnostic> {
-    if material(config, region).conductivity > 0.0 {
-        return None;
+/// A solid conductor that does not conduct, or whose circuit would not be linear.
+fn solid_fault(config: &Config, source: &SourceMap, coil: usize, region: &str) -> Option<Diagnostic> {
+    if material(config, region).conductivity == 0.0 {
+        let path = format!("coils[{coil}].region");
+        let fault =
+            source.diagnostic(&path, format!("`{region}` is a solid conductor, but does not conduct"));
+        return Some(
+            fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""),
+        );
     }
-    let fault = source.diagnostic(path, format!("`{region}` is a solid conductor, but does not conduct"));
-    Some(fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""))
+    let curved = config.saturating_region().filter(|_| config.frequencies().iter().any(|&f| f > 0.0))?;
+    let message = format!(
+        "`{region}` is a solid conductor, and `{curved}` has a B–H curve: no circuit of both above 0 Hz"
+    );
+    let fault = source.diagnostic(&format!("coils[{coil}].conductor"), message);
+    Some(fault.expected("a relative_permeability for the iron, conductor = \"stranded\", or frequency = 0"))
 }
 
 /// Remanence of every region [T], by `RegionId`; zero where there is no magnet.

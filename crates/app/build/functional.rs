@@ -138,10 +138,7 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
         let is_of_inductances = functional.coils.is_some()
             && !matches!(functional.kind, ObjectiveKind::FluxLinkage)
             && functional.kind.may_be_static();
-        let saturates = |region: &config::Region| {
-            config.materials.get(&region.material).is_some_and(config::Material::saturates)
-        };
-        if is_of_inductances && config.regions.values().any(saturates) {
+        if is_of_inductances && config.saturating_region().is_some() {
             let message = format!(
                 "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
             );

@@ -192,6 +192,7 @@ impl Blame<'_> {
                 };
                 self.at(&format!("materials.{name}.{key}"), error)
             }
+            SolverError::SolidOnRanks { coil } => self.at(&format!("{}.conductor", self.coil(coil)?), error),
             SolverError::ProbeOutside { probe, .. } => {
                 let index = self.config.probes.iter().position(|own| own.name == *probe)?;
                 self.at(&format!("probes[{index}].points"), error)

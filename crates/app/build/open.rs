@@ -24,6 +24,14 @@ fn region_of(open: &Open) -> &str {
 
 /// The mesh with the shell of the configuration around it; one that names no such surface is refused later, with all other names.
 pub(super) fn with_shell(mesh: Mesh, config: &Config, source: &SourceMap) -> Result<Mesh, Error> {
+    if config.open.is_some() && config.boundaries.uniform_field.is_some() {
+        let message = "an applied field does not vanish at infinity, as [open] has it";
+        let instead =
+            "coils that make it, such as two large circular ones around the device; or walls without [open]";
+        return Err(source
+            .error(vec![source.diagnostic("boundaries.uniform_field", message).expected(instead)])
+            .into());
+    }
     let Some(open) = config.open.as_ref().filter(|open| open.region.is_none()) else { return Ok(mesh) };
     if open.surfaces().iter().any(|name| mesh.topology().surface(name).is_err()) {
         return Ok(mesh);

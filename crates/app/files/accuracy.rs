@@ -34,6 +34,9 @@ pub struct Accuracy {
     /// Whether the error bars are within `accuracy.tolerance`; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub within_tolerance: Option<bool>,
+    /// The curved surface whose facets are farthest off it; `None` where none is curved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facets: Option<CurvedFacets>,
     /// The same two shapes by other elements on the same mesh.
     pub cross_check: Option<CrossCheck>,
     /// Whether the gain of a run is the shape's.
@@ -52,6 +55,17 @@ pub struct Level {
     pub objective: f64,
     /// Its estimated error relative to it.
     pub error_estimate_relative: Option<f64>,
+}
+
+/// How far the facets of the initial mesh are from the curved surface that they stand for: an error of the geometry, in no estimate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CurvedFacets {
+    /// The regions on both sides.
+    pub surface: String,
+    /// Distance of the surface from the middle of the edge that is farthest off it [m].
+    pub off_m: f64,
+    /// Where that is [m].
+    pub at_m: [f64; 3],
 }
 
 /// The gain of a run by other elements on its own mesh.

@@ -22,7 +22,7 @@ mod synced;
 
 use std::path::PathBuf;
 
-pub use accuracy::{Accuracy, CrossCheck, Level, SAFETY, Verdict, relative_bar};
+pub use accuracy::{Accuracy, CrossCheck, CurvedFacets, Level, SAFETY, Verdict, relative_bar};
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, read_design};
 pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};

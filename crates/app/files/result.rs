@@ -395,6 +395,7 @@ pub(crate) mod tests {
                 refinements: 0,
                 levels: Vec::new(),
                 within_tolerance: None,
+                facets: None,
                 cross_check: Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio: 0.502 }),
                 verdict: Some(Verdict::Confirmed),
             }),

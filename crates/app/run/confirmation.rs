@@ -13,12 +13,14 @@ use fluxmorph_remesh::Moved;
 
 use super::Session;
 use super::estimate::estimate;
+use super::facets::described;
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
-    Accuracy, CrossCheck, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict, relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict,
+    relative_bar,
 };
 use crate::show::Observer;
 
@@ -76,7 +78,8 @@ impl Session<'_> {
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
-        let mut accuracy = Accuracy::default();
+        let facets = errors.and_then(|_| self.facets_of(observer));
+        let mut accuracy = Accuracy { facets, ..Accuracy::default() };
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
@@ -109,6 +112,13 @@ impl Session<'_> {
             );
         }
         (accuracy != Accuracy::default()).then_some(accuracy)
+    }
+
+    /// What no estimate and no refinement has of the geometry, which is reported.
+    pub(super) fn facets_of(&self, observer: &mut dyn Observer) -> Option<CurvedFacets> {
+        let facets = self.facets.clone()?;
+        observer.notice(&described(&facets));
+        Some(facets)
     }
 
     /// Whether the result of a run that has ended so is to be looked at again.

@@ -7,6 +7,7 @@
 
 pub mod confirmation;
 pub(crate) mod estimate;
+mod facets;
 pub mod finer;
 pub mod journal;
 pub(crate) mod launcher;
@@ -48,8 +49,8 @@ use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{
-    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory,
-    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
+    CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
+    RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -127,6 +128,8 @@ struct Session<'a> {
     config: &'a Config,
     source: &'a SourceMap,
     setup: Setup,
+    /// Of the mesh before it was refined.
+    facets: Option<CurvedFacets>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,

@@ -5,11 +5,12 @@ use std::time::Instant;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 
+use super::facets::curved_facets;
 use super::{Options, Session, mesh_hash, table_hashes};
 use crate::build::{Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{LimitsInForce, Manifest, RunDirectory, surface_files};
+use crate::files::{CurvedFacets, LimitsInForce, Manifest, RunDirectory, surface_files};
 use crate::show::RunObserver;
 
 /// A problem that is set up, and what its set-up was given.
@@ -17,6 +18,8 @@ pub(super) struct Prepared<'a> {
     pub(super) setup: Setup,
     config: &'a Config,
     source: &'a SourceMap,
+    /// Of the mesh before it is refined.
+    facets: Option<CurvedFacets>,
     options: Options<'a>,
     clock: Instant,
 }
@@ -36,7 +39,8 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
-        Ok(Self { setup, config, source, options, clock })
+        let facets = curved_facets(&setup.full_mesh);
+        Ok(Self { setup, config, source, facets, options, clock })
     }
 
     /// Takes the output directory, and writes the manifest.
@@ -67,8 +71,19 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, config, source, options, clock } = self;
+        let Self { setup, config, source, facets, options, clock } = self;
         let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
-        Session { command, config, source, setup, directory, manifest, clock, setup_seconds, interrupted }
+        Session {
+            command,
+            config,
+            source,
+            setup,
+            facets,
+            directory,
+            manifest,
+            clock,
+            setup_seconds,
+            interrupted,
+        }
     }
 }

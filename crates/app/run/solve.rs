@@ -109,6 +109,7 @@ impl Session<'_> {
             }),
             accuracy: analysis.objective.zip(estimate).map(|(value, estimate)| Accuracy {
                 refinements: halvings as usize,
+                facets: self.facets_of(observer),
                 ..Accuracy::of_analysis(value, estimate.objective)
             }),
             constraints: constraints(problem, analysis, &bounds),

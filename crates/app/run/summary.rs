@@ -150,7 +150,7 @@ impl Session<'_> {
         )
     }
 
-    /// Losses and probes of the initial design in every state; nothing where a run was interrupted, or has neither.
+    /// Losses, probes and expansions of the initial design in every state; nothing where a run was interrupted, or has none.
     pub(super) fn initial_states(
         &self,
         initial: Moved,
@@ -158,13 +158,19 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<Vec<StateResult>, Error> {
         let problem = &self.setup.problem;
-        let has_neither = self.config.probes.is_empty() && self.setup.audits.is_empty();
-        if stop_reason == StopReason::Interrupted || has_neither {
+        let config = self.config;
+        let has_none =
+            config.probes.is_empty() && self.setup.audits.is_empty() && config.multipoles.is_empty();
+        if stop_reason == StopReason::Interrupted || has_none {
             return Ok(Vec::new());
         }
         let cache = &mut SolverCache::default();
         let analysis = problem.analyse(initial, Derivatives::None, cache, &mut NoProgress)?;
-        Ok(self.state_results(&analysis, observer))
+        let mut states = self.state_results(&analysis, observer);
+        for ((state, model), solution) in states.iter_mut().zip(problem.states()).zip(&analysis.solutions) {
+            state.multipoles = self.multipoles(model, &analysis, solution)?;
+        }
+        Ok(states)
     }
 
     /// Losses and probes of a design in every state.

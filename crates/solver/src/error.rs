@@ -178,6 +178,15 @@ pub enum SolverError {
         /// Name of a region with a law.
         region: String,
     },
+    /// A solid conductor above 0 Hz where the problem is shared out among ranks.
+    #[error(
+        "the coil `{coil}` is a solid conductor, whose current above 0 Hz is solved for in one process: start the program without \
+         `mpirun`, or make it of strands"
+    )]
+    SolidOnRanks {
+        /// Name of the coil.
+        coil: String,
+    },
     /// Newton's method did not reach its residual.
     #[error(
         "Newton's method stopped after {steps} steps at the relative residual {residual:.1e}; least settled is the region \
@@ -217,7 +226,8 @@ pub enum SolverError {
     },
     /// Something that moves has reached a place at which the field is observed.
     #[error(
-        "the observed place ({:.3}, {:.3}, {:.3}) mm would lie in {by}: a place that stays is of use where the body does not come;          narrow the bounds of the design, or observe another region",
+        "the observed place ({:.3}, {:.3}, {:.3}) mm would lie in {by}: a place that stays is of use where the body does not come; \
+         narrow the bounds of the design, or observe another region",
         place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
     )]
     Covered {

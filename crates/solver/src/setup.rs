@@ -150,16 +150,17 @@ fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
     let Some((coil, _)) = solids::conductors(&setup.coils).next().filter(|_| setup.frequency > 0.0) else {
         return Ok(());
     };
-    let refuse = |what: &str, value: String, expected: &str| {
-        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
-    };
-    let coil = format!("the solid conductor `{}`", setup.coils[coil].name);
+    let coil = &setup.coils[coil].name;
     if setup.bh.iter().any(Option::is_some) {
         let expected = "materials with a permeability: above 0 Hz a circuit is solved with linear materials";
-        return refuse("bh", format!("a curve beside {coil}"), expected);
+        return Err(SolverError::Parameter {
+            what: "bh".to_owned(),
+            value: format!("a curve beside the solid conductor `{coil}`"),
+            expected: expected.to_owned(),
+        });
     }
     if setup.ownership.is_some() {
-        return refuse("ranks", "several".to_owned(), "one process for a solid conductor above 0 Hz");
+        return Err(SolverError::SolidOnRanks { coil: coil.clone() });
     }
     Ok(())
 }

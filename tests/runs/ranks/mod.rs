@@ -102,12 +102,13 @@ fn so_are_those_of_a_magnet_and_of_every_stiffness() {
 }
 
 #[test]
-fn a_curve_is_refused_at_its_key() {
-    let refused = attempted(2, "actuator.toml", &[], |setup| setup.expect_err("a B–H curve").to_string());
-    assert!(
-        refused.contains("bh_file = \"steel_team20.csv\"") && refused.contains("without `mpirun`"),
-        "{refused}"
-    );
+fn what_one_process_solves_is_refused_at_its_key() {
+    for (name, key) in
+        [("actuator.toml", "bh_file = \"steel_team20.csv\""), ("busbar.toml", "conductor = \"solid\"")]
+    {
+        let refused = attempted(2, name, &[], |setup| setup.expect_err("it takes one process").to_string());
+        assert!(refused.contains(key) && refused.contains("without `mpirun`"), "{refused}");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::config::Config;
 use crate::config::section::Section;
 use crate::config::table::rules::{Rules, present};
 use crate::config::table::{one_of, table};
@@ -230,6 +231,15 @@ pub(super) fn check_regions(
                 section.unknown_name("material", message, &region.material, &known);
             }
         }
+    }
+}
+
+impl Config {
+    /// The first region whose material has a B–H curve.
+    pub fn saturating_region(&self) -> Option<&String> {
+        let saturates =
+            |region: &&Region| self.materials.get(&region.material).is_some_and(Material::saturates);
+        self.regions.iter().find(|(_, region)| saturates(region)).map(|(name, _)| name)
     }
 }
 

@@ -110,7 +110,11 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         (count, Some(true)) => Some(format!("within the tolerance after {count} refinements")),
         (count, Some(false)) => Some(format!("beyond the tolerance after {count} refinements")),
     };
-    let remark: Vec<String> = bar.into_iter().chain(other).chain(refined).collect();
+    let facets = accuracy
+        .facets
+        .as_ref()
+        .map(|facets| format!("facets up to {} mm off {}", number(1e3 * facets.off_m, 2), facets.surface));
+    let remark: Vec<String> = [bar, other, refined, facets].into_iter().flatten().collect();
     Some(("gain", verdict.to_owned(), remark.join("; ")))
 }
 

@@ -10,13 +10,13 @@ use super::ticks::{group_digits, number};
 use crate::build::Outline;
 
 /// Height of the two bars of a tenth, and the room above and below.
-const ROW: f64 = 25.0;
-const BAR: f64 = 9.0;
+pub(super) const ROW: f64 = 25.0;
+pub(super) const BAR: f64 = 9.0;
 const ABOVE: f64 = 22.0;
 
 /// Left end of the bars, and their longest.
-const START: f64 = 66.0;
-const LONGEST: f64 = WIDTH - START - 58.0;
+pub(super) const START: f64 = 66.0;
+pub(super) const LONGEST: f64 = WIDTH - START - 58.0;
 
 /// The figure with its caption.
 pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String> {

@@ -24,6 +24,7 @@ mod field_cut;
 mod field_file;
 mod files;
 mod frame;
+mod harmonics;
 mod head;
 mod histogram;
 mod iron;

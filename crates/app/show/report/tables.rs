@@ -6,9 +6,9 @@ use maud::{Markup, html};
 
 use super::circuits::circuits;
 use super::data::RunData;
-use super::iron;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
+use super::{harmonics, iron};
 use crate::build::{Audited, Outline};
 use crate::config::{BodyKind, Constraint, Limit, Objective, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, StateResult, TermResult};
@@ -158,6 +158,7 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         (constraints(&result.constraints, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (circuits(result))
+        (harmonics::figures(&data.config, result))
         (losses(result, &states))
         @if result.loads.len() > 1 {
             @for state in &result.states {
