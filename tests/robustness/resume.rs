@@ -103,7 +103,10 @@ fn slit(width: &str) -> (Config, SourceMap) {
         steel,
         field,
         force,
-        ("frequency = \"50 Hz\"", "frequency = 0\nelements = \"edge\""),
+        (
+            "frequency = \"50 Hz\"",
+            "frequency = 0\nelements = \"edge\"\nlinear_solver = { method = \"incomplete\" }",
+        ),
         ("[\"20 mm\", \"20 mm\", \"30 mm\"]]", "[\"20 mm\", \"20 mm\", \"25 mm\"]]"),
         ("[[mesh.boxes.surfaces]]", &further),
         ("[regions.iron]", "[regions.head]\nmaterial = \"iron\"\n\n[regions.iron]"),
@@ -112,16 +115,13 @@ fn slit(width: &str) -> (Config, SourceMap) {
     ])
 }
 
-/// Where rounding ends a method is by chance, so that there are three slits; the linear method that follows is in the journal.
+/// The method that follows one that fails within a step of Newton's is in the journal.
 #[test]
 fn a_run_whose_newton_steps_fell_back_goes_on_with_the_same_method() {
-    let mut changes = 0;
-    for width in ["25.00003 mm", "25.00004 mm", "25.00006 mm"] {
-        let records = cut_everywhere(width, &slit(width)).records;
-        println!("{width}: {:?}", records.iter().map(|record| &record.methods).collect::<Vec<_>>());
-        changes += records.windows(2).filter(|pair| pair[0].methods != pair[1].methods).count();
-    }
-    assert!(changes > 0, "no method changed between two evaluations");
+    let records = cut_everywhere("fallback", &slit("25.00003 mm")).records;
+    let methods: Vec<_> = records.iter().map(|record| record.methods[0]).collect();
+    println!("{methods:?}");
+    assert!(methods.last().is_some_and(Option::is_some), "no method failed: {methods:?}");
 }
 
 /// A shield, which keeps the fields of its first and its last evaluation alone.

@@ -5,7 +5,7 @@ use fluxmorph_solver::BhCurve;
 use crate::config::Steel;
 
 /// All of them.
-pub(crate) const ALL: [Steel; 3] = [Steel::Team20, Steel::Team13, Steel::M40050A];
+pub(crate) const ALL: [Steel; 4] = [Steel::Team20, Steel::Team13, Steel::M40050A, Steel::PureIron];
 
 /// A steel's table as `fluxmorph generate materials` prints it, with its source in comments.
 pub(crate) fn table(steel: Steel) -> &'static str {
@@ -13,6 +13,7 @@ pub(crate) fn table(steel: Steel) -> &'static str {
         Steel::Team20 => include_str!("../materials/team20_steel.csv"),
         Steel::Team13 => include_str!("../materials/team13_steel.csv"),
         Steel::M40050A => include_str!("../materials/m400_50a.csv"),
+        Steel::PureIron => include_str!("../materials/pure_iron.csv"),
     }
 }
 
@@ -42,7 +43,10 @@ mod tests {
             let curve = curve(steel);
             assert!(curve.ends_saturated(), "{steel:?}");
             assert!(curve.end().is_some_and(|[_, b]| b > 2.0), "{steel:?}");
-            assert!(["TEAM", "Pyleecan"].iter().any(|source| table(steel).contains(source)), "{steel:?}");
+            assert!(
+                ["TEAM", "Pyleecan", "Metals Handbook"].iter().any(|source| table(steel).contains(source)),
+                "{steel:?}"
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 //! The state minimises `W(A) = ∫w(|B|) − ∫T·B` (with the penalty of nodal elements), which is convex. Newton's steps have the
 //! exact tangent; a step is as long as the energy falls along it, about (`line_search`), and halved until the energy falls by a small
 //! part of what its slope promises (Armijo; Nocedal and Wright, Numerical Optimization, 2006, section 3.1). The start is the field of the linear parts, or what the caller gives: the
-//! field on the reference mesh of a round, so that a state is a function of mesh, model and that reference, and not of the designs
+//! field on the undeformed mesh of a run, so that a state is a function of mesh, model and that field, and not of the designs
 //! before. Within one solution a factor serves as long as it pays.
 
 use fluxmorph_geometry::fem::scalar::{axpy, dot, norm};
@@ -13,7 +13,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::element::Complex3;
 use crate::error::SolverError;
-use crate::line_search;
+use crate::line_search::{self, Along};
 use crate::linear::{LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton_steps::{Descent, MOST_STEPS, REQUIRED, StepSystems, Verdict, failure};
@@ -122,22 +122,18 @@ impl Energy<'_> {
         let falls = |trial: &Iterate, length: f64| {
             trial.energy <= from.energy + ARMIJO * length * slope + from.rounding
         };
-        // What rounding alone may do needs no search.
-        let mut length = 1.0;
-        let mut trial = if -slope > from.rounding {
-            let along = line_search::longest_useful(slope, |length| {
+        // What rounding alone may do no energy can judge: it is Newton's own step, and the residual says what it was worth.
+        if slope.abs() <= from.rounding {
+            return Some((place(1.0), 1.0));
+        }
+        let Along { mut length, is_level, state: mut trial, .. } =
+            line_search::longest_useful(slope, |length| {
                 let trial = place(length);
                 (dot(&trial.residual, step).re, trial)
             });
-            let may_gain = -slope;
-            if along.is_level && may_gain <= ENERGY_NOISE / ENERGY_ROUNDING * from.rounding {
-                return Some((along.state, along.length));
-            }
-            length = along.length;
-            along.state
-        } else {
-            place(1.0)
-        };
+        if is_level && -slope <= ENERGY_NOISE / ENERGY_ROUNDING * from.rounding {
+            return Some((trial, length));
+        }
         for _ in 0..MOST_HALVINGS {
             if falls(&trial, length) {
                 return Some((trial, length));

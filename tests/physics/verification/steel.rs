@@ -36,36 +36,75 @@ pub(super) fn solved(name: &str, overrides: &[&str]) -> Solved {
     Solved { model, mesh, solution }
 }
 
-/// Force [N] along z on the whole pole.
-fn force(ampere_turns: &str) -> (f64, usize) {
+impl Solved {
+    /// Mean component [T] of B over some points [m]: that of the elements themselves, no fit, as sections lie across corners of the
+    /// steel.
+    fn mean(&self, points: &[Point], component: usize) -> f64 {
+        let fields = locate(&self.mesh, points).into_iter().map(|found| {
+            let (e, lambda) = found.expect("a point of the mesh");
+            self.solution.at(&self.model, &self.mesh, e, &lambda).flux_density[component].re
+        });
+        fields.sum::<f64>() / points.len() as f64
+    }
+}
+
+/// The field of TEAM problem 20 at so many ampere-turns, and the force [N] along z on the whole pole.
+fn pole(ampere_turns: &str) -> (Solved, f64) {
     let coil = format!(
         "coils=[{{ name = \"coil\", shape = \"racetrack\", ampere_turns = {ampere_turns}, center = [0, 0, \"75 mm\"], \
          axis = \"z\", half_window = [\"19.5 mm\", \"19.5 mm\"], width = \"18 mm\", height = \"96.6 mm\", \
          inner_radius = \"5 mm\" }}]"
     );
-    let Solved { model, mesh, solution } = solved("team20.toml", &[&coil]);
-    let pole = mesh.topology().region("pole").expect("it is named");
+    let solved = solved("team20.toml", &[&coil]);
+    let pole = solved.mesh.topology().region("pole").expect("it is named");
     let motion = RigidMotion::Translation([0.0, 0.0, -1.0]);
-    let force = Functional::force(&model, &mesh, "pole", &[pole], motion).expect("air around the pole");
-    (4.0 * force.evaluate(&model, &mesh, &solution).expect("finite").value, solution.newton_steps())
+    let force = Functional::force(&solved.model, &solved.mesh, "pole", &[pole], motion);
+    let force = force.expect("air around the pole").evaluate(&solved.model, &solved.mesh, &solved.solution);
+    let force = 4.0 * force.expect("finite").value;
+    (solved, force)
+}
+
+/// Points [m] in a rectangle across z, from two corners [mm].
+fn across(z: f64, x: [f64; 2], y: [f64; 2]) -> Vec<Point> {
+    let along = |[from, to]: [f64; 2], i: i32| 1e-3 * (from + (to - from) * (f64::from(i) + 0.5) / 20.0);
+    (0..400).map(|k| [along(x, k / 20), along(y, k % 20), 1e-3 * z]).collect()
 }
 
 #[test]
 #[ignore = "four saturated fields of a benchmark, twenty seconds; the gallery has one of them"]
 fn the_force_of_team_20_is_within_5_percent_of_the_measured_one() {
+    // In the gap under the middle of the pole, and the means of the pole and of a leg of the yoke halfway up. The one in the gap is
+    // measured 11 % above what the forces say at 1000 A, and that under the corner lies within a cell of it: both are printed.
+    let places = [
+        ("Bz_P1_T", vec![[0.0, 0.0, 0.02575]], 1),
+        ("Bz_P2_T", vec![[0.0125, 0.005, 0.02575]], 4),
+        ("meanBz_pole_alpha_beta_T", across(75.0, [0.0, 12.5], [0.0, 5.0]), 0),
+        ("meanBz_yoke_gamma_delta_T", across(75.0, [38.5, 63.5], [0.0, 12.5]), 0),
+    ];
     let measured = &reference("team20.json")["measured"];
-    for (current, expected) in numbers(&measured["NI_At"]).iter().zip(numbers(&measured["Fz_N"])) {
-        let (found, steps) = force(&current.to_string());
+    for (k, current) in numbers(&measured["NI_At"]).iter().enumerate() {
+        let (solved, found) = pole(&current.to_string());
+        let (expected, steps) = (numbers(&measured["Fz_N"])[k], solved.solution.newton_steps());
         let error = found / expected - 1.0;
         println!("{current} A: {found:.2} N, measured {expected} N, {:+.1} %, {steps} steps", 100.0 * error);
         assert!(error.abs() < 0.05, "{current} A");
         assert!(steps <= 8, "{current} A: {steps} steps from zero");
+        for (name, points, first) in &places {
+            let (found, expected) = (solved.mean(points, 2).abs(), numbers(&measured[name])[k]);
+            let error = found / expected - 1.0;
+            println!("  {name}: {found:.3} T, measured {expected} T, {:+.1} %", 100.0 * error);
+            assert!(k < *first || error.abs() < 0.05, "{current} A, {name}");
+        }
     }
 }
 
 /// Points of a section, and the direction in which its mean is measured.
+///
+/// 50 to each side of 50 mm, so that none lies across the edge of what is opposite, at y = ±25 mm: the field at the end of a channel
+/// is strong before the plate and weak beside it.
 fn section(position: &Value) -> (Vec<Point>, usize) {
     const AXES: [&str; 3] = ["x", "y", "z"];
+    const ACROSS: u32 = 50;
     let axis = |name: &str| AXES.iter().position(|axis| *axis == name).expect("an axis");
     let (across, at) = position["plane"].as_str().and_then(|plane| plane.split_once('=')).expect("a plane");
     let at: f64 = at.parse().expect("millimetres");
@@ -74,7 +113,7 @@ fn section(position: &Value) -> (Vec<Point>, usize) {
             return vec![at];
         }
         let [from, to]: [f64; 2] = numbers(&position[AXES[d]]).try_into().expect("from and to");
-        (0..8).map(|i| from + (to - from) * (f64::from(i) + 0.5) / 8.0).collect()
+        (0..ACROSS).map(|i| from + (to - from) * (f64::from(i) + 0.5) / f64::from(ACROSS)).collect()
     };
     let [x, y, z] = [spread(0), spread(1), spread(2)];
     let points = x
@@ -85,25 +124,35 @@ fn section(position: &Value) -> (Vec<Point>, usize) {
     (points.collect(), axis(component))
 }
 
+/// Deviations of the 25 means of TEAM problem 13 from the measured ones.
+fn deviations(overrides: &[&str]) -> Vec<f64> {
+    let solved = solved("team13.toml", overrides);
+    let steps = solved.solution.newton_steps();
+    println!("{overrides:?}: {} tetrahedra, {steps} steps", solved.mesh.topology().tets().len());
+    let file = reference("team13.json");
+    let deviation = |position: &Value| {
+        let (points, component) = section(position);
+        let mean = solved.mean(&points, component).abs();
+        let error = mean / position["measured_T"].as_f64().expect("a number") - 1.0;
+        println!("{}: {mean:.3} T, {:+.1} %", position["n"], 100.0 * error);
+        error
+    };
+    file["positions_1000At"].as_array().expect("a list").iter().map(deviation).collect()
+}
+
 #[test]
 #[ignore = "a benchmark of some minutes"]
 fn mean_flux_densities_of_team_13_are_within_7_percent_of_the_measured_ones() {
-    let Solved { model, mesh, solution } = solved("team13.toml", &[]);
-    let file = reference("team13.json");
-    let mut worst = 0.0_f64;
-    for position in file["positions_1000At"].as_array().expect("a list") {
-        let (points, component) = section(position);
-        // The field of the elements themselves, no fit: sections lie across corners of the steel.
-        let fields = locate(&mesh, &points).into_iter().map(|found| {
-            let (e, lambda) = found.expect("a point of the mesh");
-            solution.at(&model, &mesh, e, &lambda).flux_density[component].re
-        });
-        let mean = fields.sum::<f64>().abs() / points.len() as f64;
-        let error = mean / position["measured_T"].as_f64().expect("a number") - 1.0;
-        println!("{}: {mean:.3} T, {:+.1} %", position["n"], 100.0 * error);
-        worst = worst.max(error.abs());
-    }
+    let worst = deviations(&[]).iter().map(|error| error.abs()).fold(0.0, f64::max);
     assert!(worst < 0.07, "{worst}");
+}
+
+/// `check` warns of them: steel in a circuit with narrow gaps.
+#[test]
+#[ignore = "a benchmark of some minutes"]
+fn nodal_elements_lose_two_fifths_of_the_flux_of_team_13() {
+    let errors = deviations(&["analysis.elements=\"nodal\""]);
+    assert!(errors.iter().all(|error| (-0.55..-0.35).contains(error)), "{errors:?}");
 }
 
 /// Prints the steps.

@@ -60,7 +60,7 @@ one_of! {
 }
 
 choice! {
-    /// Steels that the program knows, with their sources.
+    /// Steels and irons that the program knows, with their sources.
     pub enum Steel {
         /// The construction steel (SS400) of TEAM workshop problem 20.
         Team20 = "team20_steel",
@@ -68,6 +68,8 @@ choice! {
         Team13 = "team13_steel",
         /// The electrical steel M400-50A, not oriented.
         M40050A = "m400_50a",
+        /// Pure iron, annealed.
+        PureIron = "pure_iron",
     }
 }
 
