@@ -132,7 +132,29 @@ fn check_prints_the_mesh_and_writes_nothing() {
         (2.0 / (2.0 * std::f64::consts::PI * 60.0 * 800.0 * 4e-7 * std::f64::consts::PI * 7e6)).sqrt();
     assert!((number(&json, "/skin/0/skin_depth_m") / depth - 1.0).abs() < 1e-9);
     assert_eq!(count(&json, "/design_variables"), 91);
+    assert_eq!(json["materials"]["steel"]["relative_permeability"], 800.0);
     assert!(!out.exists());
+}
+
+#[test]
+fn check_says_how_far_the_mesh_follows_to_the_bounds() {
+    let home = folder();
+    let of = |arguments: &[&str]| {
+        let json = on_quick("check", &home.path().join("out"), &[&["--json"], arguments].concat())
+            .exits_with(0)
+            .json();
+        ["/reach/0", "/reach/1"].map(|bound| {
+            let at = |key: &str| json.pointer(&format!("{bound}/{key}")).expect("both bounds").clone();
+            (at("share").as_f64().expect("a number"), at("cause").to_string())
+        })
+    };
+    // As shipped; then far through the air of the remesh region, and nearly through the plate.
+    for (share, cause) in of(&[]) {
+        assert!(share == 1.0 && cause == "null", "{share}: {cause}");
+    }
+    for (share, cause) in of(&["--set", "design.upper=0.3", "--set", "design.lower=-0.00999"]) {
+        assert!(share < 1.0 && cause.contains("narrower bounds"), "{share}: {cause}");
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@
 
 mod advice;
 mod estimate;
+mod reach;
 mod summary;
 mod text;
 mod truncation;

@@ -2,6 +2,8 @@
 //!
 //! Serialised as it is by `--json`; everything is in SI. The table for people is made of it in [`super::text`].
 
+use std::collections::BTreeMap;
+
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
@@ -12,11 +14,12 @@ use serde::Serialize;
 
 use super::advice::advice;
 use super::estimate::EstimateSummary;
+use super::reach::Reach;
 use super::truncation::Truncation;
 use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched, stiffness_policy};
 use crate::config::{
-    self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, MeshConfig, Objective, Open,
-    Optimizer, Probe, RegionModel, Remesh, SourceMap,
+    self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, Objective,
+    Open, Optimizer, Probe, RegionModel, Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
@@ -50,6 +53,7 @@ pub(super) struct Summary<'a> {
     pub(super) stiffness: Option<String>,
     pub(super) bounding_box_m: [[f64; 3]; 2],
     pub(super) regions: Vec<RegionSummary>,
+    pub(super) materials: &'a BTreeMap<String, Material>,
     pub(super) surfaces: Vec<SurfaceSummary>,
     /// Sides of the mesh without condition, on which the field is left normal.
     pub(super) open_sides: Vec<OpenSideSummary>,
@@ -68,6 +72,8 @@ pub(super) struct Summary<'a> {
     pub(super) objective_unit: Option<&'static str>,
     pub(super) constraints: &'a [Constraint],
     pub(super) design: Option<&'a Design>,
+    /// Whether the mesh follows all variables to their bounds.
+    pub(super) reach: Vec<Reach>,
     pub(super) remesh: Option<&'a Remesh>,
     pub(super) optimizer: &'a Optimizer,
     pub(super) probes: &'a [Probe],
@@ -208,6 +214,7 @@ pub(super) fn summary<'a>(
         stiffness: config.remesh.as_ref().map(|remesh| stiffness(remesh, problem.shape())),
         bounding_box_m: mesh.bounding_box(),
         regions: regions(config, mesh),
+        materials: &config.materials,
         surfaces: surfaces(mesh)?,
         open_sides: open_sides(&setup),
         quality: quality(&setup),
@@ -222,6 +229,7 @@ pub(super) fn summary<'a>(
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,
         design: config.design.as_ref(),
+        reach: Reach::of(problem),
         remesh: config.remesh.as_ref(),
         optimizer: &config.optimizer,
         probes: &config.probes,

@@ -3,8 +3,12 @@
 use std::path::Path;
 
 use super::estimate::EstimateSummary;
+use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
-use crate::config::{CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, RemeshExtent, ValueBound};
+use crate::config::{
+    CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, Material, RemeshExtent, ValueBound,
+    WrittenCurve,
+};
 use crate::files::shell_word;
 use crate::show::text_table::{Align, Table};
 
@@ -24,6 +28,7 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
         estimate(found, summary.objective_unit, &mut row);
     }
     text += &region_table(summary).text();
+    text += &material_table(summary).text();
     text += &surface_table(summary).text();
     text += &open_table(summary).text();
     text += &coil_table(summary).text();
@@ -157,6 +162,15 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         };
         row("bounds", format!("{} to {} mm {way}", millimetre(design.lower), millimetre(design.upper)));
     }
+    for Reach { bound, share, cause } in &summary.reach {
+        if let Some(cause) = cause {
+            let share = 100.0 * share;
+            row(
+                &format!("{bound} bound"),
+                format!("the mesh follows all variables for {share:.0} % of the way there: {cause}"),
+            );
+        }
+    }
     if let Some(remesh) = summary.remesh {
         let body = match &remesh.extent {
             RemeshExtent::Regions(names) => names.join(", "),
@@ -216,6 +230,33 @@ fn region_table(summary: &Summary<'_>) -> Table<5> {
         table.row([r.name.clone(), r.tets.to_string(), volume, r.material.clone(), r.model.to_owned()]);
     }
     table
+}
+
+fn material_table(summary: &Summary<'_>) -> Table<4> {
+    use Align::{Left, Right};
+    let columns =
+        [("material", Left), ("permeability", Left), ("conductivity S/m", Right), ("density kg/m³", Right)];
+    let mut table = Table::new(columns);
+    for (name, material) in summary.materials {
+        let density = material.density.map_or_else(String::new, |density| density.to_string());
+        table.row([name.clone(), permeability(material), material.conductivity.to_string(), density]);
+    }
+    table
+}
+
+/// The law of a material: its relative permeability, or what its curve is.
+fn permeability(material: &Material) -> String {
+    let relative = material.relative_permeability;
+    match (&material.bh, &material.bh_file, material.saturation) {
+        (Some(WrittenCurve::Named(steel)), ..) => format!("B-H curve {}", steel.name()),
+        (Some(WrittenCurve::Points(points)), ..) => {
+            let [_, last] = points.last().copied().unwrap_or_default();
+            format!("B-H curve of {} points, to {last} T", points.len())
+        }
+        (None, Some(path), _) => format!("B-H curve of {}", path.display()),
+        (None, None, Some(saturation)) => format!("{relative}, saturated at {saturation} T"),
+        (None, None, None) => relative.to_string(),
+    }
 }
 
 fn surface_table(summary: &Summary<'_>) -> Table<3> {

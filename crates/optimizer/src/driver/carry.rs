@@ -12,8 +12,6 @@
 
 use std::time::Instant;
 
-use fluxmorph_geometry::tet4::{centroid, dot, sub};
-use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
 use super::run::Run;
@@ -21,7 +19,7 @@ use super::search::LEAST_GAIN;
 use super::stop::{Refusal, Stop};
 use crate::error::Error;
 use crate::nlopt::Sample;
-use crate::problem::{Stage, between};
+use crate::problem::{Cut, Stage, between};
 
 /// Room over the least one within which the constraint is felt.
 const NEAR: f64 = 0.03;
@@ -47,14 +45,6 @@ pub(super) struct Carriage {
     room_gradient: Vec<f64>,
     /// Wall time of all meshes that were tried [s].
     pub(super) seconds: f64,
-}
-
-/// Why a step is cut short.
-struct Cut {
-    /// In words, with what would help.
-    cause: String,
-    /// What would help.
-    cure: &'static str,
 }
 
 impl Carriage {
@@ -86,7 +76,7 @@ impl Run<'_> {
         let pushed =
             if asked.share < 1.0 { shape.pushed_back(p, &asked).map_err(Error::from)? } else { p.to_vec() };
         let Carried { mut share, mut moved, room, .. } = asked;
-        let cut = (share < 1.0).then(|| self.why_cut(p, room.element));
+        let cut = (share < 1.0).then(|| Cut::of(shape, self.problem.original(), p, room.element));
         let mut goal = p.to_vec();
         if pushed != p {
             let nearer = carried_to(&pushed)?;
@@ -117,12 +107,13 @@ impl Run<'_> {
         // With less, a search creeps along the boundary in ever smaller steps.
         let least = LEAST_GAIN.max(self.settings.ftol_rel);
         let has_gained = before.best.is_none() || self.has_gained(before.values, least);
-        if let Some(Cut { cause, cure }) = &carried.cut {
-            if self.cures.insert(cure) {
-                self.observer.note(cause);
+        if let Some(cut) = &carried.cut {
+            let cause = format!("the mesh carries a part of the step: {cut}");
+            if self.cures.insert(cut.cure) {
+                self.observer.note(&cause);
             }
             if !self.takes_constraints() {
-                return Err(Stop::Mesh(Refusal { cause: cause.clone() }));
+                return Err(Stop::Mesh(Refusal { cause }));
             }
             if has_gained {
                 return Err(Stop::CutShort);
@@ -140,55 +131,6 @@ impl Run<'_> {
         let (c, slope) = excess(carried.room);
         sample.constraints.push((c, carried.room_gradient.iter().map(|g| slope * g).collect()));
         Ok(sample)
-    }
-
-    /// Which element a design asks too much of, why, and what would help.
-    fn why_cut(&self, p: &[f64], element: ElementId) -> Cut {
-        let (shape, mesh) = (self.shape(), self.problem.original());
-        let (surface, map) = (shape.surface(), shape.motion().map());
-        let displacements = surface.normal_displacements(p);
-        let nodes = mesh.topology().tet(element);
-        let row = |node: &NodeId| surface.nodes().binary_search(node).ok();
-        let rows: Vec<usize> = nodes.iter().filter_map(row).collect();
-        let is_held = |node: &&NodeId| row(node).is_none() && (0..3).all(|c| !map.is_unknown(**node, c));
-        // Beside the surface rather than in front of it: on the level of a design node, as far as the element goes.
-        let levels = |row: usize| {
-            let (at, direction) = (mesh.point(surface.nodes()[row]), surface.directions()[row]);
-            move |node: &NodeId| dot(sub(mesh.point(*node), at), direction).abs()
-        };
-        let is_beside = |held: &NodeId, row: usize| {
-            let level = levels(row);
-            level(held) < 0.25 * nodes.iter().map(&level).fold(0.0, f64::max)
-        };
-        let is_at_held_rim =
-            nodes.iter().filter(is_held).any(|held| rows.iter().any(|&row| is_beside(held, row)));
-        let moved = || rows.iter().map(|&row| displacements[row]);
-        let (least, most) =
-            moved().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(x), m.max(x)));
-        let (why, cure) = if is_at_held_rim {
-            (
-                "nodes beside the design surface are held there".to_owned(),
-                "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)",
-            )
-        } else if rows.len() > 1 && most - least > 0.5 * most.abs().max(least.abs()) {
-            let step = 1e3 * (most - least);
-            (
-                format!("neighbouring nodes of the design lie {step:.1} mm apart"),
-                "a filter (design.filter_radius) or a control grid makes them smoother",
-            )
-        } else {
-            (
-                "there is no room between the design surface and where the mesh is held".to_owned(),
-                "a larger remesh region or narrower bounds give it",
-            )
-        };
-        let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);
-        let region = mesh.topology().region_name_at(element);
-        let cause = format!(
-            "the mesh carries a part of the step: element {element} of region `{region}` at ({x:.1}, {y:.1}, {z:.1}) mm would be \
-             squeezed, as {why}; {cure}"
-        );
-        Cut { cause, cure }
     }
 }
 

@@ -10,6 +10,7 @@
 
 mod adjoint_accumulator;
 mod analysis;
+mod cut;
 mod estimate;
 mod evaluate;
 pub mod finite;
@@ -30,6 +31,7 @@ use crate::error::Error;
 use crate::objective::WeightedSum;
 
 pub use analysis::{Analysis, Measured, Timings};
+pub use cut::Cut;
 pub use estimate::ErrorEstimate;
 pub use evaluate::Derivatives;
 pub use progress::{NoProgress, Progress, Stage};
