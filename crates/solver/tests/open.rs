@@ -233,8 +233,8 @@ fn the_field_of_a_coil_does_not_feel_the_end_of_the_mesh() {
 }
 
 /// A sphere in the field that coils apply to it: the energy beyond the mesh is that of both to 1 % with linear elements, and with
-/// quadratic ones to 0.2 %. So is the field at its end to 0.3 %, in layers of 14 mm there, whatever the cells along them. At one point linear elements may be half a cell off, over which the
-/// field falls by 16 %.
+/// quadratic ones to 0.2 %. So is the field of these at its end to 0.3 %, in layers of 14 mm there, whatever the cells along them.
+/// At one point linear elements may be half a cell off, over which the field falls by 16 %.
 #[test]
 fn the_field_of_a_sphere_between_coils_does_not_feel_the_end_of_the_mesh() {
     for (elements, divisions, bounds) in [
