@@ -39,7 +39,7 @@ const AT_REST: [&str; 2] = ["analysis.frequency=\"0 Hz\"", CONSTRAINTS];
 
 /// The same of a field that alternates: with the loss, and without a component, which has no sign.
 const OF_AMPLITUDES: &str = "constraints=[\
-    { kind = \"loss\", region = \"plate\", upper = \"1 MW\" }, \
+    { kind = \"loss\", region = \"plate\", upper = \"1000 kW\" }, \
     { kind = \"flux_linkage\", coils = [\"coil\"], upper = \"1 Wb\" }, \
     { kind = \"energy\", upper = \"1 kJ\" }, \
     { kind = \"energy\", name = \"inside\", region = \"plate\", upper = \"1 kJ\" }, \
