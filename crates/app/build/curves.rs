@@ -50,7 +50,7 @@ impl Curves {
             }
         }
         source.check(faults)?;
-        let is_static = config.frequencies().iter().all(|&f| f == 0.0);
+        let is_static = !config.alternates();
         Ok(Self { curves, files, is_static })
     }
 

@@ -111,7 +111,7 @@ pub(super) fn contact_faults(
     mesh: &Mesh,
     conductors: &[Conductor],
 ) -> Vec<Diagnostic> {
-    if config.frequencies().iter().all(|&f| f == 0.0) {
+    if !config.alternates() {
         return Vec::new();
     }
     let topology = mesh.topology();
@@ -367,7 +367,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
             faults.push(fault.expected("a region that is meshed"));
         } else if coil.is_solid() {
             faults.extend(solid_fault(config, source, i, name));
-        } else if config.frequencies().iter().any(|&f| f > 0.0) && material(config, name).conductivity > 0.0 {
+        } else if config.alternates() && material(config, name).conductivity > 0.0 {
             let message = format!(
                 "`{name}` conducts: eddy currents would flow in it beside the given current of its strands"
             );
@@ -389,7 +389,7 @@ fn solid_fault(config: &Config, source: &SourceMap, coil: usize, region: &str) -
             fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""),
         );
     }
-    let curved = config.saturating_region().filter(|_| config.frequencies().iter().any(|&f| f > 0.0))?;
+    let curved = config.saturating_region().filter(|_| config.alternates())?;
     let message = format!(
         "`{region}` is a solid conductor, and `{curved}` has a B–H curve: no circuit of both above 0 Hz"
     );

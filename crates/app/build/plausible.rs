@@ -132,7 +132,7 @@ fn section(coil: &Coil) -> Vec<(&'static str, f64)> {
 /// A region of iron or of a conductor that the current of a coil flows in, and where.
 fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(RegionId, Point)> {
     let topology = mesh.topology();
-    let changes = config.frequencies().iter().any(|&f| f > 0.0);
+    let changes = config.alternates();
     let is_matter = |name: &String| {
         let own = material(config, name);
         let replaced = config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);

@@ -15,7 +15,7 @@ use crate::error::Error;
 /// [`Error::Mesh`] for more ranks than nodes.
 pub(super) fn of_mesh(config: &Config, mesh: &Mesh, group: &RankGroup) -> Result<Ownership, Error> {
     let topology = mesh.topology();
-    let harmonic = config.frequencies().iter().any(|&f| f > 0.0);
+    let harmonic = config.alternates();
     let conducts: Vec<bool> = topology
         .region_names()
         .iter()

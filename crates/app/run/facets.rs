@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, point_at, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use crate::files::CurvedFacets;
@@ -77,7 +77,7 @@ pub(super) fn curved_facets(mesh: &Mesh) -> Option<CurvedFacets> {
         CurvedFacets {
             surface: format!("{}|{}", name(own), other.map_or("outside", name)),
             off_m,
-            at_m: point_at(&[a, b, a, b], &[0.5, 0.5, 0.0, 0.0]),
+            at_m: centroid([a, b]),
         }
     })
 }
@@ -112,10 +112,7 @@ mod tests {
         let radius = parameters.outer_radius;
         let surface = mesh.topology().surface("outer").expect("the outer sphere");
         let edges = surface.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let middle = |(a, b)| {
-            let (a, b) = (mesh.point(a), mesh.point(b));
-            radius - norm(std::array::from_fn(|d| 0.5 * (a[d] + b[d])))
-        };
+        let middle = |(a, b)| radius - norm(centroid([mesh.point(a), mesh.point(b)]));
         let height = edges.map(middle).fold(0.0, f64::max);
         assert!((found.off_m / height - 1.0).abs() < 0.1, "{} {height}", found.off_m);
         assert!((radius - norm(found.at_m) - height).abs() < 0.2 * height);

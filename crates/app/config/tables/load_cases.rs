@@ -27,6 +27,11 @@ impl Config {
         frequencies
     }
 
+    /// Whether a field alternates: one of the frequencies is above zero.
+    pub fn alternates(&self) -> bool {
+        self.frequencies().iter().any(|&f| f > 0.0)
+    }
+
     /// What the loads ask of each other and of the analysis.
     pub(super) fn check_loads(&self, root: &Section<'_>) {
         // Of `a-b` and `a_b` the arrays of fields have one name.
