@@ -34,10 +34,6 @@ fn first_steps_are_between_one_and_thirty_per_cent_of_the_range() {
             (design.grid, design.filter_radius) = (None, filter);
         }
         for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-            // With a tenth of the penalty CCSAQ's second step takes half of the range at once: 35 % over all variables.
-            if file == "busbar.toml" && algorithm == Algorithm::Ccsaq {
-                continue;
-            }
             let mut problem = set_up(&config, &source, Mode::Optimisation).expect("a sound problem").problem;
             let shape = problem.shape().expect("a shape");
             let ranges = shape.lower().iter().zip(shape.upper()).map(|(low, high)| (high - low).powi(2));

@@ -39,8 +39,8 @@ table! {
         /// design at its bounds get there long before the rest has settled.
         xtol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.xtol_rel;
         /// How far a variable may move in the first step of a search, as a share of the range that it may search; less where
-        /// the gradient promises more than half of the objective, or where constraints leave less room. The steps after it are the
-        /// method's own.
+        /// the gradient promises more than half of the objective, and half of it with `ccsaq`, whose second step is long. Under
+        /// constraints without room `mma` steps less far. The steps after it are the method's own.
         first_step: f64 = number(FIRST_STEPS) => Settings::DEFAULT.first_step;
         /// Least quality (Eq. 4) of an element that a design may have. A design below it is not evaluated: the search goes on
         /// nearer to the best one. Without it the room that elements keep is what limits a design:

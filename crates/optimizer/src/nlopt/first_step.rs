@@ -10,6 +10,11 @@
 //! * the gradient promises no more than [`PROMISE`] of the objective's own size: a sum of squares that is promised to fall
 //!   below zero is about to rise instead.
 //!
+//! Where the move would break constraints, `g` is what is left of the gradient beside them: `g + Σ λ ∂c/∂p` with the `λ ≥ 0` that
+//! make it smallest. A force asks for steel everywhere; of a step made for the whole of that, a full volume leaves the tenth that
+//! shifts steel from here to there. MMA is the exception: its approximation is as convex as the whole gradient is steep, whatever
+//! the factor.
+//!
 //! The moves without constraints, with `σ` half the range, of MMA (Svanberg, *SIAM J. Optim.* 12, 555 (2002), as NLopt's
 //! `mma.c` has it) and of CCSAQ (`ccsa_quadratic.c`): with `r = s |g| σ / ρ`
 //!
@@ -49,29 +54,73 @@ const ASSUMED: f64 = 0.1;
 /// Largest factor on a constraint: one that is active and flat.
 const LARGEST_FACTOR: f64 = 1e4;
 
+/// Share of the step asked for that CCSAQ begins with: after a success it makes its penalty ten times smaller, and half of the range
+/// is then all that limits its second step.
+const CAUTION: f64 = 0.5;
+
+/// Sweeps over the constraints that a first move breaks: with one of them, or several that share no variable, the first sweep ends it.
+const SWEEPS: usize = 20;
+
 /// Halvings of the factor's exponent: to the last digits that matter to a length.
 const HALVINGS: usize = 60;
 
 /// A search that begins, in the units that NLopt sees.
-pub(super) struct Start<'a> {
+pub(super) struct Start {
     pub(super) value: f64,
-    /// One entry a variable.
-    pub(super) gradient: &'a [f64],
-    /// How far every variable may go against its derivative.
-    pub(super) room: &'a [f64],
+    /// One entry a variable: of the objective, and, once constraints are met, what they leave of it.
+    pub(super) gradient: Vec<f64>,
+    /// How far every variable may go down and up.
+    pub(super) room: [Vec<f64>; 2],
     /// Distance between the bounds of every variable.
     pub(super) span: f64,
 }
 
-impl Start<'_> {
+impl Start {
     /// The factor on the objective with which the largest first move of a variable is `share` of its span, or less where the
-    /// gradient promises too much; 1 where no variable can move.
-    pub(super) fn objective_factor(&self, algorithm: Algorithm, share: f64) -> f64 {
-        let movable = self.gradient.iter().zip(self.room).filter(|(_, room)| **room > 0.0);
-        let steepest = movable.fold(0.0_f64, |steepest, (g, _)| steepest.max(g.abs()));
+    /// gradient promises too much, and, in the same units, the multiplier of every constraint, of which value and gradient are given.
+    pub(super) fn meet(
+        &mut self,
+        algorithm: Algorithm,
+        share: f64,
+        constraints: &[(f64, Vec<f64>)],
+    ) -> (f64, Vec<f64>) {
+        let free = self.objective_factor(algorithm, share);
+        let mut multipliers = vec![0.0; constraints.len()];
+        if algorithm == Algorithm::Mma {
+            return (free, multipliers);
+        }
+        let after = |(value, own): &(f64, Vec<f64>)| {
+            let moves = self.steps(algorithm, free).zip(&self.gradient).zip(own);
+            value - moves.map(|((step, g), own)| step * g.signum() * own).sum::<f64>()
+        };
+        let broken: Vec<usize> = (0..constraints.len()).filter(|&c| after(&constraints[c]) > 0.0).collect();
+        for _ in 0..SWEEPS {
+            for &c in &broken {
+                let own = &constraints[c].1;
+                let movable = || (0..own.len()).filter(|&k| self.room_against(k) > 0.0);
+                let along: f64 = movable().map(|k| own[k] * self.gradient[k]).sum();
+                let square: f64 = movable().map(|k| own[k] * own[k]).sum();
+                let next =
+                    if square > 0.0 { (multipliers[c] - along / square).max(0.0) } else { multipliers[c] };
+                let change = next - multipliers[c];
+                self.gradient.iter_mut().zip(own).for_each(|(g, own)| *g += change * own);
+                multipliers[c] = next;
+            }
+        }
+        // Where constraints take all, what is left has no direction.
+        let factor = self.objective_factor(algorithm, share).min(free / LEAST);
+        multipliers.iter_mut().for_each(|multiplier| *multiplier *= factor);
+        (factor, multipliers)
+    }
+
+    /// The factor on the objective for the gradient as it is; 1 where no variable can move.
+    fn objective_factor(&self, algorithm: Algorithm, share: f64) -> f64 {
+        let movable = (0..self.gradient.len()).filter(|&k| self.room_against(k) > 0.0);
+        let steepest = movable.fold(0.0_f64, |steepest, k| steepest.max(self.gradient[k].abs()));
         if steepest == 0.0 {
             return 1.0;
         }
+        let share = if algorithm == Algorithm::Ccsaq { CAUTION * share } else { share };
         let within = |share: f64, promise: f64| {
             // Twelve orders of magnitude around a factor that makes the steepest term of the order of one.
             let [mut low, mut high] = [1e-12, 1e12].map(|f| f / (steepest * self.span));
@@ -87,12 +136,14 @@ impl Start<'_> {
         cautious.max(within(LEAST * share, f64::INFINITY))
     }
 
-    /// The factor on a constraint of this value and gradient, where the objective has `objective_factor`.
+    /// The factor on a constraint of this value, gradient and multiplier, where the objective has `objective_factor`. A method adds
+    /// the constraint's penalty, times its multiplier over this factor, to that of the objective.
     pub(super) fn constraint_factor(
         &self,
         algorithm: Algorithm,
         objective_factor: f64,
         (value, gradient): (f64, &[f64]),
+        multiplier: f64,
     ) -> f64 {
         let penalty = |square: f64| match algorithm {
             Algorithm::Mma => square / (1.0 - square),
@@ -104,7 +155,8 @@ impl Start<'_> {
             assumed += 0.5 * penalty((step / (0.5 * self.span)).powi(2));
             known += g.abs() * step;
         }
-        if assumed > ASSUMED * known { (assumed / (ASSUMED * known)).min(LARGEST_FACTOR) } else { 1.0 }
+        let curved = if assumed > ASSUMED * known { assumed / (ASSUMED * known) } else { 1.0 };
+        curved.max(multiplier / ASSUMED).min(LARGEST_FACTOR)
     }
 
     /// Largest first move of a variable with a factor, and how much the gradient promises of all.
@@ -127,6 +179,11 @@ impl Start<'_> {
             Algorithm::Ccsaq => half * (slope * half).min(1.0),
             Algorithm::Slsqp | Algorithm::Lbfgs | Algorithm::Tnewton | Algorithm::Var2 => slope,
         };
-        self.gradient.iter().zip(self.room).map(move |(g, room)| free(factor * g.abs()).min(*room))
+        (0..self.gradient.len()).map(move |k| free(factor * self.gradient[k].abs()).min(self.room_against(k)))
+    }
+
+    /// How far a variable may go against its derivative.
+    fn room_against(&self, k: usize) -> f64 {
+        self.room[usize::from(self.gradient[k] <= 0.0)][k]
     }
 }

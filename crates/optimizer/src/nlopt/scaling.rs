@@ -38,20 +38,25 @@ impl Scaling {
             self.fill(&mut gradient, factor, derivative);
             gradient
         };
-        let gradient = scaled(&sample.gradient, 1.0);
         let [lower, upper] = [&settings.lower, &settings.upper].map(|bounds| self.scale(bounds));
-        let against = |k: usize| if gradient[k] > 0.0 { x[k] - lower[k] } else { upper[k] - x[k] };
-        let room: Vec<f64> = (0..x.len()).map(against).collect();
-        let start = Start { value: sample.value, gradient: &gradient, room: &room, span: SCALED_SPAN };
-        let objective = start.objective_factor(settings.algorithm, settings.first_step);
-        let factor_on = |value: f64, gradient: &[f64]| {
-            start.constraint_factor(settings.algorithm, objective, (value, gradient))
+        let between =
+            |low: &[f64], high: &[f64]| low.iter().zip(high).map(|(low, high)| high - low).collect();
+        let mut start = Start {
+            value: sample.value,
+            gradient: scaled(&sample.gradient, 1.0),
+            room: [between(&lower, x), between(x, &upper)],
+            span: SCALED_SPAN,
         };
-        let own = sample.constraints.iter().map(|(value, own)| factor_on(*value, &scaled(own, 1.0)));
-        let mut constraints: Vec<f64> = own.collect();
+        let own: Vec<_> = sample.constraints.iter().map(|(value, own)| (*value, scaled(own, 1.0))).collect();
+        let (objective, multipliers) = start.meet(settings.algorithm, settings.first_step, &own);
+        let factor_on = |value: f64, gradient: &[f64], multiplier: f64| {
+            start.constraint_factor(settings.algorithm, objective, (value, gradient), multiplier)
+        };
+        let met = own.iter().zip(multipliers);
+        let mut constraints: Vec<f64> = met.map(|((value, own), m)| factor_on(*value, own, m)).collect();
         // One factor on all terms of a worst case, which are compared with each other.
         let terms = sample.members.iter().map(|(value, own)| {
-            objective * factor_on(objective * (value - sample.value), &scaled(own, objective))
+            objective * factor_on(objective * (value - sample.value), &scaled(own, objective), 0.0)
         });
         let largest = terms.fold(0.0, f64::max);
         constraints.resize(constraints.len() + sample.members.len(), largest);
