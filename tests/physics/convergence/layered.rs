@@ -33,7 +33,7 @@ const ACROSS: [c64; 3] = [c64::new(0.3, -0.1), c64::new(0.2, 0.3), c64::new(-0.2
 const Q: c64 = c64::new(0.3, 0.2);
 
 /// Even numbers: a mesh line lies on the interface.
-const CELLS: [usize; 3] = [12, 16, 22];
+const CELLS: [usize; 3] = [10, 12, 16];
 
 /// Those for quadratic elements.
 const COARSE_CELLS: [usize; 3] = [6, 8, 12];
@@ -124,7 +124,9 @@ fn fields_converge_across_a_jump_of_the_reluctivity_and_the_face_of_a_conductor(
         [(4.0, 0.0, 1.0), (4.0, 50.0, 1.0), (2.5, 0.0, 0.5), (2.5, 50.0, 0.5)]
     {
         let field = Layered { relative_permeability, frequency, penalty, order: Order::Linear };
-        assert_orders(&field, Distortion::Random, &CELLS, ORDER_OF_A);
+        // A penalty that couples the components reaches the orders later.
+        let cells = if penalty == 1.0 { CELLS } else { [12, 16, 22] };
+        assert_orders(&field, Distortion::Random, &cells, ORDER_OF_A);
     }
 }
 
@@ -141,7 +143,7 @@ fn quadratic_elements_gain_an_order_across_a_jump() {
     for (frequency, penalty) in [(0.0, 1.0), (50.0, 1.0), (50.0, 0.5)] {
         let field = Layered { relative_permeability: 4.0, frequency, penalty, order: Order::Quadratic };
         // A penalty that couples the components reaches the order of B later.
-        let cells = if penalty == 1.0 { COARSE_CELLS } else { [8, 10, 14] };
+        let cells = if penalty == 1.0 { COARSE_CELLS } else { [8, 10, 12] };
         assert_orders(&field, Distortion::Random, &cells, QUADRATIC_ORDER_OF_A);
     }
 }

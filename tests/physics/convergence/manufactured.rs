@@ -25,10 +25,10 @@ const K: [c64; 3] = [c64::new(1.0, 0.3), c64::new(-0.4, 0.8), c64::new(0.6, -0.5
 /// `q` [T m²].
 const Q: c64 = c64::new(0.2, -0.4);
 
-const CELLS: [usize; 3] = [12, 16, 22];
+const CELLS: [usize; 3] = [8, 10, 14];
 
 /// Those for quadratic elements.
-const COARSE_CELLS: [usize; 3] = [6, 8, 12];
+const COARSE_CELLS: [usize; 3] = [6, 8, 10];
 
 struct Smooth {
     faces: Boundary,
@@ -128,7 +128,9 @@ fn quadratic_elements_gain_an_order() {
         (Boundary::FluxParallel, 50.0, 0.5),
     ] {
         let field = Smooth { faces, frequency, penalty, order: Order::Quadratic };
-        assert_orders(&field, Distortion::Random, &COARSE_CELLS, QUADRATIC_ORDER_OF_A);
+        // Grounded in one node, the scalar potential reaches its order later.
+        let cells = if faces == Boundary::FluxNormal { [6, 8, 12] } else { COARSE_CELLS };
+        assert_orders(&field, Distortion::Random, &cells, QUADRATIC_ORDER_OF_A);
     }
 }
 

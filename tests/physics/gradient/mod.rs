@@ -111,11 +111,14 @@ fn uneven(problem: &Problem) -> Vec<f64> {
 #[test]
 fn the_gradient_is_exact_in_both_models_flat_and_wavy() {
     let linear = ["remesh.law=\"linear\""];
-    for overrides in [&[][..], &MESHED, &linear, &[&MESHED[..], &linear].concat()] {
+    for overrides in [&[][..], &MESHED] {
         let problem = setup("shield_quick.toml", overrides).problem;
         holds(&problem, &initial(&problem));
         holds(&problem, &wavy(&problem));
+        // dF/dx knows nothing of the law.
         node_gradient_holds(&problem);
+        let problem = setup("shield_quick.toml", &[overrides, &linear].concat()).problem;
+        holds(&problem, &wavy(&problem));
     }
 }
 

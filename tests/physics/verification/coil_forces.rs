@@ -64,7 +64,7 @@ fn mesh(is_over_iron: bool) -> Mesh {
         BoxRegion {
             name: name.to_owned(),
             corners: [[0.0, 0.0, middle - half], [reach, reach, middle + half]],
-            size: [0.0022, 0.0022, 0.002],
+            size: [0.0035, 0.0035, 0.003],
             skin: free,
             cells: None,
         }
@@ -72,7 +72,7 @@ fn mesh(is_over_iron: bool) -> Mesh {
     let mut regions = vec![holder("sleeve", HEIGHT, 0.004), holder("upper", HEIGHT, 0.0)];
     if is_over_iron {
         let corners = [[0.0, 0.0, -FAR], [FAR, FAR, 0.0]];
-        let skin = [f64::INFINITY, f64::INFINITY, 0.002];
+        let skin = [f64::INFINITY, f64::INFINITY, 0.003];
         regions.push(BoxRegion { corners, size: free, skin, ..holder("iron", 0.0, 0.0) });
     } else {
         regions.push(holder("lower", -HEIGHT, 0.0));

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::generate::sphere;
 use fluxmorph_geometry::tet4::{Point, norm, volume};
+use fluxmorph_solver::linear::PreparedSystem;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
     BhCurve, Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Order,
@@ -116,61 +117,57 @@ const ALL: [((ElementFamily, Order), f64, &[f64]); 3] = [
     ((ElementFamily::Nodal, Order::Quadratic), 4.0 / 3.0, &[APPLIED[1]]),
 ];
 
+/// The derivative [J] of the energy in the iron by `ε` on a mesh of the sphere.
+fn energy_by_aspect(
+    mesh: &Mesh,
+    model: &FieldModel,
+    solution: &FieldSolution,
+    system: &mut PreparedSystem,
+) -> f64 {
+    let region = mesh.topology().region("sphere").expect("the generator makes it");
+    let energy = Functional::energy(model, Some(region)).expect("it has elements");
+    let value = energy.evaluate(model, mesh, solution).expect("finite");
+    let lambda = adjoint::solve(system, &value.derivative).expect("it converges");
+    let moving: Vec<_> = mesh.topology().elements().collect();
+    let implicit = adjoint::node_gradient(model, mesh, solution, &lambda, &moving).expect("one process");
+    let explicit = value.explicit.expect("an energy of a region that moves");
+    let along = |(x, (i, f)): (&Point, (&Point, &Point))| -> f64 {
+        let rate = |d: usize| share(*x) * x[d] * if d == 2 { 2.0 / 3.0 } else { -1.0 / 3.0 };
+        (0..3).map(|d| rate(d) * (i[d] + f[d])).sum()
+    };
+    8.0 * mesh.points().iter().zip(implicit.iter().zip(&explicit)).map(along).sum::<f64>()
+}
+
+/// And the energy of the sphere changes with its aspect ratio as the same equation says.
 #[test]
 fn the_inner_field_of_a_saturated_spheroid_solves_a_scalar_equation() {
     let curve = law();
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
     for (elements, refinement, fields) in ALL {
         let ball = sphere(&coarse(RADIUS, refinement)).expect("a sound sphere");
-        for aspect in [1.0, 1.5] {
+        for (aspect, &applied) in
+            [1.0, 1.5].into_iter().flat_map(|aspect| fields.iter().map(move |b| (aspect, b)))
+        {
             let mesh = stretched(&ball, aspect);
-            for &applied in fields {
-                let exact = Exact::new(&curve, aspect, applied).flux_density;
-                let model = model(&mesh, elements, &curve, applied);
-                let (solution, _) = model.solve(&mesh).expect("it converges");
-                let [mean, rms] = errors(&model, &mesh, &solution, exact);
-                println!(
-                    "{elements:?}, c/a = {aspect}, {applied} T: {exact:.4} T inside, mean off by {:.3} %, rms {:.2} %, {} steps",
-                    100.0 * mean,
-                    100.0 * rms,
-                    solution.newton_steps()
-                );
-                assert!(mean < 0.01, "{elements:?}, {aspect}, {applied} T: {mean}");
-            }
-        }
-    }
-}
-
-#[test]
-fn the_energy_of_a_saturated_sphere_changes_with_its_aspect_ratio_as_the_scalar_equation_says() {
-    let curve = law();
-    let exact_volume = 4.0 / 3.0 * std::f64::consts::PI * RADIUS.powi(3);
-    for (elements, refinement, fields) in ALL {
-        let mesh = sphere(&coarse(RADIUS, refinement)).expect("a sound sphere");
-        for &applied in fields {
-            let exact = Exact::new(&curve, 1.0, applied);
-            let by_aspect = exact_volume * curve.at(exact.flux_density).field_strength * exact.by_aspect;
+            let exact = Exact::new(&curve, aspect, applied);
             let model = model(&mesh, elements, &curve, applied);
             let (solution, mut system) = model.solve(&mesh).expect("it converges");
-            let region = mesh.topology().region("sphere").expect("the generator makes it");
-            let energy = Functional::energy(&model, Some(region)).expect("it has elements");
-            let value = energy.evaluate(&model, &mesh, &solution).expect("finite");
-            let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
-            let moving: Vec<_> = mesh.topology().elements().collect();
-            let implicit =
-                adjoint::node_gradient(&model, &mesh, &solution, &lambda, &moving).expect("one process");
-            let explicit = value.explicit.expect("an energy of a region that moves");
-            let along = |(x, (i, f)): (&Point, (&Point, &Point))| -> f64 {
-                let rate = |d: usize| share(*x) * x[d] * if d == 2 { 2.0 / 3.0 } else { -1.0 / 3.0 };
-                (0..3).map(|d| rate(d) * (i[d] + f[d])).sum()
-            };
-            let found: f64 =
-                8.0 * mesh.points().iter().zip(implicit.iter().zip(&explicit)).map(along).sum::<f64>();
-            let error = found / by_aspect - 1.0;
+            let [mean, rms] = errors(&model, &mesh, &solution, exact.flux_density);
             println!(
-                "{elements:?}, {applied} T: {found:.5e} J, exact {by_aspect:.5e} J, {:+.2} %",
-                100.0 * error
+                "{elements:?}, c/a = {aspect}, {applied} T: {:.4} T inside, mean off by {:.3} %, rms {:.2} %, {} steps",
+                exact.flux_density,
+                100.0 * mean,
+                100.0 * rms,
+                solution.newton_steps()
             );
-            assert!(error.abs() < 0.03, "{elements:?}, {applied} T: {found} against {by_aspect}");
+            assert!(mean < 0.01, "{elements:?}, {aspect}, {applied} T: {mean}");
+            if aspect == 1.0 {
+                let by_aspect = volume * curve.at(exact.flux_density).field_strength * exact.by_aspect;
+                let found = energy_by_aspect(&mesh, &model, &solution, &mut system);
+                let error = found / by_aspect - 1.0;
+                println!("  {found:.5e} J, exact {by_aspect:.5e} J, {:+.2} %", 100.0 * error);
+                assert!(error.abs() < 0.03, "{elements:?}, {applied} T: {found} against {by_aspect}");
+            }
         }
     }
 }
