@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::support::folder::{RunFolder, list, number, read_text};
 use crate::support::program::{command, finish, folder};
+use crate::support::repository;
 use crate::support::shield::quick;
 
 /// The quick shield with its plate meshed.
@@ -110,4 +111,26 @@ fn sides_without_condition_are_listed_with_their_areas() {
     assert!((number(side, "/area_m2") - 0.6 * 0.72).abs() < 1e-12, "{side}");
     let text = finish(command(&[&"check", &quick()]).args(["--set", sides])).exits_with(0).stdout;
     assert!(text.contains("no condition, field normal") && text.contains("4320.0000"), "{text}");
+}
+
+#[test]
+fn a_permeability_far_below_one_is_asked_about() {
+    let found = check(&["materials.odd.relative_permeability=0.0025"]);
+    assert!(found.contains("the material `odd` has the relative permeability 0.0025"), "{found}");
+    assert!(!check(&["materials.odd.relative_permeability=0.9998"]).contains("`odd` has the relative"));
+}
+
+#[test]
+fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
+    let home = folder();
+    let out = home.path().join("out");
+    let asks = |direction: &str| {
+        let direction = format!("objective.direction={direction}");
+        let coarse = ["mesh.boxes.refinement=0.5", "output.verify_refinement=0", &direction];
+        let further = ["--out", out.to_str().expect("UTF-8"), "--force", "--max-evaluations", "1"];
+        let config = repository("configs/actuator.toml");
+        finish(command(&[&"run", &config]).args(further).args(set(&coarse))).exits_with(1);
+        texts(&RunFolder(out.clone()).result()["warnings"]).contains("reverse its direction or minimise it")
+    };
+    assert!(asks("[0, 0, 1]") && !asks("[0, 0, -1]"));
 }

@@ -225,12 +225,14 @@ fn linear_solver(options: &config::LinearSolver) -> LinearSolverSettings {
         FactorReuse::WhileItPays => Reuse::WhileItPays,
         FactorReuse::Never => Reuse::Never,
     };
+    let usual = LinearSolverSettings::default();
     LinearSolverSettings {
         method,
         reuse,
         tolerance: options.tolerance,
+        required: usual.required.max(options.tolerance),
         factor_bytes: (options.factor_gib * GIB) as usize,
-        ..LinearSolverSettings::default()
+        ..usual
     }
 }
 
@@ -330,11 +332,18 @@ fn winding(coil: &config::Coil) -> Option<Winding> {
 }
 
 /// Notices about the current of each coil region.
+/// Divergence of a current, relative to its density, below which nothing is said of it.
+const LEAST_DIVERGENCE: f64 = 1e-4;
+
 pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
     let notice = |coil: &coil::Coil| match &coil.shape {
         // The current of a solid conductor is part of the solution.
         CoilShape::Racetrack(_) | CoilShape::Solid(_) => None,
-        CoilShape::Region(current) => Some(format!("coil `{}`: {}", coil.name, current.report())),
+        CoilShape::Region(current) => {
+            let report = current.report();
+            let is_smooth = report.after.jump.max(report.after.wall) < LEAST_DIVERGENCE;
+            (!is_smooth).then(|| format!("coil `{}`: {report}", coil.name))
+        }
     };
     model.coils().iter().filter_map(notice).collect()
 }

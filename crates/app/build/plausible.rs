@@ -8,7 +8,7 @@ use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
-use crate::config::{Coil, CoilShape, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
+use crate::config::{Coil, CoilShape, ConductorWord, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
 use crate::place::millimetres;
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -17,6 +17,9 @@ const THINNEST: f64 = 1e-6;
 
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
+
+/// Relative permeability below which none is of a usual material: bismuth has 0.9998.
+const LEAST_PERMEABILITY: f64 = 0.9;
 
 /// Weights of the vertices at which an element is looked at: its middle, near every vertex, and on every edge.
 const NEAR: f64 = 0.85;
@@ -31,7 +34,10 @@ pub(super) fn coil_faults(
     let size = size(mesh);
     let mut faults = Vec::new();
     for (i, (written, built)) in config.coils.iter().zip(coils).enumerate() {
-        let coil::CoilShape::Racetrack(winding) = &built.shape else { continue };
+        let coil::CoilShape::Racetrack(winding) = &built.shape else {
+            faults.extend(strands_in_iron(config, source, i));
+            continue;
+        };
         if let Some((key, length)) =
             section(written).into_iter().find(|(_, length)| *length < THINNEST * size)
         {
@@ -59,6 +65,23 @@ pub(super) fn coil_faults(
     faults
 }
 
+/// Strands in a region whose material has a permeability.
+fn strands_in_iron(config: &Config, source: &SourceMap, i: usize) -> Option<Diagnostic> {
+    let coil = &config.coils[i];
+    let CoilShape::Region(own) = &coil.shape else { return None };
+    let is_iron = material(config, &own.region).relative_permeability != 1.0;
+    (is_iron && own.conductor == ConductorWord::Stranded).then(|| {
+        let message = format!(
+            "the strands of the coil `{}` fill `{}`, whose material has a permeability: its flux would be that of iron",
+            coil.name, own.region
+        );
+        source
+            .diagnostic(&format!("coils[{i}].region"), message)
+            .expected("a region without a material of iron")
+            .help("take the material off the region; conductor = \"solid\" is a bar of iron")
+    })
+}
+
 /// What is rarely meant.
 pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
@@ -76,6 +99,15 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
              flux_normal"
                 .to_owned(),
         );
+    }
+    for (name, own) in &config.materials {
+        let permeability = own.relative_permeability;
+        if permeability < LEAST_PERMEABILITY {
+            warnings.push(format!(
+                "the material `{name}` has the relative permeability {permeability}, which keeps flux out as no material but a \
+                 superconductor does: of iron it is hundreds, and μr μ0 is not meant here"
+            ));
+        }
     }
     warnings.extend(unit_hint(config, mesh));
     warnings

@@ -89,7 +89,16 @@ impl Session<'_> {
             is_within(objective.initial, errors[0]) && is_within(larger, errors[1])
         });
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
-        if self.is_checked(stop_reason) && objective.ratio != 1.0 {
+        let analysis = &self.config.analysis;
+        let is_first_order_edge =
+            (analysis.elements, analysis.order) == (Elements::Edge, ElementOrder::Linear);
+        if !self.is_checked(stop_reason) || objective.ratio == 1.0 {
+        } else if is_first_order_edge && corrected.is_none() {
+            observer.notice(
+                "the best shape is not checked by other elements: of first-order edge elements the estimated error is that \
+                 check, and there is none",
+            );
+        } else if !is_first_order_edge {
             observer.phase("checking the best shape by other elements");
             match cross_check(self.config, self.source, meshes, self.interrupted) {
                 Ok(found) => accuracy.cross_check = found,

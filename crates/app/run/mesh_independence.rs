@@ -21,7 +21,7 @@ use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 use super::confirmation::ShapeMeshes;
-use super::finer::{Cut, FinerMesh, FinerProblem};
+use super::finer::{Cut, FinerMesh, FinerProblem, looked_at_once};
 use super::shape_pair::ShapePair;
 use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
@@ -29,6 +29,10 @@ use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
 use crate::show::Observer;
+
+/// Counted work of a shape on a fresh mesh, in evaluations, beyond which elements are cut instead. The shipped runs have 4 to 21, and
+/// second-order edge elements of `shield_edge.toml`, which would take twenty minutes after a search of three, 29.
+const MOST_EVALUATIONS: f64 = 25.0;
 
 /// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +69,8 @@ enum Outcome {
     CutShort,
     /// There is not enough memory.
     TooLarge(String),
+    /// A design costs so many times what one of the run does.
+    TooDear(f64),
 }
 
 /// The mesh of a check.
@@ -75,6 +81,8 @@ pub struct FreshMesh {
     parts: usize,
     /// Bytes that the process holds at the peak of the check, about: the least and the most.
     memory: [usize; 2],
+    /// Counted work of a design of the run [ns].
+    work: f64,
 }
 
 impl FreshMesh {
@@ -87,7 +95,8 @@ impl FreshMesh {
         let parts = factor.ceil() as usize;
         let mesh = DividedMesh::of(config, problem, parts)?;
         let growth = mesh.tet_count()? as f64 / config.mesh.tet_count()?.max(1) as f64;
-        Some(Self { memory: Sizes::of(problem).on_other_mesh(growth), mesh, parts })
+        let memory = Sizes::of(problem).on_other_mesh(growth);
+        Some(Self { memory, mesh, parts, work: problem.work_of_design() })
     }
 
     /// Bytes that the process holds at the peak of the check, about: the least and the most, as [`Sizes::on_other_mesh`].
@@ -123,7 +132,7 @@ impl MeshIndependence<'_> {
             _ if cut_short || interrupted() => Ok(Outcome::CutShort),
             Some(fresh) => {
                 observer.phase("checking the best shape on a fresh mesh");
-                self.compute(fresh, interrupted)
+                self.compute(fresh, interrupted, observer)
             }
             None => {
                 observer.phase("checking the best shape on finer elements");
@@ -144,7 +153,7 @@ impl MeshIndependence<'_> {
             }
             Ok(Outcome::TooLarge(shortage)) => observer
                 .notice(&format!("the best shape is not checked on a finer mesh, which takes {shortage}")),
-            Ok(Outcome::CutShort) => {
+            Ok(Outcome::CutShort | Outcome::TooDear(_)) => {
                 observer
                     .notice("the best shape is not checked on a fresh mesh: the run was stopped before that");
                 if !cut_short {
@@ -152,7 +161,9 @@ impl MeshIndependence<'_> {
                 }
             }
             Err(error) => {
-                observer.warning(&format!("the best shape could not be checked on a fresh mesh: {error}"));
+                observer.warning(&format!(
+                    "the best shape could not be checked on a fresh mesh: {error}; output.verify_refinement = 0 leaves this check out"
+                ));
             }
         }
         Check::Finished
@@ -176,10 +187,21 @@ impl MeshIndependence<'_> {
         Ok(found.map_or(Outcome::CutShort, Outcome::Found))
     }
 
-    /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape.
-    fn compute(&self, fresh: &FreshMesh, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
+    /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape or costs too much.
+    fn compute(
+        &self,
+        fresh: &FreshMesh,
+        interrupted: &dyn Fn() -> bool,
+        observer: &mut dyn Observer,
+    ) -> Result<Outcome, Error> {
         match self.compute_on(fresh, interrupted) {
             Err(Error::Optimizer(error)) if error.is_unreached() && self.meshes.is_some() => {
+                self.compute_on_finer_elements(interrupted)
+            }
+            Ok(Outcome::TooDear(times)) => {
+                observer.notice(&format!(
+                    "a fresh mesh costs {times:.0} evaluations for each shape: both are checked on their own elements, cut, instead"
+                ));
                 self.compute_on_finer_elements(interrupted)
             }
             computed => computed,
@@ -194,6 +216,10 @@ impl MeshIndependence<'_> {
         // What the factor of this very mesh takes is known now.
         if let Some(shortage) = memory_limit::shortage_of(&setup.problem) {
             return Ok(Outcome::TooLarge(shortage));
+        }
+        let times = setup.problem.work_of_design() / fresh.work;
+        if times > MOST_EVALUATIONS && self.meshes.is_some() {
+            return Ok(Outcome::TooDear(times));
         }
         if interrupted() {
             return Ok(Outcome::CutShort);
@@ -245,7 +271,7 @@ fn fresh_configuration(config: &Config) -> Config {
         // The old surface's displacements are taken over as they are.
         design.filter_radius = design.grid.is_none().then_some(0.0);
     }
-    fresh
+    looked_at_once(fresh)
 }
 
 /// The analysis of a shape.
@@ -410,6 +436,38 @@ mod tests {
             assert_eq!(inside(&new) - 1, 2 * (inside(&old) - 1), "axis {axis}");
             assert_eq!(new.len() - inside(&new), old.len() - inside(&old), "axis {axis}, far cells");
         }
+    }
+
+    #[test]
+    fn where_a_fresh_mesh_costs_too_much_elements_are_cut() {
+        let (config, source) = quick(false);
+        let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+        let problem = &setup.problem;
+        let shape = problem.shape().expect("a shape");
+        let original = problem.original().clone();
+        let best = shape.carried(shape.initial(), &dished(&setup)).expect("a mild shape").moved.mesh;
+        let (full, tets) = (setup.full_mesh.clone(), original.topology().tets().len());
+        let meshes = ShapeMeshes { full, solved: [original, best] };
+        let fresh = FreshMesh { work: 1.0, ..FreshMesh::of(&config, problem).expect("a generated mesh") };
+        let shapes = ShapePair::of(&config, &setup, &dished(&setup)).expect("a design");
+        let check = MeshIndependence {
+            config: &config,
+            source: &source,
+            stop_reason: StopReason::ObjectiveConverged,
+            shapes: &shapes,
+            fresh: Some(&fresh),
+            meshes: Some(&meshes),
+            sizes: Sizes::of(problem),
+        };
+        let mut recorded = Recorded::default();
+        let found = check.compute(&fresh, &|| false, &mut recorded).expect("both are computed");
+        let Outcome::Found(found) = found else { panic!("cut short, or too large") };
+        assert!(found.tets >= 2 * tets && (0.5..0.999).contains(&found.ratio), "{found:?}");
+        assert!(
+            recorded.notices.iter().any(|notice| notice.contains("cut, instead")),
+            "{:?}",
+            recorded.notices
+        );
     }
 
     #[test]

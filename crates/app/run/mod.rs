@@ -292,6 +292,12 @@ impl Session<'_> {
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
+        if let Some(warning) =
+            result.objective.as_ref().and_then(|own| reservations::wrong_sign(self.config, own))
+        {
+            observer.warning(&warning);
+            result.warnings.push(warning);
+        }
         // The check may need more memory or patience than there is: what the run has found is safe before.
         check_finite(&result)?;
         result.write(&self.directory)?;

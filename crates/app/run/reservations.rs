@@ -11,7 +11,8 @@ use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use crate::build::{Setup, material, result_warnings};
-use crate::config::Config;
+use crate::config::{Config, Goal};
+use crate::files::ObjectiveResult;
 use crate::place::millimetres;
 
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
@@ -41,6 +42,18 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
     });
     all.extend(result_warnings(config, &setup.audits, &analysis.mesh, least));
     all
+}
+
+/// An objective that is to be made large and is negative at the initial design.
+pub(super) fn wrong_sign(config: &Config, objective: &ObjectiveResult) -> Option<String> {
+    let goal = config.objective.as_ref()?.goal;
+    (goal == Goal::Maximise && objective.initial < 0.0).then(|| {
+        format!(
+            "the objective is {:.4e} at the initial design, and to maximise it is to make it smaller in size first: for more of \
+             it, reverse its direction or minimise it",
+            objective.initial
+        )
+    })
 }
 
 fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<String> {

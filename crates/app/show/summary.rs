@@ -143,7 +143,14 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     }
     rows.extend(accuracy.verdict.map(|verdict| {
         let style = if verdict == Verdict::Confirmed { styles.good } else { styles.bad };
-        ("gain", styled(style, verdict.describe()))
+        let opinions = [
+            objective.verification.is_some(),
+            accuracy.cross_check.is_some(),
+            accuracy.error_estimate.is_some(),
+        ];
+        let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
+        let remark = if alone { " (by one check alone)" } else { "" };
+        ("gain", format!("{}{remark}", styled(style, verdict.describe())))
     }));
     rows
 }

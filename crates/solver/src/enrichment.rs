@@ -11,8 +11,8 @@
 //! exact for a quadratic `F`. Since `r` vanishes on the first-order space, `2 Re zᵀr` comes from the functions that only the
 //! second order has, and `Σ_i 2 Re z_i r_i` over those of an element's carriers says where the error is made.
 //!
-//! With B–H curves `K` is the tangent at `u`, and what is left after the correction is the residual itself at `u + e`: what
-//! its curvature makes of `e` is weighed too.
+//! With B–H curves `e` comes from Newton's method with its line search, until the residual is a thousandth of the load; `K` is
+//! the tangent at `u + e`, and what is weighed is the residual that is left there.
 //!
 //! Does not live here: sums over terms and frequencies, and what is done with the number.
 
@@ -25,7 +25,7 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 use crate::circuit::Excitation;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
-use crate::linear::{LinearSolver, LinearSolverSettings, Method, PreparedSystem, Reuse};
+use crate::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, PreparedSystem, Reuse};
 use crate::model::FieldModel;
 use crate::nonlinear;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
@@ -83,6 +83,17 @@ struct Response {
     field: Vec<c64>,
     residual: Vec<c64>,
     correction: Vec<c64>,
+}
+
+/// A first-order field corrected.
+struct Corrected {
+    /// With the matrix, or the tangent, that duals are solved with.
+    system: PreparedSystem,
+    residual: Vec<c64>,
+    rest: Vec<c64>,
+    correction: Vec<c64>,
+    driven: Vec<c64>,
+    iterations: usize,
 }
 
 /// What the dual problem says.
@@ -147,6 +158,55 @@ impl FieldModel {
     }
 }
 
+impl Corrected {
+    /// Where all is linear.
+    fn in_one_step(
+        model: &FieldModel,
+        mesh: &Mesh,
+        (field, currents): (&[c64], &[c64]),
+        shared: Option<Enrichment>,
+    ) -> Result<Self, SolverError> {
+        let mut system = match shared {
+            Some(other) => model.take_over(other.system)?,
+            None => model.prepare(model.assembled(mesh))?,
+        };
+        let mut residual = model.load(mesh);
+        model.windings().add_driven_load(currents, &mut residual);
+        system.subtract_product(field, &mut residual);
+        // First-order functions are second-order ones, so that the circuits' equations hold as they did.
+        let (correction, report, driven) = system.solve_with(&residual, Excitation::Given(&[]))?;
+        let mut rest = residual.clone();
+        model.windings().add_driven_load(&driven, &mut rest);
+        system.subtract_product(&correction, &mut rest);
+        Ok(Self { system, residual, rest, correction, driven, iterations: report.iterations })
+    }
+
+    /// With B–H curves: the second-order state itself, as far as a thousandth of the load, and the tangent there. One step from the
+    /// first-order field is none of it where iron is saturated: beyond the knee it overshoots, and what is left of the residual is
+    /// no small part.
+    fn by_newton(model: &FieldModel, mesh: &Mesh, field: &[c64]) -> Result<Self, SolverError> {
+        let matrix = model.assemble(mesh);
+        let residual_of = |values: &[c64]| {
+            let (mut residual, mut product) = (model.load(mesh), vec![c64::default(); values.len()]);
+            matrix.mul(values, &mut product);
+            let added = nonlinear::added(model, mesh, &FieldSolution::of_state(values.to_vec()));
+            axpy(c64::from(-1.0), &product, &mut residual);
+            axpy(c64::from(-1.0), &added.residual, &mut residual);
+            residual
+        };
+        let from = (&LinearSolverCache::default(), Some(field));
+        let (state, system) = model.solve_nonlinear(mesh, from, &mut |_| {})?;
+        Ok(Self {
+            system,
+            residual: residual_of(field),
+            rest: residual_of(state.values()),
+            correction: state.values().iter().zip(field).map(|(u, first)| u - first).collect(),
+            driven: Vec::new(),
+            iterations: state.report().iterations,
+        })
+    }
+}
+
 impl Enrichment {
     /// The correction of a state of `coarse` on a mesh; `model` is [`FieldModel::enriched`] of it, and `shared` is of another state on
     /// that mesh whose model has the same matrix.
@@ -167,37 +227,12 @@ impl Enrichment {
         let mut field = vec![c64::default(); fine.dofs.count()];
         prolongation.mul(&state.values()[..coarse.unknown_count()], &mut field);
         field.extend(state.solid_unknowns(coarse));
-        let mut residual = model.load(mesh);
         let currents = state.currents().to_vec();
-        model.windings().add_driven_load(&currents, &mut residual);
-        let (mut system, linear) = if model.is_linear() {
-            let system = match shared {
-                Some(other) => model.take_over(other.system)?,
-                None => model.prepare(model.assembled(mesh))?,
-            };
-            system.subtract_product(&field, &mut residual);
-            (system, None)
+        let Corrected { system, residual, rest, correction, driven, iterations } = if model.is_linear() {
+            Corrected::in_one_step(&model, mesh, (&field, &currents), shared)?
         } else {
-            let linear = model.assemble(mesh);
-            subtract_product(&linear, &field, &mut residual);
-            let added = nonlinear::added(&model, mesh, &FieldSolution::of_state(field.clone()));
-            axpy(c64::from(-1.0), &added.residual, &mut residual);
-            (model.prepare(model.assemble_tangent(mesh, &added.tangents))?, Some((linear, added.residual)))
+            Corrected::by_newton(&model, mesh, &field)?
         };
-        // First-order functions are second-order ones, so that the circuits' equations hold as they did.
-        let (correction, report, driven) = system.solve_with(&residual, Excitation::Given(&[]))?;
-        let mut rest = residual.clone();
-        model.windings().add_driven_load(&driven, &mut rest);
-        match linear {
-            None => system.subtract_product(&correction, &mut rest),
-            Some((linear, before)) => {
-                subtract_product(&linear, &correction, &mut rest);
-                let corrected = field.iter().zip(&correction).map(|(u, e)| u + e).collect();
-                let after = nonlinear::added(&model, mesh, &FieldSolution::of_state(corrected));
-                axpy(c64::from(1.0), &before, &mut rest);
-                axpy(c64::from(-1.0), &after.residual, &mut rest);
-            }
-        }
         Ok(Self {
             model,
             system,
@@ -208,7 +243,7 @@ impl Enrichment {
             correction,
             currents: [currents, driven],
             responses: BTreeMap::new(),
-            iterations: report.iterations,
+            iterations,
         })
     }
 
@@ -321,11 +356,4 @@ impl Enrichment {
         };
         elements().map(|e| space.carriers_of(e).iter().map(share).sum()).collect()
     }
-}
-
-/// `r −= K x`.
-fn subtract_product(matrix: &CsrMatrix<c64>, x: &[c64], r: &mut [c64]) {
-    let mut product = vec![c64::default(); x.len()];
-    matrix.mul(x, &mut product);
-    r.iter_mut().zip(product).for_each(|(r, p)| *r -= p);
 }

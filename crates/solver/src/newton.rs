@@ -38,6 +38,11 @@ const ENERGY_NOISE: f64 = 1e-9;
 /// lets them, so that the method stays quadratic; right sides that are rounding themselves have no better solution.
 const REQUIRED_OF_A_STEP: f64 = 1e-6;
 
+/// Above which residual the solution for a step of a model is refused: looser only where its settings are.
+fn required_of_a_step(model: &FieldModel) -> f64 {
+    REQUIRED_OF_A_STEP.max(model.setup().linear_solver.required)
+}
+
 /// Where Newton's method stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonProgress {
@@ -104,7 +109,7 @@ impl Energy<'_> {
     /// permeability, far below the largest, and creeps along the foot of a curve.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
         let mut system = systems.prepare(self.matrix.clone())?;
-        let (values, report) = system.solve_within(REQUIRED_OF_A_STEP, &self.load)?;
+        let (values, report) = system.solve_within(required_of_a_step(self.model), &self.load)?;
         systems.keep(system.into_field());
         let zero = self.at(vec![c64::default(); self.load.len()]);
         let found = self.search(&zero, &values);
@@ -176,7 +181,7 @@ pub(crate) fn solve(
             return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
         }
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
-        let (step, report) = system.solve_within(REQUIRED_OF_A_STEP, &right_side)?;
+        let (step, report) = system.solve_within(required_of_a_step(model), &right_side)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step) } else { None };
         let Some((next, length)) = found else {

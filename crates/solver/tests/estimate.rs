@@ -104,17 +104,22 @@ fn the_error_of_saturated_iron_is_estimated() {
     };
     let law = Arc::new(BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table"));
     let iron = Material { relative_permeability: 10.0, conductivity: 0.0 };
-    let of = |order| FieldModelSetup {
-        materials: vec![Material::AIR, iron, Material::AIR],
-        bh: vec![None, Some(Arc::clone(&law))],
-        ..setup((ElementFamily::Edge, order), 0.0)
-    };
-    let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
-    let energy = Functional::energy(&model, None).expect("a functional");
-    let found = estimate(&mesh, &of(Order::Linear), &energy);
-    let difference = solved(&mesh, &of(Order::Quadratic), &energy) - found[0];
-    println!("F {:.5e}, estimated {:.5e}, second order has {difference:.5e} more", found[0], found[1]);
-    assert!((found[1] - difference).abs() < 0.1 * difference.abs(), "{} {difference}", found[1]);
+    // Below the knee, across it, and beyond.
+    for ampere_turns in [30.0, 1e3, 3e4] {
+        let of = |order| {
+            let mut setup = setup((ElementFamily::Edge, order), 0.0);
+            setup.coils[0].ampere_turns = c64::new(ampere_turns, 0.0);
+            setup.materials[1] = iron;
+            FieldModelSetup { bh: vec![None, Some(Arc::clone(&law))], ..setup }
+        };
+        let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
+        let energy = Functional::energy(&model, None).expect("a functional");
+        let found = estimate(&mesh, &of(Order::Linear), &energy);
+        let difference = solved(&mesh, &of(Order::Quadratic), &energy) - found[0];
+        println!("F {:.5e}, estimated {:.5e}, second order has {difference:.5e} more", found[0], found[1]);
+        // The definition: what is left of the residual is weighed.
+        assert!((found[1] - difference).abs() < 0.02 * difference.abs(), "{} {difference}", found[1]);
+    }
 }
 
 #[test]

@@ -148,8 +148,8 @@ const AMID: [(&str, &str); 5] = [
 
 #[test]
 fn what_would_help_a_squeezed_mesh_is_chosen_by_where_and_why() {
-    let rim = "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)";
-    let [rough, lid] = ["a filter (design.filter_radius) or", "a larger remesh region or narrower bounds"];
+    let rim = "let their faces slide or be free, or keep the rim of the design where it is";
+    let [rough, lid] = ["a filter or a control grid", "narrower bounds give it, or a larger remesh region"];
     let raw = ("[design]", "[design]\nfilter_radius = 0");
     for (changes, expected, other) in [(vec![raw], [rim, rough], lid), (vec![], [rim, lid], rough)] {
         let mut problem = setup_of(&changed(BLOCK, &[&AMID, &changes[..]].concat())).problem;

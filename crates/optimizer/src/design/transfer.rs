@@ -17,9 +17,7 @@ const NEAR: f64 = 0.25;
 
 /// Two triangulations are not of one surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "the fresh mesh's design surface has a node at {point:?} m, far from the run's; set output.verify_refinement = 0"
-)]
+#[error("the fresh mesh's design surface has a node at {point:?} m, far from the run's")]
 pub struct SurfaceMismatch {
     /// Place of the node [m].
     pub point: Point,

@@ -164,8 +164,8 @@ impl<'a> Search<'a> {
         if is_throttled {
             run.warn(&format!(
                 "not converged: the search came to its tolerance in a trust region of {:.1} % of the bound range, where the \
-                 gradient still promises {:.0} % of what it did at the start; a smoother design (design.filter_radius or \
-                 design.grid), surfaces that slide (remesh.slide) or a lower optimizer.minimum_quality let the mesh go further",
+                 gradient still promises {:.0} % of what it did at the start; a smoother design (a filter, a control grid), surfaces \
+                 that slide or a lower minimum quality let the mesh go further",
                 100.0 * scale,
                 100.0 * now / before
             ));

@@ -49,18 +49,18 @@ impl Cut {
         let (why, cure) = if is_at_held_rim {
             (
                 "nodes beside the design surface are held there".to_owned(),
-                "list their faces in remesh.slide or remesh.free, or keep the rim of the design (design.rim)",
+                "let their faces slide or be free, or keep the rim of the design where it is",
             )
         } else if rows.len() > 1 && most - least > 0.5 * most.abs().max(least.abs()) {
             let step = 1e3 * (most - least);
             (
                 format!("neighbouring nodes of the design lie {step:.1} mm apart"),
-                "a filter (design.filter_radius) or a control grid makes them smoother",
+                "a filter or a control grid makes the design smoother",
             )
         } else {
             (
                 "there is no room between the design surface and where the mesh is held".to_owned(),
-                "a larger remesh region or narrower bounds give it",
+                "narrower bounds give it, or a larger remesh region where it ends inside the mesh",
             )
         };
         let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);

@@ -263,6 +263,13 @@ impl Problem {
         matrices
     }
 
+    /// Counted work of the fields of a design with their adjoints [ns]: multiplications and bytes, no clock. 0 on several ranks.
+    pub fn work_of_design(&self) -> f64 {
+        let analyses =
+            self.matrices().into_iter().filter_map(|states| self.states[states[0]].linear_solver());
+        analyses.filter_map(|analysis| analysis.work_of_design().ok()).sum()
+    }
+
     /// What every evaluation reports of the bodies, without values.
     pub fn forces_at_rest(&self) -> Vec<BodyForce> {
         self.forces(|body, _| body.at_rest())

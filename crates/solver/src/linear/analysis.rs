@@ -172,7 +172,7 @@ impl SystemAnalysis {
     ///
     /// # Errors
     /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
-    pub(crate) fn work_of_design(&self) -> Result<f64, MeshError> {
+    pub fn work_of_design(&self) -> Result<f64, MeshError> {
         self.cost_of_design(self.method)
     }
 
