@@ -31,15 +31,14 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn a_coil_region_becomes_a_source_and_its_divergence_is_told() {
+fn a_coil_region_becomes_a_source_and_nothing_is_said_of_a_current_without_divergence() {
     let setup = prepared(BLOCK).unwrap_or_else(|error| panic!("{error}"));
     let coils = setup.problem.states()[0].coils();
     let CoilShape::Region(current) = &coils[0].shape else { panic!("a region") };
     for (_, j) in current.current_density() {
         assert!((j[1] * 0.02 * 0.03 - 1.0).abs() < 1e-11, "one ampere-turn through 20 mm x 30 mm");
     }
-    let told = setup.warnings.iter().find(|w| w.starts_with("coil `bar`: residual divergence"));
-    assert!(told.is_some_and(|w| w.contains("100.00 to 100.00 %")), "{:?}", setup.warnings);
+    assert!(!setup.warnings.iter().any(|warning| warning.contains("divergence")), "{:?}", setup.warnings);
 }
 
 #[test]
