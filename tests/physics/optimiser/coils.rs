@@ -31,14 +31,17 @@ fn refused(text: &str) -> String {
 }
 
 #[test]
-fn a_coil_region_becomes_a_source_and_nothing_is_said_of_a_current_without_divergence() {
+fn a_coil_region_becomes_a_source_and_the_divergence_of_its_current_is_told_where_there_is_any() {
     let setup = prepared(BLOCK).unwrap_or_else(|error| panic!("{error}"));
     let coils = setup.problem.states()[0].coils();
     let CoilShape::Region(current) = &coils[0].shape else { panic!("a region") };
     for (_, j) in current.current_density() {
         assert!((j[1] * 0.02 * 0.03 - 1.0).abs() < 1e-11, "one ampere-turn through 20 mm x 30 mm");
     }
-    assert!(!setup.warnings.iter().any(|warning| warning.contains("divergence")), "{:?}", setup.warnings);
+    let told = |setup: &Setup| setup.warnings.iter().any(|warning| warning.contains("residual divergence"));
+    assert!(!told(&setup), "a straight bar: {:?}", setup.warnings);
+    let round = crate::support::setup("inductor.toml", &["analysis.order=1"]);
+    assert!(told(&round), "a ring of flat facets: {:?}", round.warnings);
 }
 
 #[test]
