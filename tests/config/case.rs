@@ -21,8 +21,13 @@ use crate::program::write;
 use crate::support::{repository, repository_text};
 
 /// Where the sound bases lie.
-const BASES: [&str; 4] =
-    ["configs", "fuzz/seeds/config", "tests/config/bases", "crates/geometry/tests/msh_support"];
+const BASES: [&str; 5] = [
+    "configs",
+    "fuzz/seeds/config",
+    "tests/config/bases",
+    "tests/support",
+    "crates/geometry/tests/msh_support",
+];
 
 /// How the lines of what is expected begin.
 const EXPECTED: [&str; 6] = ["error: ", "^ ", "~ ", "= ", "|", "> "];

@@ -139,6 +139,11 @@ fn a_foreign_folder_is_not_taken_by_a_mark_that_is_none() {
     write(home.path(), "device.toml", quick());
     write(&out, "thesis.txt", "years of work");
     let force = || solve(home.path(), &["--out", "out", "--force"]);
+    for further in [&[][..], &["--force"]] {
+        solve(home.path(), &[&["--out", "out"], further].concat())
+            .refuses(5, &["is not empty and holds no run of fluxmorph"]);
+        assert_holds(&out, &["thesis.txt"]);
+    }
     let marks = [
         String::new(),
         "{}".into(),

@@ -155,59 +155,46 @@ fn a_negative_objective_is_optimised_both_ways() {
     assert!(up.initial < 0.0 && up.best.objective > up.initial && down.best.objective < down.initial);
 }
 
-#[test]
-fn a_run_at_two_frequencies_writes_both() {
+/// The result of a few evaluations of a shipped configuration, whose first state is that of the result, and its first field file
+/// with these arrays.
+fn written(name: &str, evaluations: usize, arrays: [&str; 4]) -> RunResult {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let overrides = [
-        format!("output.directory={:?}", folder.path().join("run")),
-        "optimizer.max_evaluations=3".to_owned(),
-    ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let (config, source) = config("shield_two_frequencies.toml", &overrides);
+    let directory = format!("output.directory={:?}", folder.path().join("run"));
+    let (config, source) = config(name, &[&directory, &format!("optimizer.max_evaluations={evaluations}")]);
     let result: RunResult =
         run::run(&config, &source, options(&system_disk()), &mut Silent).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!((&result.states[0].losses_w, &result.states[0].probes), (&result.losses_w, &result.probes));
+    let contents = RunFolder(folder.path().join("run")).field(0);
+    println!("{:?}", contents.cell_data.keys().collect::<Vec<_>>());
+    assert!(arrays.iter().all(|name| contents.cell_data.contains_key(*name)));
+    result
+}
+
+#[test]
+fn a_run_at_two_frequencies_writes_both() {
+    let arrays = ["B_re", "loss_density", "B_re_200Hz", "loss_density_200Hz"];
+    let result = written("shield_two_frequencies.toml", 3, arrays);
     assert_eq!(result.frequencies_hz, [60.0, 200.0]);
     let frequencies: Vec<f64> = result.states.iter().map(|state| state.frequency_hz).collect();
     assert_eq!(frequencies, result.frequencies_hz);
-    assert_eq!((&result.states[0].losses_w, &result.states[0].probes), (&result.losses_w, &result.probes));
     // Below saturation the loss of thick steel under a given current grows faster than the square root of the frequency.
     assert!(result.states[1].losses_w["plate"] > 1.8 * result.losses_w["plate"]);
     let objective = result.objective.as_ref().expect("an objective");
     let sum: f64 = objective.terms.iter().map(|term| term.weight * term.value).sum();
     assert!((sum / objective.best - 1.0).abs() < 1e-14);
-    let contents = RunFolder(folder.path().join("run")).field(0);
-    println!("{:?}", contents.cell_data.keys().collect::<Vec<_>>());
-    for name in ["B_re", "loss_density", "B_re_200Hz", "loss_density_200Hz"] {
-        assert!(contents.cell_data.contains_key(name), "{name}");
-    }
 }
 
 #[test]
 fn a_run_under_two_loads_writes_both() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let overrides = [
-        format!("output.directory={:?}", folder.path().join("run")),
-        "optimizer.max_evaluations=2".to_owned(),
-    ];
-    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-    let (config, source) = config("shield_two_loads.toml", &overrides);
-    let result: RunResult =
-        run::run(&config, &source, options(&system_disk()), &mut Silent).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(
-        (result.loads.as_slice(), result.frequencies_hz),
-        (&["wide_on".to_owned(), "narrow_on".to_owned()][..], vec![60.0; 2])
-    );
+    let arrays = ["B_re", "loss_density", "B_re_narrow_on", "loss_density_narrow_on"];
+    let result = written("shield_two_loads.toml", 2, arrays);
     let loads: Vec<Option<&str>> = result.states.iter().map(|state| state.load.as_deref()).collect();
     assert_eq!(loads, [Some("wide_on"), Some("narrow_on")]);
-    assert_eq!((&result.states[0].losses_w, &result.states[0].probes), (&result.losses_w, &result.probes));
+    assert!(result.loads == ["wide_on", "narrow_on"] && result.frequencies_hz == [60.0; 2]);
     assert!(result.states[1].losses_w["plate"] > 2.0 * result.losses_w["plate"], "{:?}", result.states);
     let objective = result.objective.as_ref().expect("an objective");
     let largest = objective.terms.iter().map(|term| term.value).fold(0.0, f64::max);
     assert_eq!(objective.best, largest);
-    let contents = RunFolder(folder.path().join("run")).field(0);
-    for name in ["B_re", "loss_density", "B_re_narrow_on", "loss_density_narrow_on"] {
-        assert!(contents.cell_data.contains_key(name), "{name}");
-    }
 }
 
 #[test]

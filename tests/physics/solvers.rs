@@ -3,8 +3,8 @@
 
 use fluxmorph::build::{Mode, set_up};
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
-use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
-use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, SolverError};
+use fluxmorph_solver::FieldModel;
+use fluxmorph_solver::linear::{LinearSolverCache, Method};
 
 use crate::problems::variables;
 use crate::support::{config, norm, relative_difference, setup};
@@ -132,37 +132,6 @@ fn what_is_shared_between_frequencies_changes_no_result() {
     };
     let deviation = deviation(&of("while_it_pays"), &of("never"));
     assert!(deviation < SAME, "{deviation:e}");
-}
-
-#[test]
-fn a_method_that_does_not_converge_is_followed_by_a_more_robust_one() {
-    let problem = problem(MESHED, &[REUSED]);
-    let (mesh, model) = (problem.original(), &problem.states()[0]);
-    let setup = |max_iterations| FieldModelSetup {
-        family: ElementFamily::Nodal,
-        linear_solver: LinearSolverSettings {
-            method: LinearSolver::Fixed(Method::Incomplete),
-            max_iterations,
-            ..LinearSolverSettings::default()
-        },
-        ..model.setup().clone()
-    };
-    // Five iterations are too few for all but a complete factor of the matrix itself.
-    let hasty = FieldModel::new(mesh, setup(Some(5))).expect("a field model");
-    let (field, system) = hasty.solve(mesh).expect("the last of them converges");
-    assert_eq!(system.method(), Some(Method::Direct));
-    let steps: Vec<(Method, Method)> =
-        system.events().iter().map(|SolverEvent::FellBack { from, to, .. }| (*from, *to)).collect();
-    let ladder = [Method::Incomplete, Method::RealFactorSingle, Method::RealFactor, Method::Direct];
-    assert_eq!(steps, ladder.windows(2).map(|w| (w[0], w[1])).collect::<Vec<_>>());
-    assert!(field.report().residual <= 1e-9);
-
-    // Without memory for any factor there is nothing to fall back to.
-    let mut small = setup(Some(5));
-    small.linear_solver.factor_bytes = 1;
-    let error =
-        FieldModel::new(mesh, small).expect("a field model").solve(mesh).expect_err("it is too hasty");
-    assert!(matches!(error, SolverError::NotConverged { .. }), "{error}");
 }
 
 #[test]

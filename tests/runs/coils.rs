@@ -207,28 +207,3 @@ fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
     assert!(deviation([found, current]) < 1e-9);
     assert_eq!(result["coils"], result["states"][0]["coils"]);
 }
-
-#[test]
-fn coils_that_cannot_be_asked_are_refused_by_name() {
-    let refused = |changes: &[(&str, &str)], fragments: &[&str]| {
-        let folder = folder();
-        execute("solve", folder.path(), changes).with(3, fragments);
-    };
-    refused(&[("coils = [\"one\", \"two\"]", "coils = [\"one\", \"tow\"]")], &["no coil `tow`", "`two`"]);
-    refused(&[("turns = 4\n", ""), ("resistance = \"2 mohm\"\n", "")], &["`two` has no turns", "turns = 10"]);
-    let current =
-        ("kind = \"coupling\"\ncoils = [\"one\", \"two\"]", "kind = \"current\"\ncoils = [\"two\"]");
-    refused(&[current], &["current of the coil `two` is given"]);
-    refused(&[("coils = [\"one\", \"two\"]", "coils = [\"one\"]")], &["is of 2 coils, and 1 are named"]);
-    let resistance =
-        ("kind = \"coupling\"\ncoils = [\"one\", \"two\"]", "kind = \"resistance\"\ncoils = [\"two\"]");
-    let content = "kind = \"multipole_content\"\nregion = \"circel\"\nharmonics = [\"b3\"]";
-    let kind = "kind = \"coupling\"\ncoils = [\"one\", \"two\"]";
-    refused(&[(kind, content)], &["no expansion of [[multipoles]] `circel`", "`circle`"]);
-    let content = "kind = \"multipole_content\"\nregion = \"circle\"\nharmonics = [\"b9\"]";
-    refused(&[(kind, content)], &["`b9` is no term", "a term from b1 to a4"]);
-    refused(
-        &[resistance, ("frequency = \"200 Hz\"", "frequency = 0"), ("phase = \"30 deg\"\n", "")],
-        &["a frequency above 0 Hz"],
-    );
-}

@@ -55,20 +55,6 @@ fn an_earlier_run_stays_until_it_is_replaced_by_force() {
 }
 
 #[test]
-fn a_foreign_directory_is_refused_even_by_force() {
-    let home = folder();
-    let thesis = home.path().join("thesis.txt");
-    fs::write(&thesis, "years of work").expect("written");
-    for further in [&[][..], &["--force"]] {
-        on_quick("run", home.path(), further).with(
-            5,
-            &["is not empty and holds no run of fluxmorph", "--out", home.path().to_str().expect("UTF-8")],
-        );
-        assert_eq!(files_below(home.path()), ["thesis.txt"]);
-    }
-}
-
-#[test]
 fn an_output_that_cannot_be_written_is_named() {
     let home = folder();
     let file = home.path().join("file");

@@ -24,15 +24,3 @@ fn a_run_reports_its_ratio_on_a_fresh_mesh() {
     assert!(count(&result, "/objective/verification/tets") > count(&result, "/mesh/tets"));
     assert!(number(&result, "/timings_s/verification") > 0.0);
 }
-
-#[test]
-fn the_check_can_be_left_out_and_a_refinement_of_no_use_is_refused() {
-    let home = folder();
-    let out = home.path().join("out");
-    on_quick("run", &out, &["--max-evaluations", "3", "--set", "output.verify_refinement=0"]).exits_with(1);
-    let result = read_json(&out.join("result.json"));
-    assert!(result["objective"]["verified_ratio"].is_null());
-    assert!(result["objective"].get("verification").is_none());
-    on_quick("run", &out, &["--force", "--set", "output.verify_refinement=0.1"])
-        .with(3, &["output.verify_refinement", "0 for no check", "at least 1 and at most 4"]);
-}

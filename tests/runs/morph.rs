@@ -1,4 +1,4 @@
-//! `fluxmorph morph`: one motion, sweeps, laws, the tuner, and what it refuses.
+//! `fluxmorph morph`: one motion, sweeps, laws, and the tuner.
 
 use std::path::Path;
 
@@ -205,39 +205,6 @@ fn the_tuner_softens_the_region_away_from_the_motion() {
     let [inner, outer] = [0, 1].map(|k| number(&found, &format!("/tuned/regions/{k}/young/1")));
     assert!(outer < inner, "{inner} {outer}");
     assert_eq!(found["tuned"]["policies"].as_array().map(Vec::len), Some(4));
-}
-
-#[test]
-fn what_cannot_be_moved_is_a_fault_at_its_key() {
-    let home = folder();
-    let refused = |text: &str, fragments: &[&str]| {
-        morph(home.path(), text, &[]).with(3, fragments);
-    };
-    let nodes = "nodes = [[\"20 mm\", \"20 mm\", \"40 mm\"]]";
-    let cases: [(&str, &str, &[&str]); 3] = [
-        (
-            "nodes = [[\"21 mm\", \"20 mm\", \"40 mm\"]]",
-            "there is no node at (21.000, 20.000, 40.000) mm",
-            &["the nearest is at (20.000, 20.000, 40.000) mm"],
-        ),
-        ("surface = \"top\"", "there is no surface `top`", &["z_max"]),
-        ("box = [[1, 1, 1], [2, 2, 2]]", "`morph.motion[0].box` holds no node of the mesh", &[]),
-    ];
-    for (moved, says, advice) in cases {
-        refused(&BLOCK.replace(nodes, moved), &[&[says], advice].concat());
-    }
-    let start = |end: &str| BLOCK.split(end).next().expect("a beginning").to_owned();
-    let without = start("[[morph") + "[analysis]\nfrequency = 0\n";
-    refused(&without, &["missing table `morph`", "[[morph.motion]]"]);
-    refused(&(start("nodes") + "design = \"upper\"\n"), &["there is no [design]"]);
-    let field = format!("{BLOCK}[[coils]]\nname = \"coil\"\n");
-    refused(&field, &["missing key `analysis`", "as there is `coils`"]);
-    // A name that only a case gives wrong is shown at the line of the case.
-    let case = format!("{BLOCK}[[morph.case]]\nname = \"a\"\nremesh.free = [\"lid\"]\n");
-    refused(&case, &["there is no surface `lid`", "block.toml:15"]);
-    assert!(!home.path().join("out").exists(), "nothing is written before all is known");
-    morph(home.path(), &format!("{case}[morph.tune]\nevaluations = 0\n"), &["--tune"])
-        .with(3, &["out of range"]);
 }
 
 #[test]

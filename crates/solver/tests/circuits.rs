@@ -5,9 +5,7 @@ use std::f64::consts::PI;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::{
-    BlockParameters, OpenShellParameters, ShieldParameters, block, open_shell, shield,
-};
+use fluxmorph_geometry::generate::{BlockParameters, OpenShellParameters, block, open_shell};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::circuit::terminals;
 use fluxmorph_solver::coil::{Coil, Corner, Frame, Racetrack};
@@ -15,14 +13,10 @@ use fluxmorph_solver::functional::{Follow, MirrorPlane, Multipoles};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{
-    Boundary, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding,
-    adjoint,
+    ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding, adjoint,
 };
 
-use super::{OUTSIDE, flux_parallel};
-
-const NO_CIRCUIT: Winding =
-    Winding { turns: 1.0, resistance: 0.0, series_inductance: 0.0, series_capacitance: None, voltage: None };
+use super::{NO_CIRCUIT, coarse_shield, flux_parallel, over_a_plate};
 
 /// Complete elliptic integrals `K(m)` and `E(m)` by the arithmetic-geometric mean (Abramowitz and Stegun, 17.6).
 fn elliptic(m: f64) -> (f64, f64) {
@@ -254,51 +248,27 @@ fn spherical_harmonics_between_two_coils_are_those_of_their_filaments() {
     }
 }
 
-fn over_a_plate(mesh: &Mesh, winding: Winding, ampere_turns: f64) -> FieldModel {
+fn wound_over_a_plate(mesh: &Mesh, winding: Winding, ampere_turns: f64) -> FieldModel {
     let plate = Material { relative_permeability: 1.0, conductivity: 3e7 };
-    let racetrack =
-        Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a coil");
-    let names = mesh.topology().region_names();
-    let setup = FieldModelSetup {
-        frequency: 60.0,
-        family: ElementFamily::Edge,
-        order: Order::Linear,
-        materials: names.iter().map(|n| if n == "plate" { plate } else { Material::AIR }).collect(),
-        coils: vec![Coil {
-            name: "coil".to_owned(),
-            ampere_turns: ampere_turns.into(),
-            shape: racetrack.into(),
-        }],
-        windings: vec![Some(winding)],
-        boundaries: OUTSIDE.map(|name| (name.to_owned(), Boundary::FluxParallel)).to_vec(),
-        ..FieldModelSetup::default()
-    };
+    let order = Order::Linear;
+    let windings = vec![Some(winding)];
+    let setup = FieldModelSetup { order, windings, ..over_a_plate(mesh, plate, ampere_turns, 60.0) };
     FieldModel::new(mesh, setup).expect("a sound problem")
-}
-
-fn coarse() -> Mesh {
-    let parameters = ShieldParameters {
-        refinement: 0.3,
-        skin: vec![1e-3],
-        side_skin: Vec::new(),
-        ..ShieldParameters::default()
-    };
-    shield(&parameters).expect("a coarse shield")
 }
 
 /// The voltage that a current needs over a conducting plate drives that current, its field and its losses, to 1e-9; the power
 /// that goes in is what is lost.
 #[test]
 fn a_voltage_drives_the_current_that_needs_it() {
-    let mesh = coarse();
+    let mesh = coarse_shield();
     let winding = Winding { turns: 50.0, resistance: 0.02, ..NO_CIRCUIT };
-    let given = over_a_plate(&mesh, winding, 1000.0);
+    let given = wound_over_a_plate(&mesh, winding, 1000.0);
     let (state, _) = given.solve(&mesh).expect("it is solved");
     let by_current = terminals(&given, &mesh, &state).expect("solved").coils[0].clone();
     let series = Winding { series_inductance: 3e-5, series_capacitance: Some(0.1), ..winding };
     let omega = given.angular_frequency();
     let source = by_current.voltage + (series.impedance(omega) - winding.resistance) * by_current.current;
-    let driven = over_a_plate(&mesh, Winding { voltage: Some(source), ..series }, 0.0);
+    let driven = wound_over_a_plate(&mesh, Winding { voltage: Some(source), ..series }, 0.0);
     let (by_voltage_state, _) = driven.solve(&mesh).expect("it is solved");
     let by_voltage = terminals(&driven, &mesh, &by_voltage_state).expect("solved").coils[0].clone();
     for (a, b) in [
@@ -326,9 +296,9 @@ fn a_voltage_drives_the_current_that_needs_it() {
 /// The loss at a fixed voltage: the current follows the shape, and the gradient knows.
 #[test]
 fn the_gradient_at_a_fixed_voltage_matches_central_differences() {
-    let mesh = coarse();
+    let mesh = coarse_shield();
     let winding = Winding { turns: 50.0, resistance: 0.02, voltage: Some(c64::new(3.0, 1.0)), ..NO_CIRCUIT };
-    let model = over_a_plate(&mesh, winding, 0.0);
+    let model = wound_over_a_plate(&mesh, winding, 0.0);
     let region = mesh.topology().region("plate").expect("the plate");
     let mut moving: Vec<_> = mesh
         .topology()

@@ -4,24 +4,11 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
-use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
-use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{FieldModel, FieldModelSetup, Material, Order};
 
-use super::{OUTSIDE, flux_parallel};
-
-const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
-
-fn coarse() -> Mesh {
-    let parameters = ShieldParameters {
-        refinement: 0.3,
-        skin: vec![1e-3],
-        side_skin: Vec::new(),
-        ..ShieldParameters::default()
-    };
-    shield(&parameters).expect("a coarse shield")
-}
+use super::{OUTSIDE, STEEL, coarse_shield, flux_parallel, lines, over_a_plate, painted};
 
 /// The same mesh with its nodes numbered in another order: another tree, and every edge the other way round.
 fn renumbered(mesh: &Mesh) -> Mesh {
@@ -49,19 +36,7 @@ fn gcd(a: usize, b: usize) -> usize {
 }
 
 fn model(mesh: &Mesh, order: Order, frequency: f64) -> FieldModel {
-    let names = mesh.topology().region_names();
-    let racetrack =
-        Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a coil");
-    let coil = Coil { name: "coil".to_owned(), ampere_turns: 40e3.into(), shape: racetrack.into() };
-    let setup = FieldModelSetup {
-        frequency,
-        family: ElementFamily::Edge,
-        order,
-        materials: names.iter().map(|n| if n == "plate" { STEEL } else { Material::AIR }).collect(),
-        coils: vec![coil],
-        boundaries: OUTSIDE.map(|name| (name.to_owned(), Boundary::FluxParallel)).to_vec(),
-        ..FieldModelSetup::default()
-    };
+    let setup = FieldModelSetup { order, ..over_a_plate(mesh, STEEL, 40e3, frequency) };
     FieldModel::new(mesh, setup).expect("a sound problem")
 }
 
@@ -76,7 +51,7 @@ fn largest_deviation(one: &[[c64; 3]], two: &[[c64; 3]]) -> f64 {
 /// `B` in every element and the losses are those of another tree; to 1e-9 of the largest.
 #[test]
 fn the_tree_changes_no_field() {
-    let mesh = coarse();
+    let mesh = coarse_shield();
     let other = renumbered(&mesh);
     for order in [Order::Linear, Order::Quadratic] {
         for frequency in [0.0, 60.0] {
@@ -110,18 +85,12 @@ fn beside_a_tunnel(mesh: &Mesh, order: Order, walls: &[&str]) -> FieldModel {
 /// that are apart count as one vertex each. Otherwise the matrix is singular, and what is solved depends on rounding.
 #[test]
 fn a_tunnel_and_walls_that_are_apart_leave_one_field() {
-    let line = |n: i32| (0..=n).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(4), line(3), line(2)]).expect("a grid");
-    let cell = |x: [f64; 3]| [(x[0] * 100.0) as usize, (x[1] * 100.0) as usize];
-    let region = |x| {
-        RegionId(match cell(x) {
-            [1, 1] => 2,
-            [2, 1] => 1,
-            _ => 0,
-        })
+    let region = |x: Point| match [(x[0] * 100.0) as usize, (x[1] * 100.0) as usize] {
+        [1, 1] => 2,
+        [2, 1] => 1,
+        _ => 0,
     };
-    let topology = grid.topology(&["air", "magnet", "hole"], region).expect("three regions");
-    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let mesh = painted([4, 3, 2].map(|n| lines(n, 0.01)), &["air", "magnet", "hole"], region);
     let (mesh, _) = mesh.without_region(RegionId(2)).expect("what is left");
     let other = renumbered(&mesh);
     for (walls, tunnels) in [(&[][..], 1), (&["x_min", "x_max"], 1), (&["z_min", "z_max"], 0)] {
@@ -152,7 +121,7 @@ fn a_tunnel_and_walls_that_are_apart_leave_one_field() {
 /// Outside conductors there are as many unknowns as edges off a spanning tree; gradients are in conductors alone.
 #[test]
 fn unknowns_are_what_the_gauge_leaves() {
-    let mesh = coarse();
+    let mesh = coarse_shield();
     let model = model(&mesh, Order::Linear, 0.0);
     let space = model.space();
     let on_faces = |n: NodeId| {

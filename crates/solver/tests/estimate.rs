@@ -4,51 +4,18 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::refine::{RefineLimits, uniform};
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::{
-    BhCurve, Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order,
-    SurfaceLaw,
+    BhCurve, Conductor, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, SurfaceLaw,
 };
 
-/// The square of 2 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil.
-fn square() -> Mesh {
-    let line = |n: i32, from: f64| (0..=n).map(|i| from + 0.1 * f64::from(i)).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(20, -1.0), line(20, -1.0), vec![0.0, 0.05, 0.1]]).expect("a grid");
-    let region = |x: [f64; 3]| match (x[0], x[1]) {
-        (x, y) if x > 0.0 && y < 0.0 => RegionId(1),
-        (x, y) if x < -0.4 && y < -0.4 => RegionId(2),
-        _ => RegionId(0),
-    };
-    let topology = grid.topology(&["air", "block", "far"], region).expect("three regions");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
-}
-
-fn setup((family, order): (ElementFamily, Order), frequency: f64) -> FieldModelSetup {
-    let shape = Racetrack::new([0.5, 0.5, 0.05], 2, [0.15; 2], 0.1, 0.4, Corner::Mitred).expect("a coil");
-    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
-        names.iter().map(|&name| (name.to_owned(), boundary)).collect()
-    };
-    let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
-    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
-    FieldModelSetup {
-        family,
-        order,
-        frequency,
-        materials: vec![Material::AIR; 3],
-        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1e3, 0.0), shape: shape.into() }],
-        boundaries,
-        ..FieldModelSetup::default()
-    }
-}
+use crate::{in_the_square, solved, square};
 
 /// The value of a functional, its estimated error, and what all elements add to that.
 fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f64; 3] {
-    let coarse = FieldModel::new(mesh, setup.clone()).expect("a sound problem");
-    let (state, _) = coarse.solve(mesh).expect("it converges");
+    let (coarse, state) = solved(mesh, setup.clone());
     let value = functional.evaluate(&coarse, mesh, &state).expect("a number").value;
     let fine = coarse.enriched(mesh, Effort::Any).expect("a sound problem");
     let mut enriched = Enrichment::new(&coarse, fine, (mesh, &state), None).expect("it converges");
@@ -64,9 +31,8 @@ fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f
     [value, error, weighed.by_element.iter().sum()]
 }
 
-fn solved(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
-    let model = FieldModel::new(mesh, setup.clone()).expect("a sound problem");
-    let (state, _) = model.solve(mesh).expect("it converges");
+fn value(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
+    let (model, state) = solved(mesh, setup.clone());
     functional.evaluate(&model, mesh, &state).expect("a number").value
 }
 
@@ -86,7 +52,7 @@ fn nodal_elements_at_a_singular_edge_have_no_estimate_and_say_so() {
     for frequency in [0.0, 50.0] {
         let setup = FieldModelSetup {
             conductors: vec![conductor.clone()],
-            ..setup((ElementFamily::Nodal, Order::Linear), frequency)
+            ..in_the_square((ElementFamily::Nodal, Order::Linear), frequency)
         };
         let model = FieldModel::new(&mesh, setup).expect("a sound problem");
         let error = model.enriched(&mesh, Effort::Any).expect_err("no estimate").to_string();
@@ -107,7 +73,7 @@ fn the_error_of_saturated_iron_is_estimated() {
     // Below the knee, across it, and beyond.
     for ampere_turns in [30.0, 1e3, 3e4] {
         let of = |order| {
-            let mut setup = setup((ElementFamily::Edge, order), 0.0);
+            let mut setup = in_the_square((ElementFamily::Edge, order), 0.0);
             setup.coils[0].ampere_turns = c64::new(ampere_turns, 0.0);
             setup.materials[1] = iron;
             FieldModelSetup { bh: vec![None, Some(Arc::clone(&law))], ..setup }
@@ -115,7 +81,7 @@ fn the_error_of_saturated_iron_is_estimated() {
         let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
         let energy = Functional::energy(&model, None).expect("a functional");
         let found = estimate(&mesh, &of(Order::Linear), &energy);
-        let difference = solved(&mesh, &of(Order::Quadratic), &energy) - found[0];
+        let difference = value(&mesh, &of(Order::Quadratic), &energy) - found[0];
         println!("F {:.5e}, estimated {:.5e}, second order has {difference:.5e} more", found[0], found[1]);
         // The definition: what is left of the residual is weighed.
         assert!((found[1] - difference).abs() < 0.02 * difference.abs(), "{} {difference}", found[1]);
@@ -140,20 +106,20 @@ fn around_iron(frequency: f64, conductivity: f64) {
     let iron = Material { relative_permeability: 20.0, conductivity };
     let of = |family, order| FieldModelSetup {
         materials: vec![Material::AIR, iron, Material::AIR],
-        ..setup((family, order), frequency)
+        ..in_the_square((family, order), frequency)
     };
     // The field is one, whatever the elements.
     let best = of(ElementFamily::Edge, Order::Quadratic);
     let on_fine = FieldModel::new(fine.mesh(), best.clone()).expect("a sound problem");
     let energy = Functional::energy(&on_fine, None).expect("a functional");
-    let reference = solved(fine.mesh(), &best, &energy);
+    let reference = value(fine.mesh(), &best, &energy);
     for family in [ElementFamily::Edge, ElementFamily::Nodal] {
         let of = |order| of(family, order);
         let model = FieldModel::new(&mesh, of(Order::Linear)).expect("a sound problem");
         let energy = Functional::energy(&model, None).expect("a functional");
         let found = estimate(&mesh, &of(Order::Linear), &energy);
         // The definition: second order on the same mesh, whatever that is worth.
-        let second = solved(&mesh, &of(Order::Quadratic), &energy);
+        let second = value(&mesh, &of(Order::Quadratic), &energy);
         let difference = second - found[0];
         assert!((found[1] - difference).abs() < 0.02 * difference.abs(), "{} {difference}", found[1]);
         assert_effective(&format!("{family:?}, {frequency} Hz"), found, reference);
@@ -163,7 +129,7 @@ fn around_iron(frequency: f64, conductivity: f64) {
 #[test]
 fn second_order_has_no_estimate_and_says_so() {
     let mesh = square();
-    let setup = setup((ElementFamily::Edge, Order::Quadratic), 0.0);
+    let setup = in_the_square((ElementFamily::Edge, Order::Quadratic), 0.0);
     let model = FieldModel::new(&mesh, setup).expect("a sound problem");
     let error = model.enriched(&mesh, Effort::Any).expect_err("there is no third order");
     assert!(error.to_string().contains("first order"), "{error}");

@@ -1,8 +1,5 @@
 //! ψ of several conductors: one grounded node for each that no plane fixes.
 
-use std::sync::Arc;
-
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::unknowns::PSI;
@@ -10,18 +7,16 @@ use fluxmorph_solver::{
     Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, SolverError, SurfaceLaw,
 };
 
+use crate::{STEEL, lines, painted};
+
 const COPPER: Material = Material { relative_permeability: 1.0, conductivity: 6e7 };
-const STEEL: Material = Material { relative_permeability: 800.0, conductivity: 7e6 };
 
 /// Seven layers along x, the region of each by `paint`; `regions` materials in order.
 fn model(paint: [u32; 7], materials: Vec<Material>, boundaries: &[(&str, Boundary)]) -> FieldModel {
-    let line = |n: usize| (0..=n).map(|i| 0.01 * i as f64).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(7), line(2), line(2)]).expect("a grid");
     let names = ["air", "one", "two", "three"];
-    let topology = grid
-        .topology(&names[..materials.len()], |x| RegionId(paint[(100.0 * x[0]) as usize]))
-        .expect("a topology");
-    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let mesh = painted([7, 2, 2].map(|n| lines(n, 0.01)), &names[..materials.len()], |x| {
+        paint[(100.0 * x[0]) as usize]
+    });
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,
         frequency: 50.0,
@@ -39,15 +34,10 @@ fn grounded(model: &FieldModel) -> usize {
 }
 
 #[test]
-fn conductors_apart_are_grounded_each() {
-    let model = model([0, 1, 0, 2, 0, 3, 0], vec![Material::AIR, COPPER, STEEL, COPPER], &[]);
-    assert_eq!(grounded(&model), 3);
-}
-
-#[test]
-fn two_parts_of_one_region_are_grounded_each() {
-    let model = model([0, 1, 0, 0, 1, 1, 0], vec![Material::AIR, COPPER], &[]);
-    assert_eq!(grounded(&model), 2);
+fn conductors_apart_and_parts_of_one_region_are_grounded_each() {
+    let apart = model([0, 1, 0, 2, 0, 3, 0], vec![Material::AIR, COPPER, STEEL, COPPER], &[]);
+    let parts = model([0, 1, 0, 0, 1, 1, 0], vec![Material::AIR, COPPER], &[]);
+    assert_eq!([grounded(&apart), grounded(&parts)], [3, 2]);
 }
 
 #[test]
@@ -75,11 +65,9 @@ fn around_a_hole(
     faces: impl Fn(&Mesh, Vec<[NodeId; 3]>) -> Vec<[NodeId; 3]>,
     boundary: Option<Boundary>,
 ) -> Result<FieldModel, SolverError> {
-    let line = || (0..=3).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(), line(), line()])?;
-    let hole = |x: [f64; 3]| x.iter().all(|c| (0.01..0.02).contains(c));
-    let topology = grid.topology(&["air", "hole"], |x| RegionId(u32::from(hole(x))))?;
-    let (mesh, exposed) = Mesh::new(Arc::new(topology), grid.points())?.without_region(RegionId(1))?;
+    let hole = |x: [f64; 3]| u32::from(x.iter().all(|c| (0.01..0.02).contains(c)));
+    let whole = painted([3; 3].map(|n| lines(n, 0.01)), &["air", "hole"], hole);
+    let (mesh, exposed) = whole.without_region(RegionId(1))?;
     let surface = faces(&mesh, exposed);
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,

@@ -8,50 +8,20 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, RegionId};
-use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{
-    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SurfaceLaw,
-};
+use fluxmorph_solver::{Boundary, Conductor, ElementFamily, FieldModelSetup, Material, Order, SurfaceLaw};
+
+use crate::{ALL, in_the_square, solved, square};
 
 /// `∫T dS` of the coil [A m]: 1 kA over 0.4 m, half window 0.15 m, winding 0.1 m wide.
 const MOMENT: f64 = 2500.0 * 0.163_333_333_333_333_33;
 
-/// The square of 2 m with a block in the quarter x > 0, y < 0.
-fn square() -> Mesh {
-    let line = |n: i32, from: f64| (0..=n).map(|i| from + 0.1 * f64::from(i)).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(20, -1.0), line(20, -1.0), vec![0.0, 0.05, 0.1]]).expect("a grid");
-    let topology = grid
-        .topology(&["air", "block"], |x| RegionId(u32::from(x[0] > 0.0 && x[1] < 0.0)))
-        .expect("two regions");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
-}
-
 /// The square without the block, and the faces that the block left.
 fn square_without_a_quarter() -> (Mesh, Vec<[fluxmorph_geometry::NodeId; 3]>) {
     square().without_region(RegionId(1)).expect("what is left")
-}
-
-fn setup(order: Order, frequency: f64) -> FieldModelSetup {
-    let shape = Racetrack::new([0.5, 0.5, 0.05], 2, [0.15; 2], 0.1, 0.4, Corner::Mitred).expect("a coil");
-    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
-        names.iter().map(|&name| (name.to_owned(), boundary)).collect()
-    };
-    let mut boundaries = of(&["x_min", "x_max", "y_min", "y_max"], Boundary::FluxParallel);
-    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
-    FieldModelSetup {
-        family: ElementFamily::Nodal,
-        frequency,
-        order,
-        materials: vec![Material::AIR; 2],
-        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1e3, 0.0), shape: shape.into() }],
-        boundaries,
-        ..FieldModelSetup::default()
-    }
 }
 
 fn block(surface: &[[fluxmorph_geometry::NodeId; 3]], law: SurfaceLaw) -> Conductor {
@@ -73,16 +43,9 @@ fn tolerance(family: ElementFamily, order: Order) -> f64 {
     }
 }
 
-/// The four combinations of family and order.
-fn elements() -> impl Iterator<Item = (ElementFamily, Order)> {
-    let orders = [Order::Linear, Order::Quadratic];
-    [ElementFamily::Nodal, ElementFamily::Edge].into_iter().flat_map(move |f| orders.map(|order| (f, order)))
-}
-
 /// The largest error of `B` in the arm x < −0.4 m, y < −0.4 m, of the exact field there.
 fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
-    let model = FieldModel::new(mesh, setup).expect("a sound problem");
-    let (solution, _) = model.solve(mesh).expect("it converges");
+    let (model, solution) = solved(mesh, setup);
     let centre = |e| {
         let vertices = mesh.vertices(e);
         [0, 1].map(|d| vertices.iter().map(|x| x[d]).sum::<f64>() / 4.0)
@@ -96,12 +59,21 @@ fn error(mesh: &Mesh, setup: FieldModelSetup, exact: c64) -> f64 {
     errors.fold(0.0, f64::max)
 }
 
+/// The field is the exact one behind surfaces with `Zs/(jω)` [H] along so many metres.
+#[track_caller]
+fn assert_exact(mesh: &Mesh, setup: FieldModelSetup, reactance: c64, perimeter: f64) {
+    let tolerance = tolerance(setup.family, setup.order);
+    let case = format!("{:?}, {:?}, {} Hz", setup.family, setup.order, setup.frequency);
+    let error = error(mesh, setup, far_field(reactance, perimeter));
+    println!("{case}: {error:.2e}");
+    assert!(error < tolerance, "{case}: {error:.2e}");
+}
+
 #[test]
 fn the_field_goes_around_the_edge_of_an_impedance_surface() {
     let (mesh, surface) = square_without_a_quarter();
     let frequency = 25.330_295_91;
-    for (skin_depth, (family, order)) in
-        [0.1, 0.01, 1e-5].into_iter().flat_map(|d| elements().map(move |e| (d, e)))
+    for (skin_depth, (family, order)) in [0.1, 0.01, 1e-5].into_iter().flat_map(|d| ALL.map(move |e| (d, e)))
     {
         let tolerance = match (family, order) {
             // What nodal elements make of a field that must not cross any triangle.
@@ -112,11 +84,8 @@ fn the_field_goes_around_the_edge_of_an_impedance_surface() {
         let conductivity =
             2.0 / (2.0 * std::f64::consts::PI * frequency * VACUUM_PERMEABILITY * skin_depth * skin_depth);
         let material = Material { relative_permeability: 1.0, conductivity };
-        let setup = FieldModelSetup {
-            family,
-            conductors: vec![block(&surface, SurfaceLaw::Impedance(material))],
-            ..setup(order, frequency)
-        };
+        let conductors = vec![block(&surface, SurfaceLaw::Impedance(material))];
+        let setup = FieldModelSetup { conductors, ..in_the_square((family, order), frequency) };
         // Zs/(jω) = μ δ (1 − j)/2.
         let reactance = 0.5 * VACUUM_PERMEABILITY * skin_depth * c64::new(1.0, -1.0);
         let error = error(&mesh, setup, far_field(reactance, 2.0));
@@ -128,20 +97,10 @@ fn the_field_goes_around_the_edge_of_an_impedance_surface() {
 #[test]
 fn the_field_goes_around_a_perfect_conductor() {
     let (mesh, surface) = square_without_a_quarter();
-    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
-        for order in [Order::Linear, Order::Quadratic] {
-            for frequency in [0.0, 50.0] {
-                let setup = FieldModelSetup {
-                    family,
-                    conductors: vec![block(&surface, SurfaceLaw::Perfect)],
-                    ..setup(order, frequency)
-                };
-                let error = error(&mesh, setup, far_field(c64::default(), 0.0));
-                let case = format!("{family:?}, {order:?}, {frequency} Hz: {error:.2e}");
-                println!("{case}");
-                assert!(error < tolerance(family, order), "{case}");
-            }
-        }
+    for (elements, frequency) in ALL.into_iter().flat_map(|e| [0.0, 50.0].map(|f| (e, f))) {
+        let conductors = vec![block(&surface, SurfaceLaw::Perfect)];
+        let setup = FieldModelSetup { conductors, ..in_the_square(elements, frequency) };
+        assert_exact(&mesh, setup, c64::default(), 0.0);
     }
 }
 
@@ -159,10 +118,9 @@ fn the_weak_field_beside_iron_needs_quadratic_or_edge_elements() {
         (ElementFamily::Nodal, Order::Quadratic, 0.01, 0.05),
         (ElementFamily::Edge, Order::Linear, 1.0, 1e-9),
     ] {
-        let mut setup = FieldModelSetup { family, penalty, ..setup(order, 0.0) };
-        setup.materials = vec![Material::AIR, iron];
-        let model = FieldModel::new(&mesh, setup).expect("a sound problem");
-        let (solution, _) = model.solve(&mesh).expect("it converges");
+        let materials = vec![Material::AIR, iron, Material::AIR];
+        let setup = FieldModelSetup { penalty, materials, ..in_the_square((family, order), 0.0) };
+        let (model, solution) = solved(&mesh, setup);
         let b = probe(&solution, &model, &mesh, "far", &[[-0.6, -0.6, 0.05]]).expect("a point of the mesh");
         let error = (b[0][2] / exact - 1.0).norm();
         println!("{family:?}, {order:?}, penalty {penalty}: {error:.2e}");
@@ -176,15 +134,10 @@ fn the_field_goes_around_the_edge_of_a_wall() {
     let (mesh, surface) = square_without_a_quarter();
     let topology = (**mesh.topology()).clone().with_surface("wall", surface).expect("faces of the mesh");
     let mesh = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("the same mesh");
-    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
-        for order in [Order::Linear, Order::Quadratic] {
-            let mut setup = FieldModelSetup { family, ..setup(order, 0.0) };
-            setup.boundaries.push(("wall".to_owned(), Boundary::FluxParallel));
-            let error = error(&mesh, setup, far_field(c64::default(), 0.0));
-            let case = format!("{family:?}, {order:?}: {error:.2e}");
-            println!("{case}");
-            assert!(error < tolerance(family, order), "{case}");
-        }
+    for elements in ALL {
+        let mut setup = in_the_square(elements, 0.0);
+        setup.boundaries.push(("wall".to_owned(), Boundary::FluxParallel));
+        assert_exact(&mesh, setup, c64::default(), 0.0);
     }
 }
 
@@ -202,19 +155,10 @@ fn a_cavity_in_an_impedance_has_one_field() {
     let surface: Vec<_> = outer.filter(|&nodes| !planes.contains(&face_key(nodes))).collect();
     let material = Material { relative_permeability: 1.0, conductivity: 1e8 };
     let frequency = 25.330_295_91;
-    for family in [ElementFamily::Nodal, ElementFamily::Edge] {
-        for order in [Order::Linear, Order::Quadratic] {
-            let mut setup = FieldModelSetup {
-                family,
-                conductors: vec![block(&surface, SurfaceLaw::Impedance(material))],
-                ..setup(order, frequency)
-            };
-            setup.boundaries.retain(|(_, boundary)| *boundary == Boundary::FluxNormal);
-            let reactance = 0.5 * VACUUM_PERMEABILITY * 0.01 * c64::new(1.0, -1.0);
-            let error = error(&mesh, setup, far_field(reactance, 8.0));
-            let case = format!("{family:?}, {order:?}: {error:.2e}");
-            println!("{case}");
-            assert!(error < tolerance(family, order), "{case}");
-        }
+    for elements in ALL {
+        let conductors = vec![block(&surface, SurfaceLaw::Impedance(material))];
+        let mut setup = FieldModelSetup { conductors, ..in_the_square(elements, frequency) };
+        setup.boundaries.retain(|(_, boundary)| *boundary == Boundary::FluxNormal);
+        assert_exact(&mesh, setup, 0.5 * VACUUM_PERMEABILITY * 0.01 * c64::new(1.0, -1.0), 8.0);
     }
 }

@@ -3,38 +3,28 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
+use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::functional::{Follow, Observed, Weighting};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, SolverEvent};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::newton::NewtonProgress;
 use fluxmorph_solver::{
     BhCurve, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, RigidMotion,
-    SolverError, adjoint,
+    SolverError, Winding, adjoint,
 };
 
-use crate::{OUTSIDE, flux_parallel};
-
-const ALL: [(ElementFamily, Order); 4] = [
-    (ElementFamily::Nodal, Order::Linear),
-    (ElementFamily::Nodal, Order::Quadratic),
-    (ElementFamily::Edge, Order::Linear),
-    (ElementFamily::Edge, Order::Quadratic),
-];
+use crate::{ALL, NO_CIRCUIT, OUTSIDE, flux_parallel, lines, painted};
 
 /// An iron block under a coil, with cells of air that are observed; some hundred nodes.
 fn mesh() -> Mesh {
-    let line = |n: usize, h: f64| (0..=n).map(|i| h * i as f64).collect::<Vec<_>>();
-    let grid = Grid::new("grid", [line(5, 0.012), line(5, 0.012), line(7, 0.01)]).expect("a grid");
     let region = |x: Point| {
         let iron = (0.02..0.04).contains(&x[2]) && x[0] > 0.012 && x[1] > 0.012 && x[0] < 0.048;
-        RegionId(u32::from(iron) + 2 * u32::from(x[2] < 0.01 && x[0] < 0.03))
+        u32::from(iron) + 2 * u32::from(x[2] < 0.01 && x[0] < 0.03)
     };
-    let topology = grid.topology(&["air", "iron", "observed"], region).expect("a topology");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+    painted([lines(5, 0.012), lines(5, 0.012), lines(7, 0.01)], &["air", "iron", "observed"], region)
 }
 
 /// A law that saturates at 1.8 T with an initial permeability of 2000, in steps of a tenth of its field strength.
@@ -65,6 +55,13 @@ fn setup((family, order): (ElementFamily, Order), iron: Material, bh: Option<BhC
 /// The material of the linear part: any one will do.
 const SOFT: Material = Material { relative_permeability: 2000.0, conductivity: 0.0 };
 
+/// The largest difference of two fields, one times a factor, of the largest of the first.
+fn off(field: &[Complex3], factor: c64, other: &[Complex3]) -> f64 {
+    let largest = field.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
+    let off = field.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a * factor - b).norm());
+    off.fold(0.0, f64::max) / largest
+}
+
 #[test]
 fn a_straight_table_gives_the_field_of_the_linear_material() {
     let mesh = mesh();
@@ -75,16 +72,13 @@ fn a_straight_table_gives_the_field_of_the_linear_material() {
         // Of nodal elements with the same penalty, of edge elements with any linear part.
         let part = if elements.0 == ElementFamily::Nodal { steel } else { SOFT };
         let solved = |iron: Material, bh: Option<BhCurve>| {
-            let model = FieldModel::new(&mesh, setup(elements, iron, bh)).expect("a sound problem");
-            let (solution, _) = model.solve(&mesh).expect("it converges");
+            let (model, solution) = crate::solved(&mesh, setup(elements, iron, bh));
             (solution.flux_densities(&model, &mesh), solution.newton_steps())
         };
         let (linear, _) = solved(steel, None);
         let (newton, steps) = solved(part, Some(straight.clone()));
         assert!((1..=3).contains(&steps), "{steps}");
-        let largest = linear.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
-        let off = linear.iter().flatten().zip(newton.iter().flatten()).map(|(a, b)| (a - b).norm());
-        let worst = off.fold(0.0, f64::max) / largest;
+        let worst = off(&linear, 1.0.into(), &newton);
         assert!(worst < 1e-10, "{elements:?}: {worst:e}");
     }
 }
@@ -115,10 +109,8 @@ fn newton_converges_to_the_same_field_whatever_the_linear_part() {
         assert!(energies.windows(2).all(|pair| pair[1] <= pair[0] + 1e-9 * pair[0].abs()));
         if elements.0 == ElementFamily::Edge {
             let (other, _) = solved(50.0);
-            let largest = field.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
-            let worst = field.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm());
             // The residuals of two solutions to 1e-13, over the conditioning of the block.
-            assert!(worst.fold(0.0, f64::max) < 1e-9 * largest);
+            assert!(off(&field, 1.0.into(), &other) < 1e-9);
         }
     }
 }
@@ -245,13 +237,11 @@ fn a_straight_table_gives_the_phasor_of_the_linear_material() {
             let mut setup = FieldModelSetup { frequency: 50.0, ..setup(elements, iron, bh) };
             // Far below the end of the table, also where eddy currents crowd the field.
             setup.coils[0].ampere_turns *= 0.02;
-            let model = FieldModel::new(&mesh, setup).expect("a sound problem");
-            model.solve(&mesh).expect("it converges").0.flux_densities(&model, &mesh)
+            let (model, solution) = crate::solved(&mesh, setup);
+            solution.flux_densities(&model, &mesh)
         };
         let (linear, newton) = (solved(steel, None), solved(part, Some(straight.clone())));
-        let largest = linear.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
-        let off = linear.iter().flatten().zip(newton.iter().flatten()).map(|(a, b)| (a - b).norm());
-        let worst = off.fold(0.0, f64::max) / largest;
+        let worst = off(&linear, 1.0.into(), &newton);
         println!("{elements:?}: {worst:.1e}");
         assert!(worst < 1e-9, "{elements:?}: {worst:e}");
     }
@@ -276,9 +266,7 @@ fn the_phasor_of_iron_that_does_not_conduct_is_the_static_field_of_its_amplitude
         };
         let phase = c64::from_polar(1.0, 0.6);
         let (at_rest, phasor) = (solved(0.0, c64::from(1.0)), solved(50.0, phase));
-        let largest = at_rest.iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
-        let off = at_rest.iter().flatten().zip(phasor.iter().flatten()).map(|(a, b)| (a * phase - b).norm());
-        let worst = off.fold(0.0, f64::max) / largest;
+        let worst = off(&at_rest, phase, &phasor);
         assert!(worst < 1e-8, "{elements:?}: {worst:e}");
     }
 }
@@ -294,13 +282,7 @@ fn laws_are_refused_where_they_have_no_meaning() {
             other => panic!("{other:?}"),
         }
     };
-    let voltage = fluxmorph_solver::Winding {
-        turns: 10.0,
-        resistance: 1.0,
-        series_inductance: 0.0,
-        series_capacitance: None,
-        voltage: Some(c64::from(10.0)),
-    };
+    let voltage = Winding { turns: 10.0, resistance: 1.0, voltage: Some(c64::from(10.0)), ..NO_CIRCUIT };
     let driven = |setup: &mut FieldModelSetup| {
         (setup.frequency, setup.windings) = (50.0, vec![Some(voltage)]);
     };
@@ -311,17 +293,14 @@ fn laws_are_refused_where_they_have_no_meaning() {
 
 /// The iron under the coil, cut by a slit so narrow that its elements are nearly flat.
 fn slit_mesh(width: f64) -> Mesh {
-    let line = |n: usize, h: f64| (0..=n).map(|i| h * i as f64).collect::<Vec<_>>();
-    let mut z = line(7, 0.01);
+    let mut z = lines(7, 0.01);
     z.extend([0.03 + width, 0.03 + 2.0 * width]);
     z.sort_by(f64::total_cmp);
-    let grid = Grid::new("grid", [line(5, 0.012), line(5, 0.012), z]).expect("a grid");
     let region = |x: Point| {
         let iron = (0.02..0.04).contains(&x[2]) && !(0.03..0.03 + width).contains(&x[2]);
-        RegionId(u32::from(iron && x[0] > 0.012 && x[1] > 0.012 && x[0] < 0.048))
+        u32::from(iron && x[0] > 0.012 && x[1] > 0.012 && x[0] < 0.048)
     };
-    let topology = grid.topology(&["air", "iron"], region).expect("a topology");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+    painted([lines(5, 0.012), lines(5, 0.012), z], &["air", "iron"], region)
 }
 
 /// Its own solutions are as good as rounding lets them be: right sides that are rounding themselves have none to the last digit.
@@ -342,9 +321,7 @@ fn a_state_beside_nearly_flat_elements_is_found_whatever_the_linear_method() {
             println!("{elements:?} {method:?}: {:?}, {:?}", state.report(), system.events());
             state.flux_densities(&model, &mesh)
         });
-        let largest = fields[1].iter().flatten().map(|c| c.norm()).fold(0.0, f64::max);
-        let off = fields[0].iter().flatten().zip(fields[1].iter().flatten()).map(|(a, b)| (a - b).norm());
-        let worst = off.fold(0.0, f64::max) / largest;
+        let worst = off(&fields[1], 1.0.into(), &fields[0]);
         println!("{elements:?}: {worst:.1e}");
         assert!(worst < 1e-4, "{elements:?}: {worst:e}");
     }

@@ -4,32 +4,24 @@
 //! z_max are flux-normal. `H = (0, 0, c − J x)` in the layer and constant on both sides of it; with flux-parallel walls at x_min
 //! and x_max no flux passes the box, so that `c = 0` in a box that is symmetric to the sheet.
 
-use std::sync::Arc;
-
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Frame, Path, RegionCurrent, RegionFault};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError};
 
-use crate::{flux_parallel, terminal};
+use crate::{flux_parallel, painted, terminal};
 
 /// Ampere-turns of the sheet [A].
 const CURRENT: f64 = 1e3;
 /// Height of the box [m].
 const HEIGHT: f64 = 0.03;
 
-fn mesh_of(lines: [Vec<f64>; 3], is_winding: impl Fn([f64; 3]) -> bool) -> Mesh {
-    let grid = Grid::new("grid", lines).expect("a grid");
-    let topology =
-        grid.topology(&["air", "winding"], |x| RegionId(u32::from(is_winding(x)))).expect("two regions");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
-}
-
 fn sheet() -> Mesh {
     let x = vec![-0.06, -0.04, -0.02, -0.01, 0.0, 0.01, 0.02, 0.04, 0.06];
-    mesh_of([x, vec![0.0, 0.02, 0.04], vec![0.0, 0.015, HEIGHT]], |x| x[0].abs() < 0.02)
+    painted([x, vec![0.0, 0.02, 0.04], vec![0.0, 0.015, HEIGHT]], &["air", "winding"], |x| {
+        u32::from(x[0].abs() < 0.02)
+    })
 }
 
 fn winding(mesh: &Mesh, path: Path) -> RegionCurrent {
@@ -107,16 +99,14 @@ fn a_coil_region_round_a_tunnel_is_refused() {
     let line = || vec![-0.03, -0.02, -0.01, 0.01, 0.02, 0.03];
     let within = |half: f64, [x, y, _]: [f64; 3]| x.abs() < half && y.abs() < half;
     let axis = || Path::Closed(Frame::coordinate([0.0; 3], 2).expect("z"));
-    let whole = mesh_of([line(), line(), vec![0.0, 0.01]], |x| within(0.02, x) && !within(0.01, x));
     let free = |mesh: &Mesh| {
         model(mesh, (ElementFamily::Edge, Order::Linear), winding(mesh, axis()), Vec::new()).map(|_| ())
     };
-    assert!(free(&whole).is_ok());
-    let grid = Grid::new("grid", [line(), line(), vec![0.0, 0.01]]).expect("a grid");
-    let region = |x| RegionId(if within(0.01, x) { 2 } else { u32::from(within(0.02, x)) });
-    let topology = grid.topology(&["air", "winding", "hole"], region).expect("three regions");
-    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
-    let (left, _) = mesh.without_region(RegionId(2)).expect("what is left");
+    let ring = |x, inside| if within(0.01, x) { inside } else { u32::from(within(0.02, x)) };
+    let mesh =
+        |inside| painted([line(), line(), vec![0.0, 0.01]], &["air", "winding", "hole"], |x| ring(x, inside));
+    assert!(free(&mesh(0)).is_ok());
+    let (left, _) = mesh(2).without_region(RegionId(2)).expect("what is left");
     let error = free(&left).unwrap_err();
     assert!(matches!(error, SolverError::CoilRegion { fault: RegionFault::RoundTunnel, .. }), "{error}");
 }

@@ -1,11 +1,9 @@
 //! Coils in a field model: where they may meet the outside of the mesh, and two descriptions of one coil.
 
-use std::sync::Arc;
-
-use crate::{OUTSIDE, flux_parallel, terminal};
+use crate::{OUTSIDE, flux_parallel, painted, terminal};
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
-use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_solver::coil::{
     Coil, CoilShape, Condition, ConditionedSurface, Corner, Path, PlaneFault, Racetrack, RegionCurrent,
     SourceTerms, planes,
@@ -62,11 +60,9 @@ fn quarter_of_a_square_coil() -> Mesh {
         lines.extend((1..=4).map(|i| fine + (outer - fine) * f64::from(i * i) / 16.0));
         lines
     };
-    let grid = Grid::new("grid", [(); 3].map(|()| lines(0.06, 0.2))).expect("a grid");
     // Window 40 mm, width 20 mm, half height 10 mm.
-    let winding = |[x, y, z]: [f64; 3]| z < 0.01 && x.max(y) > 0.04 && x.max(y) < 0.06;
-    let topology = grid.topology(&["air", "winding"], |x| RegionId(u32::from(winding(x)))).expect("regions");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+    let winding = |[x, y, z]: [f64; 3]| u32::from(z < 0.01 && x.max(y) > 0.04 && x.max(y) < 0.06);
+    painted([(); 3].map(|()| lines(0.06, 0.2)), &["air", "winding"], winding)
 }
 
 fn solved(mesh: &Mesh, shape: CoilShape, ampere_turns: c64) -> Result<[c64; 3], SolverError> {

@@ -1,12 +1,10 @@
 //! The two-level preconditioner on skin-graded meshes of the shield: its iterations hardly grow, its bits do not depend on the threads.
 
-use crate::{OUTSIDE, flux_parallel, on_threads};
+use crate::{STEEL, on_threads, over_a_plate};
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
-use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
-use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Order};
 
 /// The shipped shield, coarser.
 fn mesh(refinement: f64) -> Mesh {
@@ -23,19 +21,11 @@ fn mesh(refinement: f64) -> Mesh {
 
 fn model(mesh: &Mesh, order: Order) -> FieldModel {
     let method = LinearSolver::Fixed(Method::TwoLevel);
-    let steel = Material { relative_permeability: 800.0, conductivity: 7e6 };
-    let names = mesh.topology().region_names();
-    let shape =
-        Racetrack::new([0.0, 0.0, 0.06], 2, [0.06, 0.16], 0.02, 0.04, Corner::Mitred).expect("a racetrack");
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,
-        frequency: 60.0,
         order,
         linear_solver: LinearSolverSettings { method, ..LinearSolverSettings::default() },
-        materials: names.iter().map(|name| if name == "plate" { steel } else { Material::AIR }).collect(),
-        coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(40e3, 0.0), shape: shape.into() }],
-        boundaries: flux_parallel(&OUTSIDE),
-        ..FieldModelSetup::default()
+        ..over_a_plate(mesh, STEEL, 40e3, 60.0)
     };
     FieldModel::new(mesh, setup).expect("a sound problem")
 }

@@ -1,4 +1,4 @@
-//! From the tables of sources to the field model, and what is refused on the way.
+//! From the tables of sources to the field model.
 
 use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph::config::Config;
@@ -26,10 +26,6 @@ fn prepared(text: &str) -> Result<Setup, String> {
     set_up(&config, &source, Mode::Analysis).map_err(|error| error.to_string())
 }
 
-fn refused(text: &str) -> String {
-    prepared(text).err().unwrap_or_else(|| panic!("accepted:\n{text}"))
-}
-
 #[test]
 fn a_coil_region_becomes_a_source_and_the_divergence_of_its_current_is_told_where_there_is_any() {
     let setup = prepared(BLOCK).unwrap_or_else(|error| panic!("{error}"));
@@ -42,40 +38,6 @@ fn a_coil_region_becomes_a_source_and_the_divergence_of_its_current_is_told_wher
     assert!(!told(&setup), "a straight bar: {:?}", setup.warnings);
     let round = crate::support::setup("inductor.toml", &["analysis.order=1"]);
     assert!(told(&round), "a ring of flat facets: {:?}", round.warnings);
-}
-
-#[test]
-fn a_name_that_the_mesh_does_not_have_is_answered_with_the_nearest() {
-    let error = refused(
-        &BLOCK.replace("\"block\"\namp", "\"blok\"\namp").replace("s = [\"y_min\"", "s = [\"y_mim\""),
-    );
-    assert!(
-        error.contains("there is no region `blok`") && error.contains("did you mean `block`?"),
-        "{error}"
-    );
-    assert!(
-        error.contains("there is no surface `y_mim`") && error.contains("did you mean `y_min`?"),
-        "{error}"
-    );
-}
-
-#[test]
-fn a_winding_that_conducts_is_refused_at_a_frequency_only() {
-    let conducting = format!(
-        "{BLOCK}[materials.copper]\nconductivity = \"58 MS/m\"\n[regions.block]\nmaterial = \"copper\"\n"
-    );
-    let error = refused(&conducting);
-    assert!(error.contains("`block` conducts") && error.contains("without conductivity"), "{error}");
-    assert!(prepared(&conducting.replace("50 Hz", "0 Hz")).is_ok());
-}
-
-#[test]
-fn a_path_that_the_region_does_not_have_is_refused_with_the_coils_name() {
-    let closed = BLOCK.replace("terminals = [\"y_min\", \"y_max\"]", "center = [\"1 m\", 0, 0]");
-    let error = refused(&closed);
-    assert!(error.contains("the coil `bar`") && error.contains("goes round the line"), "{error}");
-    let error = refused(&BLOCK.replace("flux_parallel = [\"y_min\", ", "flux_parallel = ["));
-    assert!(error.contains("its terminal `y_min`") && error.contains("boundaries.flux_parallel"), "{error}");
 }
 
 #[test]

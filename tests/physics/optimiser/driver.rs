@@ -88,20 +88,6 @@ fn a_quality_that_no_step_keeps_ends_at_the_mesh_limit() {
     assert_eq!(notes.0.iter().filter(|note| note.contains("the search goes on within")).count(), 3);
 }
 
-#[test]
-fn bounds_far_beyond_the_mesh_end_at_its_limit_by_the_linear_law_too() {
-    let (mut problem, settings) = quick(&["remesh.law=\"linear\""]);
-    let n = shape(&mut problem).surface().variable_count();
-    shape(&mut problem).set_bounds([vec![-9e-3; n], vec![35e-3; n]]);
-    let (optimised, rows) =
-        optimised(&mut problem, &Optimizer { max_evaluations: 40, ..settings }, &mut Silent);
-    let ratio = rows[optimised.best.evaluation].ratio;
-    println!("{:?} after {} rows, {ratio:.4}", optimised.stop_reason, rows.len());
-    check_rows(&optimised, &rows, 0.0);
-    assert!(rows.iter().all(|row| row.worst_quality > 0.0));
-    assert!(!optimised.stop_reason.is_converged() && ratio < 0.6, "{ratio}");
-}
-
 /// The mesh that moves ends 15 mm below a face that would move by 20 mm.
 const LID: &str = "mesh.shield.remesh_z=[\"-25 mm\", \"30 mm\"]";
 

@@ -1,4 +1,4 @@
-//! The optimiser on small cases of a configuration: driver, guards, geometric functionals, what a set-up refuses.
+//! The optimiser on small cases of a configuration: driver, guards, geometric functionals, sources and variables.
 #![allow(clippy::unwrap_used)]
 
 mod coils;

@@ -13,12 +13,7 @@ use super::exact::Prism;
 use super::problem::set_up;
 
 /// `d/ds ∫|B|²` [T² m²] over the observation, by the adjoint and the motion of every node.
-pub(super) fn square_derivative(
-    prism: &Prism,
-    mesh: &Mesh,
-    motion: &Motion,
-    discretisation: Discretisation,
-) -> f64 {
+fn square_derivative(prism: &Prism, mesh: &Mesh, motion: &Motion, discretisation: Discretisation) -> f64 {
     let (mesh, setup) = set_up(prism, mesh, 1.0);
     let model = FieldModel::new(&mesh, discretisation.of(setup)).expect("a sound problem");
     let (state, mut system) = model.solve(&mesh).expect("it converges");

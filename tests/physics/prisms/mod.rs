@@ -4,8 +4,8 @@
 //! `diffusion`. `cases` are prisms with sides along the axes, meshed in `boxed`; `unstructured` reads those of
 //! `fixtures/`, which Gmsh meshed. `problem` makes a problem of the program from any of them and measures its errors;
 //! `gradient` compares its derivatives with the exact ones. `discretisation` is the list of elements, with what each must
-//! get right; `known` asserts that, and has the numbers with which faults were first seen; `locking` compares what nodal
-//! elements lose in meshed conductors with what the audit expects. `convergence` fits orders; `iron_circuit` is a device
+//! get right; `known` asserts that; `locking` compares what nodal elements lose in meshed conductors with what the audit
+//! expects. `convergence` fits orders; `iron_circuit` is a device
 //! without closed form. All numbers, in some minutes:
 //!
 //! `cargo test --release --test physics -- --ignored --nocapture prisms::table`
@@ -25,7 +25,6 @@ mod known;
 mod locking;
 mod polygon;
 mod problem;
-mod refine;
 mod saturation;
 mod source;
 mod table;

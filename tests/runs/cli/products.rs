@@ -29,6 +29,8 @@ fn every_template_passes_check_and_does_its_work() {
             let result = read_json(&folder.path().join("runs/device/result.json"));
             let ratio = number(&result, "/objective/ratio");
             assert!(ratio < 1.0, "{template}: {ratio}");
+            let objective = result["objective"].as_object().expect("an objective");
+            assert!(objective["verified_ratio"].is_null() && !objective.contains_key("verification"));
         }
     }
 }

@@ -86,10 +86,11 @@ fn so_are_those_of_quadratic_elements() {
 
 #[test]
 fn so_are_those_of_edge_elements() {
-    for order in ["analysis.order=1", "analysis.order=2"] {
-        let mut overrides = MESHED.to_vec();
-        overrides.extend(["analysis.elements=\"edge\"", "mesh.shield.refinement=0.25", order]);
-        ranks_agree("shield.toml", &overrides, &[3]);
+    for (order, skin) in [("1", "[4e-4,1.2e-3,2.5e-3,5e-3]"), ("2", "[5e-3]")] {
+        let own = [format!("analysis.order={order}"), format!("mesh.shield.skin={skin}")];
+        let coarse = ["mesh.shield.refinement=0.25", "mesh.shield.growth=2.5", &own[0], &own[1]];
+        let method = ["analysis.elements=\"edge\"", "analysis.linear_solver.method=\"direct\""];
+        ranks_agree("shield.toml", &[&coarse[..], &method].concat(), &[3]);
     }
 }
 

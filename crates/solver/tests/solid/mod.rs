@@ -7,7 +7,6 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::circuit::{CoilTerminals, Terminals, terminals};
@@ -20,7 +19,7 @@ use fluxmorph_solver::{
     Winding, adjoint,
 };
 
-use super::{OUTSIDE, flux_parallel, terminal};
+use super::{ALL, NO_CIRCUIT, OUTSIDE, flux_parallel, painted, solved, terminal};
 
 /// Conductivity [S/m] of copper.
 const COPPER: f64 = 58e6;
@@ -50,8 +49,7 @@ fn impedance(found: &Terminals, omega: f64) -> c64 {
 
 /// A bar through a box, beside a plate and a coil of a region; cells of 5 mm, and so many in each.
 fn bar_in_a_box() -> Mesh {
-    let lines = |length: f64| std::iter::once(0.0).chain(parts(0.0, length, 6)).collect::<Vec<_>>();
-    let grid = Grid::new("box", [lines(30e-3), lines(30e-3), lines(30e-3)]).expect("ascending lines");
+    let line = || std::iter::once(0.0).chain(parts(0.0, 30e-3, 6)).collect::<Vec<_>>();
     let names = ["air", "bar", "plate", "winding"];
     let within = |[x, y]: [f64; 2], [low, high]: [[f64; 2]; 2]| {
         x > low[0] * 5e-3 && x < high[0] * 5e-3 && y > low[1] * 5e-3 && y < high[1] * 5e-3
@@ -67,12 +65,8 @@ fn bar_in_a_box() -> Mesh {
             0
         }
     };
-    let topology = grid.topology(&names, |x| RegionId(paint(x))).expect("regions");
-    Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+    painted([line(), line(), line()], &names, paint)
 }
-
-const NO_CIRCUIT: Winding =
-    Winding { turns: 1.0, resistance: 0.0, series_inductance: 0.0, series_capacitance: None, voltage: None };
 
 fn with_a_bar(
     mesh: &Mesh,
@@ -99,19 +93,12 @@ fn with_a_bar(
     FieldModel::new(mesh, setup).expect("a model")
 }
 
-const FAMILIES: [(ElementFamily, Order); 4] = [
-    (ElementFamily::Edge, Order::Linear),
-    (ElementFamily::Edge, Order::Quadratic),
-    (ElementFamily::Nodal, Order::Linear),
-    (ElementFamily::Nodal, Order::Quadratic),
-];
-
 /// The inductance matrix with a coil of strands is symmetric, the power that goes in at the terminals is lost, and the voltage that
 /// a current needs drives it, through what is in series.
 #[test]
 fn a_bar_is_a_coil_among_others() {
     let mesh = bar_in_a_box();
-    for elements in FAMILIES {
+    for elements in ALL {
         let given = with_a_bar(&mesh, elements, 300.0, (100.0, NO_CIRCUIT));
         let (state, _) = given.solve(&mesh).expect("a field");
         let found = terminals(&given, &mesh, &state).expect("terminals");
@@ -164,7 +151,7 @@ fn at_rest_a_bar_has_the_resistance_of_its_section() {
         let (state, _) = model.solve(&mesh).expect("a field");
         terminals(&model, &mesh, &state).expect("terminals")
     };
-    for elements in FAMILIES {
+    for elements in ALL {
         let [rest, slow] = [0.0, 0.1].map(|frequency| of(elements, frequency));
         for found in [&rest, &slow] {
             let current = found.coils[0].current;
@@ -188,11 +175,9 @@ fn a_closed_ring_is_two_halves_in_series() {
         };
         let whole: Vec<f64> = line(-30e-3).collect();
         let first = if half { line(0.0).collect() } else { whole.clone() };
-        let grid = Grid::new("box", [first, whole, vec![-5e-3, 0.0, 5e-3, 10e-3]]).expect("ascending lines");
         let within = |x: Point, r: f64| x[0].abs() < r && x[1].abs() < r && x[2] > 0.0 && x[2] < 5e-3;
-        let paint = |x: Point| RegionId(u32::from(within(x, 20e-3) && !within(x, 10e-3)));
-        let topology = grid.topology(&["air", "ring"], paint).expect("regions");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let paint = |x: Point| u32::from(within(x, 20e-3) && !within(x, 10e-3));
+        let mesh = painted([first, whole, vec![-5e-3, 0.0, 5e-3, 10e-3]], &["air", "ring"], paint);
         let elements = mesh.topology().elements_of(RegionId(1));
         let path = if half {
             let ends = |name: &str, sign: f64| {
@@ -220,8 +205,7 @@ fn a_closed_ring_is_two_halves_in_series() {
             ..FieldModelSetup::default()
         };
         let omega = 2.0 * PI * setup.frequency;
-        let model = FieldModel::new(&mesh, setup).expect("a model");
-        let (state, _) = model.solve(&mesh).expect("a field");
+        let (model, state) = solved(&mesh, setup);
         let found = terminals(&model, &mesh, &state).expect("terminals");
         let voltage = found.coils[0].voltage / 2.0;
         assert!((voltage - impedance(&found, omega)).norm() < 1e-9 * voltage.norm());
@@ -251,7 +235,7 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
         [off(x) * wave, off(y) * (1.0 + wave), off(z) * (80.0 * x - 50.0 * y).cos()]
     };
     let direction: Vec<Point> = mesh.topology().nodes().map(sway).collect();
-    for elements in FAMILIES {
+    for elements in ALL {
         let winding = Winding {
             voltage: Some(c64::new(0.02, 0.01)),
             resistance: 1e-5,
@@ -320,7 +304,7 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
 fn the_net_current_passes_every_section() {
     let mesh = bar_in_a_box();
     let bar = mesh.topology().elements_of(mesh.topology().region("bar").expect("a region"));
-    for elements in [FAMILIES[0], FAMILIES[2]] {
+    for elements in [ALL[2], ALL[0]] {
         let model = with_a_bar(&mesh, elements, 2000.0, (100.0, NO_CIRCUIT));
         let (state, _) = model.solve(&mesh).expect("a field");
         let densities = state.current_densities_of(&model, &mesh, &bar);
@@ -368,7 +352,7 @@ fn the_error_of_a_bar_is_estimated() {
 #[test]
 fn solid_conductors_that_cannot_be_are_refused() {
     let mesh = bar_in_a_box();
-    let sound = with_a_bar(&mesh, FAMILIES[0], 300.0, (100.0, NO_CIRCUIT)).setup().clone();
+    let sound = with_a_bar(&mesh, ALL[2], 300.0, (100.0, NO_CIRCUIT)).setup().clone();
     let said = |setup: FieldModelSetup| FieldModel::new(&mesh, setup).expect_err("it is refused").to_string();
     let mut nowhere_to_return = sound.clone();
     nowhere_to_return.boundaries = flux_parallel(&["x_min", "x_max"]);
@@ -405,8 +389,7 @@ fn parts_of_a_conductor_are_in_series_or_in_parallel() {
             linear_solver: LinearSolverSettings { tolerance: 1e-13, ..LinearSolverSettings::default() },
             ..FieldModelSetup::default()
         };
-        let model = FieldModel::new(&mesh, setup).expect("a model");
-        let (state, _) = model.solve(&mesh).expect("a field");
+        let (model, state) = solved(&mesh, setup);
         terminals(&model, &mesh, &state).expect("terminals").coils
     };
     let topology = mesh.topology();
@@ -447,14 +430,14 @@ fn load_cases_of_a_bar_are_those_of_models_of_their_own() {
         terminals(model, &mesh, state).expect("terminals").coils.into_iter().flat_map(of).collect::<Vec<_>>()
     };
     for frequency in [0.0, 300.0] {
-        let first = with_a_bar(&mesh, FAMILIES[0], frequency, (100.0, NO_CIRCUIT));
+        let first = with_a_bar(&mesh, ALL[2], frequency, (100.0, NO_CIRCUIT));
         let mut case = first.load_case();
         case.drives[0] = Drive::Voltage(volt);
         let second = first.at_load_case(&mesh, &case).expect("a model");
         let (_, system) = first.solve(&mesh).expect("a field");
         let mut system = second.take_over(system).expect("the responses of the case");
         let state = second.solve_prepared(&mut system, &second.load(&mesh)).expect("a field");
-        let own = with_a_bar(&mesh, FAMILIES[0], frequency, (0.0, driven));
+        let own = with_a_bar(&mesh, ALL[2], frequency, (0.0, driven));
         let (expected, _) = own.solve(&mesh).expect("a field");
         for (a, b) in seen(&second, &state).iter().zip(&seen(&own, &expected)) {
             assert!((a - b).norm() <= 1e-9 * b.norm(), "{frequency}: {a} {b}");

@@ -3,15 +3,14 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::circuit::terminals;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{ElementFamily, FieldModelSetup, Material, Order};
 
-use super::super::flux_parallel;
+use super::super::{flux_parallel, painted, solved};
 use super::{COPPER, METAL, coil, impedance, parts};
 
 /// Opening of a wedge [rad] whose chord stands for an arc: its area is short of the sector's by a square of it over six, 0.08 %.
@@ -41,10 +40,10 @@ fn frequency(skin_depth: f64) -> f64 {
 
 /// A wedge of lines along the radius, one cell wide and high, with regions by the radius [m] of a cell.
 fn wedge(radii: Vec<f64>, height: f64, names: &[&str], paint: impl Fn(f64) -> u32) -> Mesh {
-    let grid = Grid::new("wedge", [radii, vec![0.0, OPENING], vec![0.0, height]]).expect("ascending lines");
-    let topology = grid.topology(names, |x| RegionId(paint(x[0]))).expect("regions");
-    let turned = |[r, angle, z]: Point| [r * angle.cos(), r * angle.sin(), z];
-    Mesh::new(Arc::new(topology), grid.points().into_iter().map(turned).collect()).expect("a mesh")
+    let straight = painted([radii, vec![0.0, OPENING], vec![0.0, height]], names, |x| paint(x[0]));
+    let turned = |&[r, angle, z]: &Point| [r * angle.cos(), r * angle.sin(), z];
+    let points = straight.points().iter().map(turned).collect();
+    Mesh::new(Arc::clone(straight.topology()), points).expect("a mesh")
 }
 
 /// A wire of 1 mm in a sheath of 2 mm that takes its current back.
@@ -64,8 +63,7 @@ fn wire(elements: (ElementFamily, Order), skin_depth: f64, cells: usize) -> [c64
         ..FieldModelSetup::default()
     };
     let omega = 2.0 * PI * setup.frequency;
-    let model = FieldModel::new(&mesh, setup).expect("a model");
-    let (state, _) = model.solve(&mesh).expect("a field");
+    let (model, state) = solved(&mesh, setup);
     let found = terminals(&model, &mesh, &state).expect("terminals");
     let k = wave_number(skin_depth);
     let [j0, j1] = bessel(k * radius);
@@ -136,8 +134,7 @@ fn an_induction_coil_heats_a_billet_by_the_power_of_bessel_functions() {
             boundaries: flux_parallel(&["x_min", "y_min", "y_max"]),
             ..FieldModelSetup::default()
         };
-        let model = FieldModel::new(&mesh, setup).expect("a model");
-        let (state, _) = model.solve(&mesh).expect("a field");
+        let (model, state) = solved(&mesh, setup);
         let power = state.losses(&model, &mesh)[0].1;
         let exact =
             billet_power(radius, steel, 2.0 * PI * hertz, current / height) * height * OPENING / (2.0 * PI);
@@ -213,10 +210,8 @@ fn bars_by_elements([gap, width, half]: [f64; 3], is_pair: bool, hertz: f64, cel
     let x = x.into_iter().chain(parts(gap, gap + width, cells[0])).chain(far(gap + width));
     let y = std::iter::once(0.0).chain(parts(0.0, half, cells[1])).chain(far(half));
     let height = 2e-3;
-    let grid = Grid::new("slice", [x.collect(), y.collect(), vec![0.0, height]]).expect("ascending lines");
-    let in_bar = |[x, y, _]: Point| x > gap && x < gap + width && y < half;
-    let topology = grid.topology(&["air", "bar"], |x| RegionId(u32::from(in_bar(x)))).expect("regions");
-    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+    let in_bar = |[x, y, _]: Point| u32::from(x > gap && x < gap + width && y < half);
+    let mesh = painted([x.collect(), y.collect(), vec![0.0, height]], &["air", "bar"], in_bar);
     let mut boundaries = flux_parallel(&["z_min", "z_max", "x_max", "y_max"]);
     boundaries.extend(is_pair.then(|| flux_parallel(&["x_min"])).into_iter().flatten());
     let setup = FieldModelSetup {
@@ -227,8 +222,7 @@ fn bars_by_elements([gap, width, half]: [f64; 3], is_pair: bool, hertz: f64, cel
         boundaries,
         ..FieldModelSetup::default()
     };
-    let model = FieldModel::new(&mesh, setup).expect("a model");
-    let (state, _) = model.solve(&mesh).expect("a field");
+    let (model, state) = solved(&mesh, setup);
     let found = terminals(&model, &mesh, &state).expect("terminals");
     impedance(&found, 2.0 * PI * hertz) / height
 }

@@ -45,8 +45,8 @@ fn holds_numbers_alone(out: &Path) {
 fn a_run_that_overflows_after_some_evaluations_exits_with_4_and_saves_its_best_design() {
     let folder = folder();
     let out = folder.path().join("run");
-    let weight = format!("objective.weight={:e}", weight(&quick(&[]).0, 1.1));
-    let arguments = ["--set", &weight, "--set", "objective.goal=maximise", "--max-evaluations", "40"];
+    let weight = format!("objective.weight={:e}", weight(&quick(&[]).0, 1.5));
+    let arguments = ["--set", &weight, "--set", "objective.goal=maximise", "--max-evaluations", "60"];
     on_quick("run", &out, &arguments).exits_with(4).says(&[
         "the adjoint of the objective at 60 Hz",
         "leave the range of numbers",
@@ -55,7 +55,8 @@ fn a_run_that_overflows_after_some_evaluations_exits_with_4_and_saves_its_best_d
     assert_eq!(read_json(&out.join("manifest.json"))["status"], "failed");
     let result = read_json(&out.join("result.json"));
     assert_eq!(result["stop_reason"], "numerical_failure");
-    assert!(result["evaluations"].as_u64() >= Some(1), "{result}");
+    let [initial, best] = ["initial", "best"].map(|key| result["objective"][key].as_f64());
+    assert!(result["evaluations"].as_u64() >= Some(2) && best > initial, "{result}");
     assert!(out.join("optimum.msh").exists(), "{:?}", files_below(&out));
     holds_numbers_alone(&out);
 }

@@ -1,12 +1,9 @@
 //! Runs of which an evaluation fails.
 
-use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
 use fluxmorph::ExitCode;
 use fluxmorph::config::{Algorithm, Optimizer};
 use fluxmorph::files::{OutputError, RunStatus, StopReason};
-use fluxmorph::show::{Evaluation, Observer, Silent};
+use fluxmorph::show::{Evaluation, Observer};
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::{Optimised, optimise};
@@ -66,28 +63,6 @@ fn every_algorithm_that_runs_into_an_overflow_ends_with_its_best_design() {
         let named = |warning: &String| warning.starts_with("the adjoint of the objective at 60 Hz: ");
         assert!(warnings.iter().any(named), "{algorithm:?}: {warnings:?}");
     }
-}
-
-#[test]
-fn an_overflow_after_several_evaluations_keeps_the_best_of_them() {
-    let (problem, settings) = overflowing(1.5);
-    let settings = Optimizer { max_evaluations: 60, ..settings };
-    let mut rows = Rows::default();
-    let (ended, _) = run(problem, &settings, &mut rows);
-    let optimised = ended.unwrap();
-    println!("{} evaluations, best {}", optimised.evaluations, optimised.best.evaluation);
-    best_is_saved(&optimised, &rows.rows);
-    assert!(optimised.best.objective > optimised.initial && optimised.evaluations >= 2);
-}
-
-#[test]
-fn an_overflow_at_the_first_design_is_an_error_and_nothing_is_recorded() {
-    let (problem, settings) = overflowing(0.5);
-    let mut rows = Rows::default();
-    let error = run(problem, &settings, &mut rows).0.expect_err("there is no best design");
-    let error = fluxmorph::Error::from(error);
-    assert_eq!(error.exit_code(), ExitCode::Numerical);
-    assert!(rows.rows.is_empty() && error.to_string().contains("right side"), "{error}");
 }
 
 /// The required residual lies between that of the first evaluations and that of a later one.
@@ -177,28 +152,6 @@ fn an_objective_too_small_to_be_divided_by_is_an_error_before_anything_is_record
 }
 
 #[test]
-fn a_panic_in_any_evaluation_of_any_algorithm_comes_out_on_this_side() {
-    for algorithm in Algorithm::ALL {
-        let (mut problem, settings) = quick(&[]);
-        let settings = Optimizer { algorithm, ..settings };
-        let asked = Cell::new(0);
-        let interrupted = || {
-            asked.set(asked.get() + 1);
-            assert!(asked.get() < 3, "a fault of the program");
-            false
-        };
-        let mut rows = Rows::default();
-        let caught = catch_unwind(AssertUnwindSafe(|| {
-            optimise(&mut problem, &settings.settings(), &mut Silent, &mut rows, &interrupted)
-        }));
-        let panic = caught.err().unwrap_or_else(|| panic!("{algorithm:?} swallows the panic"));
-        assert_eq!(panic.downcast_ref::<&str>(), Some(&"a fault of the program"), "{algorithm:?}");
-        // Asked before the first one too.
-        assert_eq!(rows.rows.len(), 2, "the evaluations before it were kept");
-    }
-}
-
-#[test]
 fn a_mesh_that_inverts_under_a_bound_ends_at_the_mesh_limit_with_numbers_alone() {
     for law in ["linear", "rails", "hyperelastic"] {
         let law = format!("remesh.law=\"{law}\"");
@@ -211,7 +164,9 @@ fn a_mesh_that_inverts_under_a_bound_ends_at_the_mesh_limit_with_numbers_alone()
         let optimised = run(problem, &settings, &mut rows).0.unwrap();
         println!("{:?} after {} evaluations", optimised.stop_reason, optimised.evaluations);
         assert_ne!(optimised.stop_reason, StopReason::NumericalFailure);
-        assert_eq!(optimised.best.objective, rows.rows[optimised.best.evaluation].objective);
+        let best = &rows.rows[optimised.best.evaluation];
+        assert_eq!(optimised.best.objective, best.objective);
+        assert!(!optimised.stop_reason.is_converged() && best.ratio < 0.6, "{law}: {best:?}");
         assert!(rows.rows.iter().all(|row| row.objective.is_finite() && row.worst_quality > 0.0));
     }
 }

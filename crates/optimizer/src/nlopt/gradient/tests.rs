@@ -186,14 +186,29 @@ fn without_a_tolerance_a_method_ends_where_it_settles() {
     }
 }
 
+/// The methods that keep constraints.
+const CONSTRAINED: [Algorithm; 3] = [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp];
+
+/// Every method without constraints, and those that keep them with two, from inside and from outside.
+fn every_way() -> impl Iterator<Item = (Algorithm, usize, f64)> {
+    let constrained = CONSTRAINED.into_iter().flat_map(|method| [0.0, 0.015].map(|start| (method, 2, start)));
+    Algorithm::ALL.into_iter().map(|method| (method, 0, 0.0)).chain(constrained)
+}
+
+/// The quadratic, with its constraints where there are any.
+fn sample(p: &[f64], constraints: usize) -> Sample {
+    if constraints > 0 { constrained(p) } else { quadratic(p) }
+}
+
 #[test]
 fn every_algorithm_stops_at_once_when_the_closure_does() {
-    for algorithm in Algorithm::ALL {
-        for last in [1, 2, 4] {
+    for (algorithm, constraints, start) in every_way() {
+        for last in 1..=4 {
             let mut calls = 0;
-            let outcome = minimise(&settings(algorithm), &[0.0; 8], |p| {
+            let settings = Minimisation { constraints, ..settings(algorithm) };
+            let outcome = minimise(&settings, &[start; 8], |p| {
                 calls += 1;
-                if calls == last { Err(Halt::Enough) } else { Ok(quadratic(p)) }
+                if calls == last { Err(Halt::Enough) } else { Ok(sample(p, constraints)) }
             });
             assert!(matches!(outcome, Outcome::Interrupted(Halt::Enough)), "{algorithm:?}: {outcome:?}");
             assert_eq!(calls, last, "{algorithm:?}");
@@ -216,14 +231,15 @@ fn the_first_design_asked_for_is_the_start_to_the_last_bit() {
 
 #[test]
 fn a_panic_in_the_closure_comes_out_on_this_side_of_every_algorithm() {
-    for algorithm in Algorithm::ALL {
+    for (algorithm, constraints, start) in every_way() {
         for last in [1, 3] {
             let mut calls = 0;
+            let settings = Minimisation { constraints, ..settings(algorithm) };
             let caught = catch_unwind(AssertUnwindSafe(|| {
-                minimise::<Halt>(&settings(algorithm), &[0.0; 8], |p| {
+                minimise::<Halt>(&settings, &[start; 8], |p| {
                     calls += 1;
                     assert!(calls < last, "inside the callback");
-                    Ok(quadratic(p))
+                    Ok(sample(p, constraints))
                 })
             }));
             let panic = caught.expect_err("the closure panics");
@@ -233,84 +249,52 @@ fn a_panic_in_the_closure_comes_out_on_this_side_of_every_algorithm() {
     }
 }
 
-#[test]
-fn a_panic_under_constraints_comes_out_too() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        let settings = Minimisation { constraints: 2, ..settings(algorithm) };
-        let caught = catch_unwind(|| minimise::<Halt>(&settings, &[0.015; 8], |_| panic!("inside")));
-        assert!(caught.is_err(), "{algorithm:?}");
-    }
-}
+/// What is damaged in a sample, with how many constraints, and what is said.
+type Damage = (fn(&mut Sample), usize, &'static str);
 
-/// What `minimise` says where the third sample is damaged, and how often it asked.
-fn with_a_bad_sample(algorithm: Algorithm, constraints: usize, damage: &dyn Fn(&mut Sample)) -> String {
-    let settings = Minimisation { constraints, ..settings(algorithm) };
-    let mut calls = 0;
-    let outcome = minimise::<Halt>(&settings, &[0.0; 8], |p| {
-        calls += 1;
-        let mut sample = if constraints > 0 { constrained(p) } else { quadratic(p) };
-        if calls == 3 {
-            damage(&mut sample);
-        }
-        Ok(sample)
-    });
-    assert_eq!(calls, 3, "{algorithm:?} asks no more");
-    match outcome {
-        Outcome::Interrupted(Halt::Failed(error)) => {
-            assert!(error.is_numerical());
-            error.to_string()
-        }
-        other => panic!("{algorithm:?}: {other:?}"),
-    }
-}
+const DAMAGES: [Damage; 14] = [
+    (|sample| sample.value = f64::NAN, 0, "the relative objective is"),
+    (|sample| sample.value = f64::INFINITY, 0, "the relative objective is"),
+    (|sample| sample.value = f64::NEG_INFINITY, 0, "the relative objective is"),
+    // It would be taken for the stop value, and the run for converged.
+    (|sample| sample.value = -1e301, 0, "the relative objective is"),
+    (|sample| sample.gradient[6] = f64::NAN, 0, "objective by design variable 6 is"),
+    (|sample| sample.gradient[6] = f64::INFINITY, 0, "objective by design variable 6 is"),
+    (|sample| sample.gradient[6] = 1e200, 0, "objective by design variable 6 is"),
+    (|sample| sample.constraints[1].0 = f64::NAN, 2, "constraint 1, relative to its bound, is"),
+    (|sample| sample.constraints[1].0 = f64::NEG_INFINITY, 2, "constraint 1, relative to its bound, is"),
+    (
+        |sample| sample.constraints[0].1[3] = f64::INFINITY,
+        2,
+        "constraint 0, relative to its bound, by design variable 3 is",
+    ),
+    // A gradient that is too short would leave what NLopt's array held before.
+    (|sample| sample.gradient.truncate(7), 0, "number of derivatives"),
+    (|sample| sample.constraints.push((0.0, vec![0.0; 8])), 0, "number of constraints"),
+    (|sample| sample.constraints.truncate(1), 2, "number of constraints"),
+    (|sample| sample.constraints[1].1.truncate(1), 2, "number of derivatives"),
+];
 
 #[test]
-fn no_algorithm_is_shown_an_objective_that_is_no_number() {
-    for algorithm in Algorithm::ALL {
-        // The last would be taken for the stop value, and the run for converged.
-        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -1e301] {
-            let message = with_a_bad_sample(algorithm, 0, &|sample| sample.value = bad);
-            assert!(message.starts_with("the relative objective is"), "{algorithm:?}: {message}");
+fn no_algorithm_is_shown_a_sample_that_is_no_number_or_of_another_length() {
+    for (damage, constraints, says) in DAMAGES {
+        for (algorithm, constraints, _) in every_way().filter(|way| way.1 == constraints && way.2 == 0.0) {
+            let settings = Minimisation { constraints, ..settings(algorithm) };
+            let mut calls = 0;
+            let outcome = minimise::<Halt>(&settings, &[0.0; 8], |p| {
+                calls += 1;
+                let mut sample = sample(p, constraints);
+                if calls == 3 {
+                    damage(&mut sample);
+                }
+                Ok(sample)
+            });
+            assert_eq!(calls, 3, "{algorithm:?} asks no more");
+            let Outcome::Interrupted(Halt::Failed(error)) = outcome else {
+                panic!("{algorithm:?}: {outcome:?}")
+            };
+            assert!(error.is_numerical() && error.to_string().contains(says), "{algorithm:?}: {error}");
         }
-    }
-}
-
-#[test]
-fn no_algorithm_is_shown_a_derivative_that_is_no_number() {
-    for algorithm in Algorithm::ALL {
-        for bad in [f64::NAN, f64::INFINITY, 1e200] {
-            let message = with_a_bad_sample(algorithm, 0, &|sample| sample.gradient[6] = bad);
-            assert!(message.contains("objective by design variable 6 is"), "{algorithm:?}: {message}");
-        }
-    }
-}
-
-#[test]
-fn no_algorithm_is_shown_a_constraint_that_is_no_number() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[1].0 = bad);
-            assert!(message.starts_with("constraint 1, relative to its bound, is"), "{message}");
-            let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[0].1[3] = bad);
-            assert!(message.contains("constraint 0") && message.contains("variable 3"), "{message}");
-        }
-    }
-}
-
-/// A gradient that is too short would leave what NLopt's array held before.
-#[test]
-fn samples_of_other_lengths_than_announced_are_refused() {
-    for algorithm in Algorithm::ALL {
-        let message = with_a_bad_sample(algorithm, 0, &|sample| sample.gradient.truncate(7));
-        assert!(message.contains("number of derivatives"), "{message}");
-        let message = with_a_bad_sample(algorithm, 0, &|sample| sample.constraints.push((0.0, vec![0.0; 8])));
-        assert!(message.contains("number of constraints"), "{message}");
-    }
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints.truncate(1));
-        assert!(message.contains("number of constraints"), "{message}");
-        let message = with_a_bad_sample(algorithm, 2, &|sample| sample.constraints[1].1.truncate(1));
-        assert!(message.contains("number of derivatives"), "{message}");
     }
 }
 
@@ -372,7 +356,7 @@ fn a_design_of_the_method_that_is_no_number_is_never_evaluated() {
 
 #[test]
 fn constraints_are_kept_from_inside_and_from_outside() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+    for algorithm in CONSTRAINED {
         for start in [0.0, 0.015] {
             let settings = Minimisation { constraints: 2, ..settings(algorithm) };
             let (mut best, mut seen) = ((f64::INFINITY, vec![]), Vec::new());
@@ -398,22 +382,6 @@ fn constraints_are_kept_from_inside_and_from_outside() {
                 (0..8).filter(|&k| k != 6 && p[k] > -0.004999 && p[k] < 0.019999).map(multiplier).collect();
             let spread = free.iter().fold(0.0_f64, |m, x| m.max((x - free[0]).abs()));
             assert!(spread < 0.02 * free[0].abs(), "{algorithm:?} from {start}: {free:?}");
-        }
-    }
-}
-
-#[test]
-fn constrained_methods_stop_at_once_too() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        for (start, last) in [(0.0, 1), (0.0, 3), (0.015, 1), (0.015, 2), (0.015, 4)] {
-            let mut calls = 0;
-            let settings = Minimisation { constraints: 2, ..settings(algorithm) };
-            let outcome = minimise(&settings, &[start; 8], |p| {
-                calls += 1;
-                if calls == last { Err(Halt::Enough) } else { Ok(constrained(p)) }
-            });
-            assert!(matches!(outcome, Outcome::Interrupted(Halt::Enough)), "{algorithm:?}: {outcome:?}");
-            assert_eq!(calls, last, "{algorithm:?}");
         }
     }
 }
@@ -451,7 +419,7 @@ fn least_shield(settings: &Minimisation, gain: f64) -> f64 {
 
 #[test]
 fn a_mass_without_room_neither_holds_the_first_steps_back_nor_ends_a_search_early() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+    for algorithm in CONSTRAINED {
         for (variables, gain) in [(8, 0.2), (100, 0.2), (100, 1.0), (400, 0.2)] {
             let (lower, upper) = (vec![-0.005; variables], vec![0.020; variables]);
             let settings =
@@ -493,7 +461,7 @@ fn paraboloids(p: &[f64]) -> Sample {
 
 #[test]
 fn a_worst_case_is_found_to_a_tight_tolerance() {
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+    for algorithm in CONSTRAINED {
         let first_step = 0.1 / taken(algorithm);
         let settings = Minimisation { members: 3, ftol_rel: 1e-9, first_step, ..settings(algorithm) };
         let mut values = Vec::new();
