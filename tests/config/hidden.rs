@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::program::{limited, write};
+use crate::program::{is_hidden, limited, write};
 use crate::support::device::BLOCK;
 use crate::support::program::{Finished, folder};
 use crate::support::repository_text;
@@ -19,12 +19,6 @@ const HOSTILE: [&str; 9] = [
     "\u{feff}",
     "\u{2028}",
 ];
-
-fn is_hidden(letter: char) -> bool {
-    letter != '\n'
-        && (letter.is_control()
-            || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}'))
-}
 
 #[track_caller]
 fn assert_shown(ended: &Finished, context: &str) {

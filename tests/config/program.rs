@@ -79,6 +79,13 @@ pub(crate) fn least_limit(most: u64, suffices: impl Fn(u64) -> bool) -> u64 {
     high << 20
 }
 
+/// Whether a letter acts on a terminal, or hides or turns round others.
+pub(crate) fn is_hidden(letter: char) -> bool {
+    letter != '\n'
+        && (letter.is_control()
+            || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}'))
+}
+
 impl Finished {
     /// What is wrong with a refusal of this exit code that says these words; `None` when it is as it must be.
     pub(crate) fn objection(&self, code: i32, says: &[&str]) -> Option<String> {
@@ -95,11 +102,7 @@ impl Finished {
         {
             return Some(format!("`{word}` in:\n{stderr}"));
         }
-        let is_hidden = |c: &char| {
-            (c.is_control() && *c != '\n')
-                || ('\u{200b}'..='\u{202e}').contains(c) && !"–—‘’“”†‡•…".contains(*c)
-        };
-        if let Some(c) = stderr.chars().find(is_hidden) {
+        if let Some(c) = stderr.chars().find(|c| is_hidden(*c)) {
             return Some(format!("the control character {c:?} in:\n{stderr:?}"));
         }
         // A screen or two, whatever the length of the names in the file.

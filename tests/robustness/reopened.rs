@@ -22,12 +22,8 @@ struct Begun {
 }
 
 fn begun(name: &str) -> Begun {
-    begun_with(name, |device| device)
-}
-
-fn begun_with(name: &str, change: impl FnOnce(Device) -> Device) -> Begun {
     let home = folder();
-    let device = change(block(home.path(), 12));
+    let device = block(home.path(), 12);
     let (expected, _) = device.undisturbed(home.path());
     let out = home.path().join(name);
     finish(device.command("run", &out).args(["--max-evaluations", "3"])).completed();
@@ -63,11 +59,6 @@ impl Begun {
         let path = self.out.join(name);
         std::fs::write(&path, changed(&read_text(&path), &[(from, to)])).expect("written");
     }
-}
-
-#[test]
-fn edge_elements_go_on_to_the_bit() {
-    begun_with("out", |device| device.with("analysis.elements=edge")).goes_on("edge elements");
 }
 
 #[test]

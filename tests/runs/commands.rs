@@ -88,9 +88,6 @@ fn a_file_that_is_no_fitting_design_is_refused_with_its_name() {
     let cases = [
         ("[0.001, 0.002]".to_owned(), "has 2 values, but the problem has 91 design variables"),
         (filled("NaN"), "not a design: no valid JSON"),
-        (filled("null"), "item 0 is null, not a number"),
-        (filled("\"5 mm\""), "item 0 is \"5 mm\", not a number"),
-        ("{}".to_owned(), "no list `design.values_m`"),
         (filled("0.05"), "of it can be taken; move less, enlarge the remesh region"),
     ];
     for name in ["solve", "gradient"] {

@@ -77,21 +77,3 @@ fn write_pages(folder: &Path) -> Result<(), OutputError> {
     disk.create_dir(folder).map_err(OutputError::io("create the folder", folder))?;
     pages().into_iter().try_for_each(|(name, page)| write_whole(&*disk, &folder.join(name), &page))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_command_has_a_page() {
-        let pages = pages();
-        let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
-        for name in ["fluxmorph.1", "fluxmorph-run.1", "fluxmorph-generate-completions.1"] {
-            assert!(names.contains(&name), "{name}: {names:?}");
-        }
-        for (name, page) in &pages {
-            let text = String::from_utf8_lossy(page);
-            assert!(text.contains(".TH ") && text.contains(".SH SYNOPSIS"), "{name}: {text}");
-        }
-    }
-}

@@ -1,24 +1,12 @@
 //! Motion along one axis by the convex energy: closed forms, derivatives, one function of the design, and its limits.
 
-use crate::support::{self, Point, noise, product, unit_cells, whole};
+use crate::support::{self, Point, noise, unit_cells};
 use fluxmorph_geometry::Mesh;
-use fluxmorph_remesh::{
-    Boundary, BoundaryKind, LEAST_ROOM, Motion, MotionLaw, RemeshError, RemeshSetup, StiffnessPolicy,
-};
+use fluxmorph_remesh::{LEAST_ROOM, Motion, MotionLaw, RemeshError, StiffnessPolicy};
 
-/// A block whose top is designed and whose sides slide, on rails along z.
+/// A block on rails along z.
 fn motion(mesh: &Mesh, policy: StiffnessPolicy) -> Motion {
-    let slide = |name| Boundary::of_surface(mesh.topology(), name, BoundaryKind::Slide).unwrap();
-    let top = mesh.bounding_box()[1][2];
-    let setup = RemeshSetup {
-        subregions: whole(mesh),
-        policy,
-        law: MotionLaw::Rails(2),
-        design_nodes: support::nodes_where(mesh, |p| p[2] == top),
-        boundaries: ["x_min", "x_max", "y_min", "y_max"].map(slide).to_vec(),
-        ..RemeshSetup::default()
-    };
-    Motion::new(mesh.clone(), setup).unwrap()
+    support::sliding_top(mesh, policy, MotionLaw::Rails(2))
 }
 
 /// Displacements of the top along z.
@@ -49,29 +37,9 @@ fn one_weight_a_volume_stretches_a_block_evenly_however_far() {
     }
 }
 
-/// Layers of height h in equilibrium have one stress: with a modulus inverse to the volume, J − 1/J is in proportion to h.
 #[test]
 fn thin_layers_keep_what_their_weight_says() {
-    let heights = [0.0, 0.1, 0.4, 1.0, 2.5, 5.0];
-    let flat = unit_cells([2, 2, 5]);
-    let graded: Vec<Point> =
-        flat.points().iter().map(|p| [0.0, 0.0, heights[p[2] as usize] - p[2]]).collect();
-    let mesh = flat.moved(&graded).unwrap();
-    let motion = motion(&mesh, StiffnessPolicy::InverseVolume);
-    let moved = motion.moved(&uniform(&motion, -2.5)).unwrap();
-    let height = |layer: usize| {
-        let node = mesh.topology().nodes().find(|n| flat.point(*n) == [0.0, 0.0, layer as f64]).unwrap();
-        moved.mesh.point(node)[2]
-    };
-    let stress = |layer: usize| {
-        let h = heights[layer + 1] - heights[layer];
-        let stretch = (height(layer + 1) - height(layer)) / h;
-        (stretch - 1.0 / stretch) / h
-    };
-    for layer in 1..5 {
-        assert!((stress(layer) / stress(0) - 1.0).abs() < 1e-10, "{layer}");
-    }
-    assert!((height(1) - height(0)) / 0.1 > 0.9, "the skin keeps its thickness");
+    support::assert_layers_keep_what_their_weight_says(MotionLaw::Rails(2), -2.5);
 }
 
 #[test]
@@ -107,20 +75,17 @@ fn a_way_through_the_floor_is_cut_before_it_and_the_room_there_is_the_least_one(
 fn room_and_shortfall_have_exact_derivatives_on_both_sides_of_the_limit() {
     let mesh = support::shaken(&unit_cells([4, 4, 4]), 0.1);
     let motion = motion(&mesh, StiffnessPolicy::InverseSize);
-    let room = |design: &[Point]| motion.carried_along(&|_| design.to_vec());
-    let shortfall = |design: &[Point]| motion.shortfall(design, None).unwrap().unwrap();
-    let shifted = |design: &[Point], direction: &[Point], h: f64| -> Vec<Point> {
-        design.iter().zip(direction).map(|(u, d)| [0.0, 0.0, u[2] + h * d[2]]).collect()
+    let room = |design: &[Point]| {
+        let room = motion.carried_along(&|_| design.to_vec()).unwrap().room;
+        (room.value, room.gradient)
     };
-    let h = 1e-6;
+    let shortfall = |design: &[Point]| {
+        let shortfall = motion.shortfall(design, None).unwrap().unwrap();
+        (shortfall.value, shortfall.gradient)
+    };
     let (inside, beyond) = (rough(&motion, 1.0, 1), uniform(&motion, -4.3));
     let direction = rough(&motion, 1.0, 9);
-    let value = |h: f64| room(&shifted(&inside, &direction, h)).unwrap().room.value;
-    let exact = product(&room(&inside).unwrap().room.gradient, &direction);
-    // The smooth minimum bends by β = 200: truncation of (β h)², rounding over h.
-    assert!(((value(h) - value(-h)) / (2.0 * h) / exact - 1.0).abs() < 1e-5);
-    assert_eq!(shortfall(&inside).value, 0.0);
-    let exact = product(&shortfall(&beyond).gradient, &direction);
-    let value = |h: f64| shortfall(&shifted(&beyond, &direction, h)).value;
-    assert!(((value(h) - value(-h)) / (2.0 * h) / exact - 1.0).abs() < 1e-5);
+    assert_eq!(shortfall(&inside).0, 0.0);
+    support::assert_derivative(room, &inside, &direction);
+    support::assert_derivative(shortfall, &beyond, &direction);
 }

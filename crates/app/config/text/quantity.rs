@@ -192,8 +192,6 @@ fn split_number(text: &str) -> (Option<Number<'_>>, &str) {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
     use crate::config::text::dimension::Dimension::*;
 
@@ -262,27 +260,5 @@ mod tests {
     fn a_resistivity_is_answered_with_its_reciprocal() {
         let error = parse_quantity("1.25e-7 Ohm m", Conductivity).expect_err("a resistivity");
         assert!(error.help.contains("8.000000e6 S/m"), "{}", error.help);
-    }
-
-    proptest! {
-        #[test]
-        fn any_text_is_read_or_refused_without_a_panic(text in "\\PC*") {
-            for dimension in [Length, Frequency, Conductivity, Current, FluxDensity, Angle, Duration, Power, Volume] {
-                if let Ok(value) = parse_quantity(&text, dimension) {
-                    prop_assert!(value.is_finite());
-                }
-            }
-        }
-
-        #[test]
-        fn a_printed_number_is_read_back_exactly(value in -1e12_f64..1e12) {
-            prop_assert_eq!(parse_quantity(&format!("{value} m"), Length), Ok(value));
-            prop_assert_eq!(parse_quantity(&format!("{value:e}m"), Length), Ok(value));
-        }
-
-        #[test]
-        fn number_like_texts_never_panic(text in "[-+]?[0-9.]{0,4}[eE]?[-+]?[0-9]{0,12} ?[a-zA-Z/]{0,4}") {
-            let _ = parse_quantity(&text, Length);
-        }
     }
 }

@@ -2,9 +2,10 @@
 
 #![allow(dead_code, reason = "every test binary uses its part")]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use fluxmorph_geometry::generate::{BlockParameters, block};
 use fluxmorph_geometry::tet4::{FACES, Point, volume};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 
@@ -79,47 +80,23 @@ impl Device {
     /// A block of some cells with crooked nodes, random tags, regions and surfaces.
     pub(crate) fn random(random: &mut Random, tag_limit: u64) -> Self {
         let cells = [0; 3].map(|_| 1 + random.below(3) as usize);
-        let [nx, ny, nz] = cells.map(|n| n + 1);
-        let mut used = std::collections::BTreeSet::new();
+        let grid = block(&BlockParameters { size: cells.map(|n| n as f64), cells }).expect("a block");
+        let mut used = BTreeSet::new();
         let mut tag = |random: &mut Random| loop {
             let tag = 1 + random.below(tag_limit);
             if used.insert(tag) {
                 break tag;
             }
         };
-        let mut nodes = Vec::new();
-        for k in 0..nz {
-            for j in 0..ny {
-                for i in 0..nx {
-                    // A tenth of a cell off the grid keeps all volumes positive.
-                    let x = [i, j, k].map(|c| c as f64 + 0.1 * (random.unit() - 0.5));
-                    nodes.push((tag(random), x));
-                }
-            }
-        }
-        let at = |c: [usize; 3]| nodes[c[0] + nx * (c[1] + ny * c[2])].0;
-        let mut tets = Vec::new();
+        // A tenth of a cell off the grid keeps all volumes positive.
+        let crooked = |x: &Point, random: &mut Random| x.map(|c| c + 0.1 * (random.unit() - 0.5));
+        let nodes: Vec<_> = grid.points().iter().map(|x| (tag(random), crooked(x, random))).collect();
         let groups = 1 + random.below(3);
         let mut element = 0;
-        for k in 0..cells[2] {
-            for j in 0..cells[1] {
-                for i in 0..cells[0] {
-                    for order in [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]] {
-                        let mut corner = [i, j, k];
-                        let mut tet = [at(corner); 4];
-                        for (step, axis) in order.into_iter().enumerate() {
-                            corner[axis] += 1;
-                            tet[step + 1] = at(corner);
-                        }
-                        // Even permutations are right-handed; the others are turned.
-                        if [[0, 2, 1], [2, 1, 0], [1, 0, 2]].contains(&order) {
-                            tet.swap(2, 3);
-                        }
-                        element += 1 + random.below(5);
-                        tets.push((element, tet, 7 + random.below(groups) as i32));
-                    }
-                }
-            }
+        let mut tets = Vec::new();
+        for tet in grid.topology().tets() {
+            element += 1 + random.below(5);
+            tets.push((element, tet.map(|n| nodes[n.index()].0), 7 + random.below(groups) as i32));
         }
         let mut triangles = Vec::new();
         for &(_, tet, _) in &tets {

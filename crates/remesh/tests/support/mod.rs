@@ -7,7 +7,7 @@ use fluxmorph_geometry::generate::{BlockParameters, ShieldParameters, block, shi
 use fluxmorph_geometry::tet4::{centroid, cross};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 use fluxmorph_remesh::{
-    Boundary, BoundaryKind, KinematicConstraint, Motion, RemeshSetup, StiffnessPolicy, Subregion,
+    Boundary, BoundaryKind, KinematicConstraint, Motion, MotionLaw, RemeshSetup, StiffnessPolicy, Subregion,
 };
 
 pub(crate) type Point = [f64; 3];
@@ -62,6 +62,59 @@ pub(crate) fn outer_design(mesh: &Mesh, subregions: Vec<Subregion>, policy: Stif
 /// All elements in one subregion.
 pub(crate) fn whole(mesh: &Mesh) -> Vec<Subregion> {
     vec![Subregion::new("all", mesh.topology().elements().collect())]
+}
+
+/// A block by a law whose top is designed and whose sides slide.
+pub(crate) fn sliding_top(mesh: &Mesh, policy: StiffnessPolicy, law: MotionLaw) -> Motion {
+    let slide = |name| Boundary::of_surface(mesh.topology(), name, BoundaryKind::Slide).unwrap();
+    let top = mesh.bounding_box()[1][2];
+    let setup = RemeshSetup {
+        subregions: whole(mesh),
+        policy,
+        law,
+        design_nodes: nodes_where(mesh, |p| p[2] == top),
+        boundaries: ["x_min", "x_max", "y_min", "y_max"].map(slide).to_vec(),
+        ..RemeshSetup::default()
+    };
+    Motion::new(mesh.clone(), setup).unwrap()
+}
+
+/// Asserts that layers of height h in equilibrium have one stress when the top of a block is moved by so much: with a modulus inverse
+/// to the volume, J − 1/J is in proportion to h.
+pub(crate) fn assert_layers_keep_what_their_weight_says(law: MotionLaw, depth: f64) {
+    let heights = [0.0, 0.1, 0.4, 1.0, 2.5, 5.0];
+    let flat = unit_cells([2, 2, 5]);
+    let graded: Vec<Point> =
+        flat.points().iter().map(|p| [0.0, 0.0, heights[p[2] as usize] - p[2]]).collect();
+    let mesh = flat.moved(&graded).unwrap();
+    let motion = sliding_top(&mesh, StiffnessPolicy::InverseVolume, law);
+    let moved = motion.moved(&at(&mesh, motion.map().design_nodes(), |_| [0.0, 0.0, depth])).unwrap();
+    let height = |layer: usize| {
+        let node = mesh.topology().nodes().find(|n| flat.point(*n) == [0.0, 0.0, layer as f64]).unwrap();
+        moved.mesh.point(node)[2]
+    };
+    let stretch = |layer: usize| (height(layer + 1) - height(layer)) / (heights[layer + 1] - heights[layer]);
+    let stress =
+        |layer: usize| (stretch(layer) - 1.0 / stretch(layer)) / (heights[layer + 1] - heights[layer]);
+    for layer in 1..5 {
+        assert!((stress(layer) / stress(0) - 1.0).abs() < 1e-9, "{depth}: {layer}");
+    }
+    assert!((stretch(0) - 1.0).abs() < 0.1, "the skin keeps its thickness");
+}
+
+/// Asserts that a function of a design has the derivative of its central differences along a direction.
+pub(crate) fn assert_derivative(
+    function: impl Fn(&[Point]) -> (f64, Vec<Point>),
+    design: &[Point],
+    direction: &[Point],
+) {
+    let shifted = |h: f64| -> Vec<Point> {
+        design.iter().zip(direction).map(|(u, d)| std::array::from_fn(|i| u[i] + h * d[i])).collect()
+    };
+    let h = 1e-6;
+    let difference = (function(&shifted(h)).0 - function(&shifted(-h)).0) / (2.0 * h);
+    // The smooth minimum bends by β = 200: truncation of (β h)², rounding over h.
+    assert!((difference / product(&function(design).1, direction) - 1.0).abs() < 1e-5);
 }
 
 /// `motion` at some nodes.
