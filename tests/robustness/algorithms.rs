@@ -17,7 +17,7 @@ use crate::disk::SimulatedDisk;
 const VARIABLES: usize = 91;
 
 /// Length of the run.
-const EVALUATIONS: usize = 120;
+const EVALUATIONS: usize = 60;
 
 /// A chain of Rosenbrock's valleys about 10 mm, never done in so few evaluations, and the bound of a sphere on it.
 fn function(p: &[f64]) -> (f64, Vec<f64>, (f64, Vec<f64>)) {
