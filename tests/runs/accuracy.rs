@@ -20,9 +20,13 @@ fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
     let result = read_json(&nodal.join("result.json"));
     assert_eq!(result["accuracy"]["verdict"], "not_confirmed");
     assert_eq!(result["accuracy"]["cross_check"]["elements"], "edge");
+    assert_eq!(result["accuracy"]["cross_check"]["by_estimate"], false);
     let edge = home.path().join("edge");
-    pole("analysis.elements=edge", "analysis.order=1", &edge)
-        .says(&["error bar of F/F0", "confirmed: the gain is the shape's"]);
+    pole("analysis.elements=edge", "analysis.order=1", &edge).says(&[
+        "error bar of F/F0",
+        "(edge, order 2, by the estimate)",
+        "confirmed: the gain is the shape's",
+    ]);
     let result = read_json(&edge.join("result.json"));
     assert_eq!(result["accuracy"]["verdict"], "confirmed");
     let (ratio, fresh) = (number(&result, "/objective/ratio"), number(&result, "/objective/verified_ratio"));

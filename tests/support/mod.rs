@@ -83,7 +83,14 @@ pub(crate) fn setup_of(text: &str) -> Setup {
 
 /// A run of the library: on one thread, into a folder without an earlier run, never interrupted.
 pub(crate) fn options(disk: &Arc<dyn Disk>) -> Options<'_> {
-    Options { disk, overwrite_policy: OverwritePolicy::Keep, threads: 1, ranks: None, interrupted: &|| false }
+    Options {
+        disk,
+        overwrite_policy: OverwritePolicy::Keep,
+        threads: 1,
+        ranks: None,
+        interrupted: &|| false,
+        searched: &|_| None,
+    }
 }
 
 /// Euclidean norm.

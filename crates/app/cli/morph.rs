@@ -19,8 +19,14 @@ pub(super) fn morph(args: &MorphArgs) -> Result<ExitCode, Error> {
         let interrupted = || signal.received().is_some();
         let disk = system_disk();
         let overwrite_policy = args.common.overwrite_policy();
-        let options =
-            Options { disk: &disk, overwrite_policy, threads, ranks: None, interrupted: &interrupted };
+        let options = Options {
+            disk: &disk,
+            overwrite_policy,
+            threads,
+            ranks: None,
+            interrupted: &interrupted,
+            searched: &|_| None,
+        };
         let report = morph::morph(&config, &source, parameters, options, &mut *observer(&args.common.work))?;
         if args.common.work.json {
             stdout::print_json(&report)?;

@@ -93,8 +93,14 @@ pub(super) fn on_all(
         }
         let interrupted = || signal.received().is_some() || ranks.are_signalled(signal.number());
         let (disk, overwrite_policy) = (system_disk(), args.overwrite_policy());
-        let options =
-            Options { disk: &disk, overwrite_policy, threads, ranks: group, interrupted: &interrupted };
+        let options = Options {
+            disk: &disk,
+            overwrite_policy,
+            threads,
+            ranks: group,
+            interrupted: &interrupted,
+            searched: &|_| None,
+        };
         work(options, observer(args))
     });
     signal.exit_code_of(outcome)

@@ -1,7 +1,7 @@
 //! `fluxmorph run` and `fluxmorph resume`.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::args::{ResumeArgs, RunArgs};
 use super::interrupt::{self, Signal};
@@ -11,8 +11,8 @@ use crate::build::{Mode, memory_limit};
 use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::{self, Concluded, RunLimits, SavedRun};
+use crate::files::{RunDirectory, RunStatus, StopReason, extend_command, resume_command, system_disk};
+use crate::run::{self, Concluded, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
 
@@ -21,7 +21,9 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let (config, source) = args.load()?;
     let work = &args.common.work;
+    let page = |held: &RunDirectory| page_so_far(config.output.report, held);
     on_all((&config, &source, Mode::Optimisation), work, &signal, |options, mut observer| {
+        let options = Options { searched: &page, ..options };
         let result = run::run_held(&config, &source, options, &mut *observer);
         let ended =
             Ended { directory: &config.output.directory, report: config.output.report, json: work.json };
@@ -34,6 +36,7 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
     let saved = SavedRun::open(&system_disk(), &args.directory)?;
     let (config, source) = saved.config();
+    let page = |held: &RunDirectory| page_so_far(config.output.report, held);
     on_all((config, source, Mode::Optimisation), &args.work, &signal, |options, mut observer| {
         if !args.work.allow_outside {
             source.confined(OutputNamedBy::User)?;
@@ -43,10 +46,21 @@ pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
         }
         let limits =
             RunLimits { max_evaluations: args.limits.max_evaluations, max_time: args.limits.max_time };
+        let options = Options { searched: &page, ..options };
         let result = run::resume_held(&saved, limits, options, &mut *observer);
         let ended = Ended { directory: &args.directory, report: config.output.report, json: args.work.json };
         conclude(result, &ended, &signal, &mut *observer)
     })
+}
+
+/// The page about what a directory holds; the panic where there is a bug in it.
+fn page(held: RunDirectory) -> std::thread::Result<Result<PathBuf, Error>> {
+    catch_unwind(AssertUnwindSafe(|| ReportedRun::of(held)?.write(None)))
+}
+
+/// The same before the checks of a run; what is in its way is said at the end.
+fn page_so_far(is_wanted: bool, held: &RunDirectory) -> Option<PathBuf> {
+    is_wanted.then(|| page(held.clone()).ok()?.ok()).flatten()
 }
 
 /// What to do when a run has ended.
@@ -70,7 +84,7 @@ fn conclude(
     let printed = if ended.json { stdout::print_json(&result) } else { Ok(()) };
     if ended.report {
         // The result is worth more than a page about it: not even a bug in the page changes how the run ends.
-        match catch_unwind(AssertUnwindSafe(|| ReportedRun::of(held)?.write(None))) {
+        match page(held) {
             Ok(Ok(path)) => observer.note(&format!("report: {}", path.display())),
             Ok(Err(error)) => observer.warning(&format!("the report is not written: {error}")),
             Err(_) => observer.warning("the report is not written: a bug in the program, shown above"),

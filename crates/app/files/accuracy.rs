@@ -77,6 +77,9 @@ pub struct CrossCheck {
     pub order: u8,
     /// `best / initial` by them.
     pub ratio: f64,
+    /// Whether it is the ratio without the estimated errors, and no opinion beside the estimate.
+    #[serde(default)]
+    pub by_estimate: bool,
 }
 
 /// Whether the gain of a run is the shape's, or the mesh's.

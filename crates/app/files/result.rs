@@ -396,7 +396,12 @@ pub(crate) mod tests {
                 levels: Vec::new(),
                 within_tolerance: None,
                 facets: None,
-                cross_check: Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio: 0.502 }),
+                cross_check: Some(CrossCheck {
+                    elements: "edge".to_owned(),
+                    order: 2,
+                    ratio: 0.502,
+                    by_estimate: true,
+                }),
                 verdict: Some(Verdict::Confirmed),
             }),
             constraints: vec![ConstraintResult {

@@ -105,10 +105,9 @@ impl Session<'_> {
                 Err(error) => observer.notice(&format!("there is no check by other elements: {error}")),
             }
         }
-        if let (None, Some(ratio), Elements::Edge) =
-            (&accuracy.cross_check, corrected, self.config.analysis.elements)
-        {
-            accuracy.cross_check = Some(CrossCheck { elements: "edge".to_owned(), order: 2, ratio });
+        if let Some(ratio) = corrected.filter(|_| is_first_order_edge) {
+            let elements = "edge".to_owned();
+            accuracy.cross_check = Some(CrossCheck { elements, order: 2, ratio, by_estimate: true });
         }
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
         let others: Vec<f64> =
@@ -131,7 +130,7 @@ impl Session<'_> {
     }
 
     /// Whether the result of a run that has ended so is to be looked at again.
-    fn is_checked(&self, stop_reason: StopReason) -> bool {
+    pub(super) fn is_checked(&self, stop_reason: StopReason) -> bool {
         self.config.output.verify_refinement != 0.0 && !self.is_cut_short(stop_reason)
     }
 
@@ -163,5 +162,6 @@ pub(super) fn cross_check(
         elements: "edge".to_owned(),
         order: order.into(),
         ratio: best / initial,
+        by_estimate: false,
     }))
 }

@@ -72,6 +72,8 @@ pub struct Options<'a> {
     pub ranks: Option<&'a RankGroup>,
     /// Whether the user wants to stop; asked after the set-up and before each evaluation.
     pub interrupted: &'a dyn Fn() -> bool,
+    /// Shows what a search has found, which is safe then, before it is checked; where, if anywhere.
+    pub searched: &'a dyn Fn(&RunDirectory) -> Option<PathBuf>,
 }
 
 /// Optimises and writes everything into the run directory.
@@ -135,6 +137,7 @@ struct Session<'a> {
     clock: Instant,
     setup_seconds: f64,
     interrupted: &'a dyn Fn() -> bool,
+    searched: &'a dyn Fn(&RunDirectory) -> Option<PathBuf>,
 }
 
 impl Session<'_> {
@@ -309,6 +312,11 @@ impl Session<'_> {
         };
         let sizes = Sizes::of(&self.setup.problem);
         self.setup.problem.release();
+        if self.is_checked(result.stop_reason)
+            && let Some(page) = (self.searched)(&self.directory)
+        {
+            observer.note(&format!("report of the search, to be checked: {}", page.display()));
+        }
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
         let stop_reason = result.stop_reason;

@@ -72,7 +72,7 @@ impl<'a> Prepared<'a> {
         manifest: Manifest,
     ) -> Session<'a> {
         let Self { setup, config, source, facets, options, clock } = self;
-        let (setup_seconds, interrupted) = (clock.elapsed().as_secs_f64(), options.interrupted);
+        let setup_seconds = clock.elapsed().as_secs_f64();
         Session {
             command,
             config,
@@ -83,7 +83,8 @@ impl<'a> Prepared<'a> {
             manifest,
             clock,
             setup_seconds,
-            interrupted,
+            interrupted: options.interrupted,
+            searched: options.searched,
         }
     }
 }

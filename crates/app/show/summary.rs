@@ -138,14 +138,15 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         let verdict = if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
         rows.push(("tolerance", format!("{verdict} after {} refinements of the mesh", accuracy.refinements)));
     }
-    if let Some(CrossCheck { elements, order, ratio }) = &accuracy.cross_check {
-        rows.push(("F/F0 by other elements", format!("{ratio:.5} ({elements}, order {order})")));
+    if let Some(CrossCheck { elements, order, ratio, by_estimate }) = &accuracy.cross_check {
+        let source = if *by_estimate { ", by the estimate" } else { "" };
+        rows.push(("F/F0 by other elements", format!("{ratio:.5} ({elements}, order {order}{source})")));
     }
     rows.extend(accuracy.verdict.map(|verdict| {
         let style = if verdict == Verdict::Confirmed { styles.good } else { styles.bad };
         let opinions = [
             objective.verification.is_some(),
-            accuracy.cross_check.is_some(),
+            accuracy.cross_check.as_ref().is_some_and(|check| !check.by_estimate),
             accuracy.error_estimate.is_some(),
         ];
         let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;

@@ -14,7 +14,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::line_search::{self, Along};
-use crate::linear::{LinearSolverReport, PreparedSystem};
+use crate::linear::{Goal, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton_steps::{Descent, MOST_STEPS, REQUIRED, StepSystems, Verdict, failure};
 use crate::nonlinear::{self, Added};
@@ -34,13 +34,19 @@ const ENERGY_ROUNDING: f64 = 1e-13;
 /// 170, approximate Wolfe conditions).
 const ENERGY_NOISE: f64 = 1e-9;
 
-/// Relative residual [1] above which the solution for a step is refused. Iterations go on to that of the settings where rounding
-/// lets them, so that the method stays quadratic; right sides that are rounding themselves have no better solution.
+/// Relative residual [1] above which the solution for a step is refused where it should be smaller: right sides that are rounding
+/// themselves have no better solution.
 const REQUIRED_OF_A_STEP: f64 = 1e-6;
 
-/// Above which residual the solution for a step of a model is refused: looser only where its settings are.
-fn required_of_a_step(model: &FieldModel) -> f64 {
-    REQUIRED_OF_A_STEP.max(model.setup().linear_solver.required)
+/// A residual of a step's own system [1], at most: the method need not know its direction better far from the solution.
+const LOOSEST: f64 = 1e-2;
+
+/// How exact a step from a relative residual is to be: as the next residual is small, so that the method stays quadratic, and no
+/// more than the last one needs (Dembo, Eisenstat and Steihaug, SIAM J. Numer. Anal. 19 (1982) 400).
+fn goal_of_a_step(model: &FieldModel, residual: f64) -> Goal {
+    let settings = &model.setup().linear_solver;
+    let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual).max(settings.tolerance);
+    Goal { tolerance, required: tolerance.max(REQUIRED_OF_A_STEP).max(settings.required) }
 }
 
 /// Where Newton's method stands.
@@ -109,7 +115,7 @@ impl Energy<'_> {
     /// permeability, far below the largest, and creeps along the foot of a curve.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
         let mut system = systems.prepare(self.matrix.clone())?;
-        let (values, report) = system.solve_within(required_of_a_step(self.model), &self.load)?;
+        let (values, report) = system.solve_within(goal_of_a_step(self.model, 1.0), &self.load)?;
         systems.keep(system.into_field());
         let zero = self.at(vec![c64::default(); self.load.len()]);
         let found = self.search(&zero, &values);
@@ -181,7 +187,7 @@ pub(crate) fn solve(
             return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
         }
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
-        let (step, report) = system.solve_within(required_of_a_step(model), &right_side)?;
+        let (step, report) = system.solve_within(goal_of_a_step(model, residual), &right_side)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step) } else { None };
         let Some((next, length)) = found else {
@@ -238,4 +244,30 @@ fn least_settled(
         }
     }
     (worst.0, worst.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use fluxmorph_geometry::RegionId;
+    use fluxmorph_geometry::generate::Grid;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{FieldModelSetup, Material};
+
+    #[test]
+    fn a_step_is_as_exact_as_the_next_residual_is_small_and_the_last_one_needs() {
+        let line = || vec![0.0, 0.1, 0.2];
+        let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
+        let topology = grid.topology(&["air"], |_| RegionId(0)).expect("a topology");
+        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let setup = FieldModelSetup { materials: vec![Material::AIR], ..FieldModelSetup::default() };
+        let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+        let goals = [3.0, 1e-4, 1e-7, 2e-11].map(|residual| goal_of_a_step(&model, residual));
+        // Quadratic until a tenth of 1e-11 over the residual is more.
+        assert_eq!(goals.map(|goal| goal.tolerance), [1e-2, 1e-4, 1e-5, 0.05]);
+        assert!(
+            goals.iter().all(|goal| goal.required >= goal.tolerance && goal.required >= REQUIRED_OF_A_STEP)
+        );
+    }
 }

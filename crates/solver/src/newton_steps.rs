@@ -81,7 +81,14 @@ pub(crate) struct StepSystems<'a> {
 impl<'a> StepSystems<'a> {
     /// Those of a state of a model, which begin with a method; `None` is the first choice.
     pub(crate) fn new(model: &'a FieldModel, method: Option<Method>) -> Self {
-        Self { model, cache: LinearSolverCache::with_method(method), events: Vec::new() }
+        Self { model, cache: Self::first(model, method), events: Vec::new() }
+    }
+
+    /// What the first of them begins with. In statics a factor serves the tangents after its own as long as it pays; for phasors
+    /// it is applied many times a step, and every tangent has its own.
+    fn first(model: &FieldModel, method: Option<Method>) -> LinearSolverCache {
+        let cache = LinearSolverCache::with_method(method);
+        if model.angular_frequency() > 0.0 { cache } else { cache.within_a_state() }
     }
 
     /// The system of a matrix.
@@ -114,7 +121,7 @@ impl<'a> StepSystems<'a> {
         let cause =
             format!("Newton's method stays at the relative residual {residual:.1e} after {steps} steps");
         self.events.push(SolverEvent::FellBack { from, to, cause });
-        self.cache = LinearSolverCache::with_method(Some(to));
+        self.cache = Self::first(self.model, Some(to));
         true
     }
 }

@@ -53,6 +53,7 @@ fn run(directory: &Path, size: usize, task: Task) -> RunResult {
             threads: 1,
             ranks: group,
             interrupted: &interrupted,
+            searched: &|_| None,
         };
         let result = match task {
             Task::Resume => {

@@ -11,7 +11,7 @@ use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::{MeshConfig, Objective};
-use crate::files::{Accuracy, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict};
+use crate::files::{Accuracy, CrossCheck, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict};
 
 /// Title, status, what was done in a sentence, and key figures.
 pub(super) fn head(data: &RunData) -> Markup {
@@ -54,6 +54,9 @@ fn status(data: &RunData) -> (&'static str, String) {
         return (class, text.to_owned());
     };
     let reason = result.stop_reason.describe();
+    if data.manifest.status == RunStatus::Running {
+        return ("fair", format!("The search has ended: {reason}; what it found is still to be checked"));
+    }
     match result.status {
         RunStatus::Converged => ("good", format!("Converged: {reason}")),
         RunStatus::Done => ("good", "Done".to_owned()),
@@ -103,7 +106,9 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
     let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
     let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", number(objective.ratio, 4), number(bar, 1)));
     let other = accuracy.cross_check.as_ref().map(|check| {
-        format!("{} by {} elements of order {}", number(check.ratio, 4), check.elements, check.order)
+        let CrossCheck { elements, order, ratio, by_estimate } = check;
+        let source = if *by_estimate { ", by the estimate" } else { "" };
+        format!("{} by {elements} elements of order {order}{source}", number(*ratio, 4))
     });
     let refined = match (accuracy.refinements, accuracy.within_tolerance) {
         (_, None) => None,

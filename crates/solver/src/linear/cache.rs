@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 
 use super::analysis::SystemAnalysis;
 use super::cost::Ledger;
-use super::method::Method;
+use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 
 /// What the linear solver of a field model keeps from one mesh to the next.
@@ -19,6 +19,8 @@ pub struct LinearSolverCache {
     pub(super) method: Option<Method>,
     /// The solutions of the last design, in the order in which they were asked for.
     pub(super) solutions: Vec<Vec<c64>>,
+    /// Whether it is between the steps of one state, where a factor serves as long as it pays whatever the settings say.
+    pub(super) is_within_a_state: bool,
 }
 
 /// The preconditioner of another matrix of the same pattern.
@@ -35,6 +37,19 @@ impl LinearSolverCache {
         Self { method, ..Self::default() }
     }
 
+    /// The same between the steps of one state.
+    pub(crate) fn within_a_state(self) -> Self {
+        Self { is_within_a_state: true, ..self }
+    }
+
+    /// What is left of it when the state is found: what the settings keep between designs.
+    pub(super) fn between_designs(self, reuse: Reuse) -> Self {
+        match reuse {
+            Reuse::Never => Self::with_method(self.method),
+            Reuse::WhileItPays => Self { is_within_a_state: false, ..self },
+        }
+    }
+
     /// The method that worked last, where it is not the first choice.
     pub fn method(&self) -> Option<Method> {
         self.method
@@ -42,6 +57,12 @@ impl LinearSolverCache {
 
     /// What may serve the same design at another frequency: the preconditioner, as far as the patterns are the same.
     pub fn without_initial_guess(&self) -> Self {
-        Self { preconditioner: self.preconditioner.clone(), method: self.method, solutions: Vec::new() }
+        let Self { preconditioner, method, is_within_a_state, .. } = self;
+        Self {
+            preconditioner: preconditioner.clone(),
+            method: *method,
+            solutions: Vec::new(),
+            is_within_a_state: *is_within_a_state,
+        }
     }
 }

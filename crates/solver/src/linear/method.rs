@@ -1,5 +1,7 @@
 //! The methods of solution, and what may be chosen about them.
 
+use super::system::Goal;
+
 /// How to precondition the iteration, from the most exact factor to the smallest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -78,8 +80,15 @@ pub enum Reuse {
     /// As long as it costs less than a new one.
     #[default]
     WhileItPays,
-    /// Every matrix has its own, and every solution starts from zero.
+    /// Every design has its own, and every solution starts from zero.
     Never,
+}
+
+impl LinearSolverSettings {
+    /// How far solutions go.
+    pub(super) fn goal(&self) -> Goal {
+        Goal { tolerance: self.tolerance, required: self.required }
+    }
 }
 
 /// Whether the matrix is real.

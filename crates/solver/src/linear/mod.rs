@@ -33,4 +33,5 @@ pub use method::{LinearSolver, LinearSolverSettings, Method, Reuse};
 pub use prepared::PreparedSystem;
 pub(crate) use prepared::{FieldSystem, RealLinear};
 pub use report::LinearSolverReport;
+pub(crate) use system::Goal;
 pub use system::{LocalSystem, SolverEvent};

@@ -6,9 +6,9 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use super::cache::LinearSolverCache;
 use super::distributed::DistributedSystem;
-use super::method::Method;
+use super::method::{Method, Reuse};
 use super::report::LinearSolverReport;
-use super::system::{LocalSystem, SolverEvent};
+use super::system::{Goal, LocalSystem, SolverEvent};
 use crate::circuit::{Border, Excitation, Windings};
 use crate::error::SolverError;
 
@@ -111,18 +111,18 @@ impl PreparedSystem {
         self.field.events()
     }
 
-    /// Solves as [`PreparedSystem::solve`], and refuses a solution above a relative residual, not above that of the settings.
+    /// Solves as [`PreparedSystem::solve`], as far as a goal says and not the settings.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
     pub(crate) fn solve_within(
         &mut self,
-        required: f64,
+        goal: Goal,
         right_side: &[c64],
     ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        self.field.require(Some(required));
+        self.field.aim(Some(goal));
         let solved = self.solve(right_side);
-        self.field.require(None);
+        self.field.aim(None);
         solved
     }
 
@@ -136,7 +136,11 @@ impl PreparedSystem {
 
     /// What the next design may start from.
     pub fn into_cache(self) -> LinearSolverCache {
-        self.field.into_cache()
+        let reuse = match &self.field {
+            FieldSystem::Local(system) => system.reuse(),
+            FieldSystem::Distributed(_) => Reuse::Never,
+        };
+        self.field.into_cache().between_designs(reuse)
     }
 
     /// Solves `K x = b` of the field alone, with solid conductors in it: their unknowns are behind the others, and their currents
@@ -205,10 +209,10 @@ impl FieldSystem {
         }
     }
 
-    /// Refuses solutions above a relative residual; `None` is that of the settings.
-    fn require(&mut self, residual: Option<f64>) {
+    /// How far to go with the solutions to come; `None` is what the settings say.
+    fn aim(&mut self, goal: Option<Goal>) {
         if let Self::Local(system) = self {
-            system.require(residual);
+            system.aim(goal);
         }
     }
 

@@ -81,8 +81,17 @@ pub struct LocalSystem {
     before: Vec<Vec<c64>>,
     solutions: Vec<Vec<c64>>,
     events: Vec<SolverEvent>,
-    /// Relative true residual above which a solution is refused [1].
-    required: f64,
+    /// How far to go on, and what is refused.
+    goal: Goal,
+    /// Whether this is the matrix of a step towards a state, and its factor serves the next one's as long as it pays.
+    is_within_a_state: bool,
+}
+
+/// Relative true residuals [1]: the one that iterations go on to, and the one above which a solution is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Goal {
+    pub(crate) tolerance: f64,
+    pub(crate) required: f64,
 }
 
 /// How one run of iterations ended.
@@ -103,8 +112,9 @@ impl LocalSystem {
         matrix: CsrMatrix<c64>,
         cache: &mut LinearSolverCache,
     ) -> Result<Self, SolverError> {
-        let LinearSolverCache { preconditioner: cached, method, solutions: before } = std::mem::take(cache);
-        let reuse = analysis.settings.reuse == Reuse::WhileItPays;
+        let LinearSolverCache { preconditioner: cached, method, solutions: before, is_within_a_state } =
+            std::mem::take(cache);
+        let reuse = is_within_a_state || analysis.settings.reuse == Reuse::WhileItPays;
         let pays = |cached: &CachedPreconditioner| {
             let may = reuse && cached.preconditioner.method.is_complete();
             may && Arc::ptr_eq(&cached.analysis, analysis) && cached.ledger.pays()
@@ -130,7 +140,8 @@ impl LocalSystem {
             before: if reuse { before } else { Vec::new() },
             solutions: Vec::new(),
             events,
-            required: analysis.settings.required,
+            goal: analysis.settings.goal(),
+            is_within_a_state,
         })
     }
 
@@ -154,9 +165,14 @@ impl LocalSystem {
         &self.events
     }
 
-    /// Refuses solutions above a relative true residual; `None` is that of the settings.
-    pub(super) fn require(&mut self, residual: Option<f64>) {
-        self.required = residual.unwrap_or(self.analysis.settings.required);
+    /// How far to go with the solutions to come; `None` is what the settings say.
+    pub(super) fn aim(&mut self, goal: Option<Goal>) {
+        self.goal = goal.unwrap_or(self.analysis.settings.goal());
+    }
+
+    /// Whether factors serve several designs.
+    pub(super) fn reuse(&self) -> Reuse {
+        self.analysis.settings.reuse
     }
 
     /// Puts what was done in other systems first.
@@ -167,8 +183,9 @@ impl LocalSystem {
     /// What the next design may start from.
     pub fn into_cache(mut self) -> LinearSolverCache {
         let method = self.preconditioner.as_ref().map(|p| p.method).filter(|&m| m != self.analysis.method());
-        if self.analysis.settings.reuse == Reuse::Never {
-            return LinearSolverCache { method, ..LinearSolverCache::default() };
+        let is_within_a_state = self.is_within_a_state;
+        if self.reuse() == Reuse::Never && !is_within_a_state {
+            return LinearSolverCache::with_method(method);
         }
         let (iterations, solutions) = self.served;
         self.ledger.enter(iterations, solutions);
@@ -179,7 +196,8 @@ impl LocalSystem {
         };
         // The others are made for one matrix, and cheap beside their iterations.
         let kept = self.preconditioner.filter(|preconditioner| preconditioner.method.is_complete());
-        LinearSolverCache { preconditioner: kept.map(cached), method, solutions: self.solutions }
+        let (preconditioner, solutions) = (kept.map(cached), self.solutions);
+        LinearSolverCache { preconditioner, method, solutions, is_within_a_state }
     }
 
     /// Solves `K x = b`.
@@ -201,7 +219,7 @@ impl LocalSystem {
             let before = report.iterations;
             let ended = self.attempt(right_side, scale, &mut x, &mut report.iterations);
             if let Attempt::Ended(residual) = ended
-                && residual <= self.required
+                && residual <= self.goal.required
             {
                 report.residual = residual;
                 self.served.0 += report.iterations - before;
@@ -252,7 +270,7 @@ impl LocalSystem {
         });
         let affordable = (settings.most_work / preconditioner.costs.iteration) as usize;
         let most = most.min(affordable.max(1));
-        let target = settings.tolerance * scale;
+        let target = self.goal.tolerance * scale;
         let (mut done, mut residual) = (0, f64::INFINITY);
         let (mut least, mut is_slow) = (f64::INFINITY, false);
         // The residual of the recurrence drifts from the true one: restart from the true one where they part.
@@ -283,7 +301,7 @@ impl LocalSystem {
             }
             let before = residual;
             residual = self.residual(right_side, x) / scale;
-            let settled = residual <= settings.required || outcome.iterations == 0;
+            let settled = residual <= self.goal.required || outcome.iterations == 0;
             if settled || !residual.is_finite() || residual > 0.1 * before {
                 break;
             }
@@ -303,7 +321,8 @@ impl LocalSystem {
         // Without any progress by then the projection is without end.
         let total = if digits > 0.0 { (start / target).ln() / digits * count as f64 } else { f64::INFINITY };
         let of_this = (done - count) as f64 + total;
-        let solutions = self.before.len().max(USUAL_SOLUTIONS).max(self.solutions.len() + 1);
+        let usual = if self.is_within_a_state { 1 } else { USUAL_SOLUTIONS };
+        let solutions = self.before.len().max(usual).max(self.solutions.len() + 1);
         let rest = solutions - self.served.1;
         self.ledger.is_exceeded_by(self.served.0 as f64 + of_this * rest as f64, solutions)
     }
@@ -326,7 +345,7 @@ impl LocalSystem {
         let Some(to) = self.analysis.more_robust(from) else {
             let cause =
                 if residual.is_finite() { NonConvergence::IllConditioned } else { NonConvergence::Breakdown };
-            let required = self.required;
+            let required = self.goal.required;
             return Err(SolverError::NotConverged { residual, required, iterations, cause });
         };
         let cause = format!("relative residual {residual:.1e} after {iterations} iterations");
