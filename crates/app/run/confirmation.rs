@@ -1,8 +1,8 @@
 //! How exact the objective of a run or an analysis is: estimated errors, the same shapes by other elements, the verdict.
 //!
-//! A run has three second opinions: the ratio on a mesh that the optimiser never saw (`mesh_independence`), the ratio
+//! A run has second opinions: the ratio on a mesh that the optimiser never saw (`mesh_independence`), the ratio
 //! without the estimated errors, and that of other elements on the same mesh. First-order edge elements are checked by what
-//! the estimate has of second order, second-order ones by the first, nodal ones by edge elements of their order, which are
+//! the estimate has of second order, which is no third opinion, second-order ones by the first, nodal ones by edge elements of their order, which are
 //! right where these are not. None of them costs more than a few evaluations; what fails or does not fit is said, and costs
 //! the run nothing else.
 
