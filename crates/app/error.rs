@@ -15,6 +15,7 @@ use crate::run::sweep::SweepError;
 /// Errors of the program.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum Error {
     /// Problem, optimisation, field or mesh.
     #[error(transparent)]
@@ -30,73 +31,38 @@ pub enum Error {
     Output(#[from] OutputError),
     /// The file to write exists already.
     #[error("`{}` exists, and nothing was written; choose another NAME or folder, or replace it with --force", path.display())]
-    FileExists {
-        /// The file.
-        path: PathBuf,
-    },
+    FileExists { path: PathBuf },
     /// The name cannot be that of a file or cannot be used in a configuration.
     #[error(
         "`{}` cannot be the name of a configuration: expected the name of a file in UTF-8 without quotes, backslashes and \
          control characters, such as plate or devices/plate.toml",
         name.display()
     )]
-    ConfigurationName {
-        /// What was given.
-        name: PathBuf,
-    },
+    ConfigurationName { name: PathBuf },
     /// A sweep cannot be begun.
     #[error(transparent)]
     Sweep(#[from] SweepError),
     /// The gradient does not match the objective.
     #[error("the gradient certificate does not hold: {cause}")]
-    Certificate {
-        /// Which of its tests fails.
-        cause: String,
-    },
+    Certificate { cause: String },
     /// A journal belongs to another run.
     #[error("the journal `{}` is not that of this run: {cause}", path.display())]
-    OtherRun {
-        /// The journal.
-        path: PathBuf,
-        /// The first difference.
-        cause: String,
-    },
+    OtherRun { path: PathBuf, cause: String },
     /// A run directory without a run to resume.
     #[error("`{}` cannot be resumed: {cause}", path.display())]
-    NotResumable {
-        /// The directory.
-        path: PathBuf,
-        /// Why, and what to do.
-        cause: String,
-    },
+    NotResumable { path: PathBuf, cause: String },
     /// A run directory without anything to report.
     #[error("there is no report of `{}`: {cause}", path.display())]
-    NoReport {
-        /// The directory.
-        path: PathBuf,
-        /// Why, and what to do.
-        cause: String,
-    },
+    NoReport { path: PathBuf, cause: String },
     /// A rank could not write its piece of a field.
     #[error("the fields cannot be written: {cause}")]
-    Pieces {
-        /// Which rank, and why.
-        cause: RankError,
-    },
+    Pieces { cause: RankError },
     /// The ranks of a parallel program cannot work together.
     #[error("several ranks: {cause}")]
-    Ranks {
-        /// Why, and what to do.
-        cause: String,
-    },
+    Ranks { cause: String },
     /// A pool of threads cannot be created.
     #[error("cannot start {threads} threads: {cause}; give a smaller --threads")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system said.
-        cause: String,
-    },
+    Threads { threads: usize, cause: String },
 }
 
 impl Error {

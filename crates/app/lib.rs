@@ -10,7 +10,6 @@ pub mod config;
 mod error;
 mod exit_code;
 pub mod files;
-mod place;
 mod printable;
 pub mod run;
 pub mod show;

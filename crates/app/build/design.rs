@@ -3,15 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology, millimetres};
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
     default_filter_radius,
 };
 
+use super::outline::same_nodes;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
-use crate::place::millimetres;
 
 /// The design surface on the mesh with all regions.
 pub(super) fn surface(
@@ -53,7 +53,11 @@ pub(super) fn surface(
             (None, Some(radius)) => Control::Filter(radius),
             (None, None) => Control::Filter(default_filter_radius(mesh, &triangles)),
         },
-        mirrors: design.symmetry.iter().map(mirror).collect(),
+        mirrors: design
+            .symmetry
+            .iter()
+            .map(|plane| Mirror { axis: plane.axis.index(), at: plane.at })
+            .collect(),
         boundary: match design.rim {
             RimMotion::Free => BoundaryMotion::Free,
             RimMotion::Fixed => BoundaryMotion::Fixed,
@@ -102,17 +106,14 @@ pub(super) fn on_remaining(
     full_mesh: &Mesh,
     mesh: &Mesh,
 ) -> Result<DesignSurface, Error> {
-    let key = |point: [f64; 3]| point.map(f64::to_bits);
-    // Nodes keep their order where others are taken out.
-    let wanted: BTreeSet<_> = surface.nodes().iter().map(|&n| key(full_mesh.point(n))).collect();
-    let nodes: Vec<NodeId> =
-        mesh.topology().nodes().filter(|&n| wanted.contains(&key(mesh.point(n)))).collect();
+    let same = same_nodes(full_mesh, mesh);
+    let nodes: Vec<NodeId> = surface.nodes().iter().filter_map(|n| same[n.index()]).collect();
     if nodes.len() == surface.nodes().len() {
         return Ok(surface.renumbered(nodes));
     }
     let message = format!(
         "{} of {} nodes of the design surface lie inside a region that its impedance surface replaces",
-        surface.nodes().len().saturating_sub(nodes.len()),
+        surface.nodes().len() - nodes.len(),
         surface.nodes().len()
     );
     let fault = source
@@ -160,10 +161,6 @@ fn unclear_side(source: &SourceMap, mesh: &Mesh, name: &str, triangle: [NodeId; 
         "a surface with a [regions] entry on one side and air on the other, or a direction of three numbers",
     );
     source.error(vec![fault]).into()
-}
-
-fn mirror(plane: &config::SymmetryPlane) -> Mirror {
-    Mirror { axis: plane.axis.index(), at: plane.at }
 }
 
 /// The fault at the key that the surface does not fit.

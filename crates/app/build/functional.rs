@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, RegionId, Topology};
 use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
@@ -42,31 +42,23 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
     faults.extend(super::multipole::faults(config, source));
     for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_region()) {
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
-        let entry = config.regions.get(region);
-        if functional.kind == ObjectiveKind::Loss {
-            if entry.is_some_and(|entry| entry.model == RegionModel::Perfect) {
-                let message = format!("`{region}` is a perfect conductor, so it has no eddy-current loss");
-                faults.push(
-                    source
-                        .diagnostic(&format!("{path}.region"), message)
-                        .expected("a region whose material conducts, with another model"),
-                );
-            } else if material(config, region).conductivity == 0.0 {
-                let message = format!("`{region}` does not conduct, so it has no eddy-current loss");
-                faults.push(
-                    source
-                        .diagnostic(&format!("{path}.region"), message)
-                        .expected("a region whose material conducts"),
-                );
+        let model = config.regions.get(region).map(|entry| entry.model);
+        let is_loss = functional.kind == ObjectiveKind::Loss;
+        let (message, expected) = match model {
+            Some(RegionModel::Perfect) if is_loss => (
+                format!("`{region}` is a perfect conductor, so it has no eddy-current loss"),
+                "a region whose material conducts, with another model",
+            ),
+            _ if is_loss && material(config, region).conductivity == 0.0 => (
+                format!("`{region}` does not conduct, so it has no eddy-current loss"),
+                "a region whose material conducts",
+            ),
+            Some(RegionModel::Impedance | RegionModel::Perfect) if !is_loss => {
+                (format!("`{region}` is replaced by its surface"), "a region that is meshed, such as air")
             }
-        } else if entry.is_some_and(|entry| entry.model != RegionModel::Volume) {
-            let message = format!("`{region}` is replaced by its surface");
-            faults.push(
-                source
-                    .diagnostic(&format!("{path}.region"), message)
-                    .expected("a region that is meshed, such as air"),
-            );
-        }
+            _ => continue,
+        };
+        faults.push(source.diagnostic(&format!("{path}.region"), message).expected(expected));
     }
     for (k, constraint) in config.constraints.iter().enumerate() {
         let Written::Body { kind: BodyKind::Mass, region, .. } = &constraint.limit else { continue };
@@ -220,7 +212,8 @@ fn measured(
     let model = &states[taken.first().copied().unwrap_or_default()];
     let coils: Vec<&str> = functional.coils.iter().flatten().map(String::as_str).collect();
     let of_inductances = |of| Ok(Functional::of_inductances(model, &coils, of)?);
-    let at_terminals = |of| at_terminals(model, &coils, of);
+    let at_terminals =
+        |of| Ok(Functional::at_terminals(model, coils.first().copied().unwrap_or_default(), of)?);
     match functional.kind {
         ObjectiveKind::FluxDensitySquared
         | ObjectiveKind::TargetField
@@ -294,16 +287,10 @@ fn observed(functional: &config::Functional) -> Observed {
     }
 }
 
-/// A quantity of the one coil that is named.
-fn at_terminals(model: &FieldModel, coils: &[&str], of: AtTerminals) -> Result<Functional, Error> {
-    Ok(Functional::at_terminals(model, coils.first().copied().unwrap_or_default(), of)?)
-}
-
 /// The bodies whose forces are reported.
 pub(super) fn bodies(config: &Config, mesh: &Mesh, states: &[FieldModel]) -> Result<Vec<Body>, Error> {
     let of = |body: &config::ForceBody| {
-        let regions = body.regions.iter().map(|name| mesh.topology().region(name));
-        let regions = regions.collect::<Result<Vec<_>, _>>()?;
+        let regions = regions_of(body, mesh)?;
         let mut first = None;
         for model in states {
             first = first.or(Some(Body::new(model, mesh, &body.name, &regions, body.about)?));
@@ -320,9 +307,11 @@ fn force(
     model: &FieldModel,
     motion: RigidMotion,
 ) -> Result<Functional, Error> {
-    let regions = body.regions.iter().map(|name| mesh.topology().region(name));
-    let regions = regions.collect::<Result<Vec<_>, _>>()?;
-    Ok(Functional::force(model, mesh, &body.name, &regions, motion)?)
+    Ok(Functional::force(model, mesh, &body.name, &regions_of(body, mesh)?, motion)?)
+}
+
+fn regions_of(body: &config::ForceBody, mesh: &Mesh) -> Result<Vec<RegionId>, MeshError> {
+    body.regions.iter().map(|name| mesh.topology().region(name)).collect()
 }
 
 /// Elements that must not move, with the key path of the region they observe.

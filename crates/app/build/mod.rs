@@ -2,7 +2,7 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `loads` what excites them, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `probes` where nothing is measured, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod curves;
 mod design;
@@ -22,6 +22,7 @@ mod names;
 mod open;
 mod outline;
 mod plausible;
+mod probes;
 mod references;
 mod refined;
 mod shape;
@@ -47,7 +48,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_optimizer::design::DesignSurface;
@@ -58,9 +58,8 @@ use self::curves::Curves;
 use self::locate_error::DiagnosticSink;
 use self::names::{check_names, name_faults};
 use self::skin::audits;
-use crate::config::{Config, Diagnostic, SourceMap};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::place::millimetres;
 
 /// A problem, and what the user should know of it.
 #[derive(Debug)]
@@ -152,8 +151,7 @@ fn problem_on(
     let audits = audits(config, &full_mesh);
     warnings.extend(audits.iter().filter_map(Audited::warning));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
-    let mut faults = probe_faults(config, source, &full_mesh, &mesh);
-    faults.extend(open::probe_faults(config, source, &full_mesh));
+    let mut faults = probes::faults(config, source, &full_mesh, &mesh);
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
     faults.extend(elements::faults(config, source, &full_mesh, &audits));
     let mut sink = DiagnosticSink::new(config, source, faults);
@@ -278,44 +276,4 @@ pub fn variable_count(config: &Config, source: &SourceMap) -> Result<usize, Erro
     let mesh = build_mesh(config, source)?;
     source.check(name_faults(config, source, mesh.topology()))?;
     Ok(design::surface(config, source, design, &mesh)?.variable_count())
-}
-
-/// Every probe point that no element holds, before a run is spent on it.
-fn probe_faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Diagnostic> {
-    let mut faults = Vec::new();
-    let points: Vec<(usize, usize, [f64; 3])> = config
-        .probes
-        .iter()
-        .enumerate()
-        .flat_map(|(i, probe)| probe.points.iter().enumerate().map(move |(j, &point)| (i, j, point)))
-        .collect();
-    let places: Vec<[f64; 3]> = points.iter().map(|&(_, _, point)| point).collect();
-    let outside: Vec<_> = points
-        .iter()
-        .zip(locate(mesh, &places))
-        .filter(|(_, found)| found.is_none())
-        .map(|(p, _)| *p)
-        .collect();
-    let places: Vec<[f64; 3]> = outside.iter().map(|&(_, _, point)| point).collect();
-    for ((i, j, point), replaced) in outside.into_iter().zip(locate(full_mesh, &places)) {
-        let at = millimetres(point);
-        let name = &config.probes[i].name;
-        let (message, expected) = match replaced {
-            Some(_) => (
-                format!(
-                    "the point {at} of the probe `{name}` lies in a region that its impedance surface replaces"
-                ),
-                "a point in a region that is meshed".to_owned(),
-            ),
-            None => {
-                let [lower, upper] = full_mesh.bounding_box().map(millimetres);
-                (
-                    format!("the point {at} of the probe `{name}` lies outside the mesh"),
-                    format!("a point inside the mesh, which goes from {lower} to {upper}"),
-                )
-            }
-        };
-        faults.push(source.diagnostic(&format!("probes[{i}].points[{j}]"), message).expected(expected));
-    }
-    faults
 }

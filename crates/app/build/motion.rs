@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 use fluxmorph_remesh::RemeshSetup;
 
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
@@ -16,7 +16,6 @@ use crate::config::{
     Config, DesignMotion, DesignWord, Diagnostic, Morphing, PrescribedMotion, SourceMap, Target,
 };
 use crate::error::Error;
-use crate::place::millimetres;
 use crate::run::morph::path::{NodeMotion, Path, Transform};
 
 /// How far from a line, box or point of the configuration a node may lie, as a share of the mesh's diagonal:

@@ -1,7 +1,6 @@
 //! Open space of a configuration: the shell on its mesh, what must not lie in it, and what `check` says about truncation.
 
 use fluxmorph_geometry::generate::{OpenShellParameters, open_shell};
-use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::topology::Topology;
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_solver::{Boundary, OpenRegion};
@@ -9,7 +8,6 @@ use fluxmorph_solver::{Boundary, OpenRegion};
 use super::references::{functionals, surface_names};
 use crate::config::{Config, Diagnostic, ObjectiveKind, Open, SourceMap};
 use crate::error::Error;
-use crate::place::millimetres;
 
 /// The region of a shell that is put around a mesh.
 const REGION: &str = "open";
@@ -18,7 +16,7 @@ const REGION: &str = "open";
 const INFINITY: &str = "infinity";
 
 /// The name of the shell's region.
-fn region_of(open: &Open) -> &str {
+pub(super) fn region_of(open: &Open) -> &str {
     open.region.as_deref().unwrap_or(REGION)
 }
 
@@ -86,27 +84,4 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     };
     let named = surface_names(config).into_iter().filter_map(twice);
     named.chain(functionals(config).into_iter().filter_map(observed)).collect()
-}
-
-/// Probe points in the shell.
-pub(super) fn probe_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
-    let Some(shell) = config.open.as_ref().and_then(|open| mesh.topology().region(region_of(open)).ok())
-    else {
-        return Vec::new();
-    };
-    let mut faults = Vec::new();
-    for (i, probe) in config.probes.iter().enumerate() {
-        for (j, found) in locate(mesh, &probe.points).into_iter().enumerate() {
-            if found.is_some_and(|(e, _)| mesh.topology().region_of()[e.index()] == shell) {
-                let at = millimetres(probe.points[j]);
-                let message =
-                    format!("the point {at} of the probe `{}` lies in the shell of open space", probe.name);
-                let fault = source.diagnostic(&format!("probes[{i}].points[{j}]"), message);
-                faults.push(
-                    fault.expected("a point in the mesh inside the shell, whose places mean others far away"),
-                );
-            }
-        }
-    }
-    faults
 }

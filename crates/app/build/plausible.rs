@@ -4,12 +4,11 @@
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, norm, sub};
-use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
 use crate::config::{Coil, CoilShape, ConductorWord, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
-use crate::place::millimetres;
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{add, centroid, dot, sub};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::Shape;
@@ -16,7 +16,6 @@ use super::outline::same_nodes;
 use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
 use crate::error::Error;
-use crate::place::millimetres;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {

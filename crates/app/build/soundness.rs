@@ -10,12 +10,11 @@ use fluxmorph_geometry::soundness::{
 };
 use fluxmorph_geometry::tet4::{self, centroid, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
+use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology, millimetres};
 
 use super::entries::material;
 use super::open;
 use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
-use crate::place::millimetres;
 
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];

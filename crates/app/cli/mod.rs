@@ -32,7 +32,7 @@ use crate::exit_code::ExitCode;
 use crate::files::DesignFileError;
 use crate::printable::printable;
 use crate::run::launcher;
-use crate::show::{Bar, Console, Quiet, Results, RunObserver};
+use crate::show::{Amount, Bar, Console, RunObserver};
 use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
@@ -107,8 +107,8 @@ fn message(error: &Error) -> String {
 /// Who shows the progress.
 fn observer(args: &WorkArgs) -> Box<dyn RunObserver> {
     match args.progress() {
-        Progress::None if args.quiet => Box::new(Quiet::stderr()),
-        Progress::None => Box::new(Results::stderr()),
+        Progress::None if args.quiet => Box::new(Console::stderr().with(Amount::Warnings)),
+        Progress::None => Box::new(Console::stderr().with(Amount::Results)),
         Progress::Plain => Box::new(Console::stderr()),
         Progress::Auto | Progress::Bar => match Bar::stderr() {
             Some(bar) => Box::new(bar),

@@ -72,33 +72,23 @@ impl DiagnosticReport {
 /// Why a configuration could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum ConfigError {
     /// The file cannot be read.
     #[error("cannot read the configuration `{path}`: {source}; give the path of a TOML file that exists")]
-    Read {
-        /// The path as given.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// The file is one of Gmsh's.
     #[error(
         "`{path}` is a .{extension} file of Gmsh, and not a configuration; give the TOML file that names the mesh as \
          mesh.file, `fluxmorph init --template gmsh` writes one"
     )]
-    GmshFile {
-        /// The path as given.
-        path: PathBuf,
-        /// Its extension.
-        extension: String,
-    },
+    GmshFile { path: PathBuf, extension: String },
     /// The file is too large to be a configuration.
     #[error(
         "the configuration `{path}` is larger than {limit} bytes; a mesh belongs into its own file, named by \
          mesh.file"
     )]
     TooLarge {
-        /// The path as given.
         path: PathBuf,
         /// Largest size accepted [bytes].
         limit: u64,
@@ -113,12 +103,7 @@ pub enum ConfigError {
     },
     /// The file is not UTF-8.
     #[error("the configuration `{path}` is not UTF-8 text at byte {offset}; save it as UTF-8")]
-    NotText {
-        /// The path as given.
-        path: PathBuf,
-        /// First byte that is not UTF-8.
-        offset: usize,
-    },
+    NotText { path: PathBuf, offset: usize },
     /// The text is not a valid configuration.
     #[error("{0}")]
     Invalid(Box<DiagnosticReport>),

@@ -4,13 +4,13 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::open_regular;
+use fluxmorph_geometry::millimetres;
 use fluxmorph_optimizer::design::DesignSurface;
 use serde::Deserialize;
 use serde_json::Value;
 
 use super::json_place;
 use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
-use crate::place::millimetres;
 
 /// Largest design file that is read [bytes]: a million variables with their points.
 const LARGEST: u64 = 256 * 1024 * 1024;
@@ -18,25 +18,16 @@ const LARGEST: u64 = 256 * 1024 * 1024;
 /// Why a file is not a design.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum DesignFileError {
     /// The file cannot be read.
     #[error(
         "cannot read the design `{path}`: {source}; give a result.json or a JSON array of lengths in metres"
     )]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// The file holds something else.
     #[error("`{path}` is not a design: {message}; give a result.json or a JSON array of lengths in metres")]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
+    Content { path: PathBuf, message: String },
     /// The file holds something else at one place.
     #[error("{0}")]
     Fault(Box<DiagnosticReport>),
@@ -45,14 +36,7 @@ pub enum DesignFileError {
         "the design `{path}` has {found} values, but the problem has {expected} design variables; give one value [m] for \
          each, as `design.values_m` of a result.json of the same design"
     )]
-    Count {
-        /// The file.
-        path: PathBuf,
-        /// Values in the file.
-        found: usize,
-        /// Values needed.
-        expected: usize,
-    },
+    Count { path: PathBuf, found: usize, expected: usize },
     /// The design is that of another device.
     #[error(
         "the design `{path}` is that of another device: its variable {index} acts at {}, that of this configuration at {} \
@@ -61,9 +45,7 @@ pub enum DesignFileError {
         millimetres(*.found), millimetres(*.expected)
     )]
     Places {
-        /// The file.
         path: PathBuf,
-        /// The first variable that acts elsewhere.
         index: usize,
         /// Where it acts by the file [m].
         found: [f64; 3],

@@ -7,7 +7,7 @@ use fluxmorph_optimizer::driver::StopReason;
 use serde::{Deserialize, Serialize};
 
 use super::host::{hostname, utc_timestamp};
-use super::json::to_json;
+use super::json::{read_json, to_json};
 use super::{OutputError, RunDirectory};
 use crate::config::{Optimizer, SourceMap};
 
@@ -266,10 +266,7 @@ impl Manifest {
     /// # Errors
     /// When there is none, or it is none of ours.
     pub fn read(directory: &RunDirectory) -> Result<Self, OutputError> {
-        let path = directory.manifest();
-        let bytes = directory.disk().read(&path, LARGEST).map_err(OutputError::io("read", &path))?;
-        let damaged = |error: serde_json::Error| OutputError::Damaged { path, message: error.to_string() };
-        serde_json::from_slice(&bytes).map_err(damaged)
+        read_json(directory.disk(), &directory.manifest(), LARGEST)
     }
 }
 

@@ -20,7 +20,7 @@ mod run_directory;
 mod run_files;
 mod synced;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use accuracy::{Accuracy, CrossCheck, CurvedFacets, Level, SAFETY, Verdict, relative_bar};
 pub(crate) use csv::csv_text;
@@ -31,7 +31,7 @@ pub(crate) use finite::check_finite;
 pub use fluxmorph_optimizer::driver::StopReason;
 pub use history::History;
 pub use host::{hostname, peak_memory_bytes, utc_timestamp};
-pub(crate) use json::to_json;
+pub(crate) use json::{read_json, to_json};
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
 pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
@@ -49,39 +49,28 @@ pub(crate) use synced::write_whole;
 /// Why something could not be written or read back.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum OutputError {
     /// The output directory holds something that is not a run of this program.
     #[error(
         "the output directory `{path}` is not empty and holds no run of fluxmorph; nothing in it was touched: \
          choose an empty or new directory with --out or output.directory"
     )]
-    NotOurs {
-        /// The directory.
-        path: PathBuf,
-    },
+    NotOurs { path: PathBuf },
     /// The output directory holds an earlier run, which was not to be replaced.
     #[error(
         "the output directory `{path}` holds an earlier run; replace it with --force, or choose another \
          directory with --out"
     )]
-    HoldsRun {
-        /// The directory.
-        path: PathBuf,
-    },
+    HoldsRun { path: PathBuf },
     /// The output directory is something else.
     #[error(
         "the output directory `{path}` is a file or lies below one; choose a directory with --out or output.directory"
     )]
-    NotADirectory {
-        /// The path.
-        path: PathBuf,
-    },
+    NotADirectory { path: PathBuf },
     /// There is no run in a directory.
     #[error("`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into")]
-    NoRun {
-        /// The directory.
-        path: PathBuf,
-    },
+    NoRun { path: PathBuf },
     /// Another process writes into the directory.
     #[error(
         "`{path}` is written by another process of fluxmorph: wait for it or stop it; a new run may write elsewhere with \
@@ -95,39 +84,19 @@ pub enum OutputError {
     #[error(
         "`{path}` is a link, and nothing is written through links; remove it; a new run may write elsewhere with --out"
     )]
-    Linked {
-        /// The link.
-        path: PathBuf,
-    },
+    Linked { path: PathBuf },
     /// A file of a run does not hold what it should.
     #[error("`{path}` is damaged: {message}; it must be a file as fluxmorph wrote it")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        message: String,
-    },
+    Damaged { path: PathBuf, message: String },
     /// The run is one of an earlier version.
     #[error(
         "`{path}` is the journal of version {version:?} of fluxmorph in a form that this version does not read: resume with \
          the program that wrote it, or start the run again with --force"
     )]
-    OlderJournal {
-        /// The journal.
-        path: PathBuf,
-        /// The version that wrote it.
-        version: String,
-    },
+    OlderJournal { path: PathBuf, version: String },
     /// The operating system refused.
     #[error("cannot {action} `{path}`: {source}; {}", advice(.source))]
-    Io {
-        /// What was tried: a verb.
-        action: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// The cause.
-        source: std::io::Error,
-    },
+    Io { action: &'static str, path: PathBuf, source: std::io::Error },
 }
 
 /// What to do about an error of the operating system.
@@ -146,6 +115,23 @@ fn advice(error: &std::io::Error) -> &'static str {
 }
 
 impl OutputError {
+    /// Turns what is wrong with a file into [`Self::Damaged`], for `map_err`.
+    pub(crate) fn damaged<E: std::fmt::Display>(path: impl Into<PathBuf>) -> impl FnOnce(E) -> Self {
+        let path = path.into();
+        move |error| Self::Damaged { path, message: error.to_string() }
+    }
+
+    /// What was read, or `None` where there is no such file.
+    pub(crate) fn unless_missing(
+        path: &Path,
+        read: std::io::Result<Vec<u8>>,
+    ) -> Result<Option<Vec<u8>>, Self> {
+        match read {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            other => other.map(Some).map_err(Self::io("read", path)),
+        }
+    }
+
     /// Turns an error of the operating system into one that names the path, for `map_err`.
     pub(crate) fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();

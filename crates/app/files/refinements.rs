@@ -1,7 +1,5 @@
 //! `refinements.json`: how the mesh of a run with a tolerance was refined, so that it can be made again.
 
-use std::io;
-
 use fluxmorph_geometry::ElementId;
 use serde::{Deserialize, Serialize};
 
@@ -42,14 +40,10 @@ impl Refinements {
     /// [`OutputError::Damaged`], or when the operating system refuses.
     pub fn read(directory: &RunDirectory) -> Result<Self, OutputError> {
         let path = directory.refinements();
-        match directory.disk().read(&path, LARGEST) {
-            Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| {
-                let message = format!("{error} (without the file `resume` estimates the errors anew)");
-                OutputError::Damaged { path, message }
-            }),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Self::default()),
-            Err(error) => Err(OutputError::io("read", path)(error)),
-        }
+        let read = directory.disk().read(&path, LARGEST);
+        let Some(bytes) = OutputError::unless_missing(&path, read)? else { return Ok(Self::default()) };
+        let advised = |error| format!("{error} (without the file `resume` estimates the errors anew)");
+        serde_json::from_slice(&bytes).map_err(advised).map_err(OutputError::damaged(path))
     }
 
     /// The elements that were marked in the first refinements.

@@ -7,9 +7,12 @@ use fluxmorph_optimizer::driver::StopReason;
 use serde::{Deserialize, Serialize};
 
 use super::accuracy::Accuracy;
-use super::json::to_json;
+use super::json::{read_json, to_json};
 use super::manifest::RunStatus;
 use super::{OutputError, RunDirectory};
+
+/// Largest file that is read [bytes].
+const LARGEST: u64 = 1 << 30;
 
 /// The content of `result.json`. Keys carry their unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -340,6 +343,14 @@ pub struct LinearSolverResult {
 }
 
 impl RunResult {
+    /// Reads `result.json`.
+    ///
+    /// # Errors
+    /// [`OutputError::Damaged`], or when the operating system refuses.
+    pub fn read(directory: &RunDirectory) -> Result<Self, OutputError> {
+        read_json(directory.disk(), &directory.result(), LARGEST)
+    }
+
     /// Write `result.json`.
     pub fn write(&self, directory: &RunDirectory) -> Result<(), OutputError> {
         directory.write(&directory.result(), &self.to_json())

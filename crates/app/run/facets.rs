@@ -8,10 +8,9 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 use crate::files::CurvedFacets;
-use crate::place::millimetres;
 
 /// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
 /// circle, and no chamfer of 45°.

@@ -5,15 +5,14 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_geometry::{ElementId, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use crate::build::{Setup, material, result_warnings};
 use crate::config::{Config, Goal};
 use crate::files::ObjectiveResult;
-use crate::place::millimetres;
 
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
 /// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.

@@ -19,8 +19,8 @@ use crate::files::{
 use crate::run::journal::{Contents, Identity, Journal, Rest};
 use crate::show::RunObserver;
 
-/// Largest configuration and largest result that are read [bytes].
-const LARGEST: [u64; 2] = [1 << 20, 1 << 30];
+/// Largest configuration that is read [bytes].
+const LARGEST: u64 = 1 << 20;
 
 /// Limits in place of those that the run was started with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -152,22 +152,18 @@ pub(crate) fn configuration(
     manifest: &Manifest,
 ) -> Result<(Config, SourceMap), Error> {
     let path = directory.config();
-    let bytes = match directory.disk().read(&path, LARGEST[0]) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            let cause = match Journal::read(directory) {
-                Ok(None) => {
-                    "it was interrupted before its configuration was saved, and nothing is lost: start it again with --force"
-                }
-                _ => {
-                    "its config.toml is gone: restore it from the file that manifest.json names, and its evaluations are kept"
-                }
-            };
-            return Err(not_resumable(directory, cause.to_owned()));
-        }
-        other => other.map_err(OutputError::io("read", &path))?,
+    let Some(bytes) = OutputError::unless_missing(&path, directory.disk().read(&path, LARGEST))? else {
+        let cause = match Journal::read(directory) {
+            Ok(None) => {
+                "it was interrupted before its configuration was saved, and nothing is lost: start it again with --force"
+            }
+            _ => {
+                "its config.toml is gone: restore it from the file that manifest.json names, and its evaluations are kept"
+            }
+        };
+        return Err(not_resumable(directory, cause.to_owned()));
     };
-    let text = String::from_utf8(bytes)
-        .map_err(|error| OutputError::Damaged { path: path.clone(), message: error.to_string() })?;
+    let text = String::from_utf8(bytes).map_err(OutputError::damaged(&path))?;
     let given = manifest.config.as_ref().map_or("", |config| config.path.as_str());
     let stem = Path::new(given).file_stem().map_or_else(|| "run".into(), |stem| stem.to_string_lossy());
     let folder = manifest.folder.clone().unwrap_or_default();
@@ -180,8 +176,7 @@ fn finished_result(
     manifest: &Manifest,
     max_evaluations: usize,
 ) -> Option<RunResult> {
-    let bytes = directory.disk().read(&directory.result(), LARGEST[1]).ok()?;
-    let result: RunResult = serde_json::from_slice(&bytes).ok()?;
+    let result = RunResult::read(directory).ok()?;
     let may_continue = match result.stop_reason {
         StopReason::MaxEvaluations => max_evaluations > result.evaluations,
         StopReason::MaxTime => true,

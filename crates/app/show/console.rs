@@ -1,4 +1,4 @@
-//! Plain lines: one for each evaluation, and a summary.
+//! Plain lines: one for each evaluation, and a summary; or less of it.
 
 use std::io::Write;
 use std::time::Instant;
@@ -15,10 +15,22 @@ use crate::printable::printable;
 /// A stage that takes longer [s] is shown with its time, outside of evaluations: people begin to wonder then.
 const LONG_STAGE: f64 = 2.0;
 
-/// Shows one plain line for each evaluation, and a summary.
+/// How much is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Amount {
+    /// The warnings alone.
+    Warnings,
+    /// These and, in the end, the results.
+    Results,
+    /// Everything, with a line for each evaluation.
+    All,
+}
+
+/// Shows plain lines.
 #[derive(Debug)]
 pub struct Console<W> {
     writer: W,
+    amount: Amount,
     lines: Lines,
     /// The stage in hand and when it began; `None` within the evaluations of a run, which have a line each.
     stage: Option<(Stage, Instant)>,
@@ -26,17 +38,23 @@ pub struct Console<W> {
 }
 
 impl Console<std::io::Stderr> {
-    /// On standard error.
+    /// Everything, on standard error.
     pub fn stderr() -> Self {
         Self { lines: Lines::new(Styles::for_stderr(), Columns::All), ..Self::new(std::io::stderr()) }
+    }
+
+    /// So much of it.
+    #[must_use]
+    pub fn with(self, amount: Amount) -> Self {
+        Self { amount, ..self }
     }
 }
 
 impl<W: Write> Console<W> {
-    /// On any writer, without colours.
+    /// Everything, on any writer, without colours.
     pub fn new(writer: W) -> Self {
         let lines = Lines::new(Styles::default(), Columns::All);
-        Self { writer, lines, stage: None, has_evaluations: false }
+        Self { writer, amount: Amount::All, lines, stage: None, has_evaluations: false }
     }
 
     /// Shows the time of the stage in hand, if it was long.
@@ -49,15 +67,17 @@ impl<W: Write> Console<W> {
         }
     }
 
-    /// Shows a line that may have styles.
-    fn styled_line(&mut self, text: &str) {
-        show(&mut self.writer, text);
+    /// Shows lines that may have styles, where so much is shown.
+    fn styled_lines(&mut self, least: Amount, lines: &[String]) {
+        if self.amount >= least {
+            lines.iter().for_each(|line| show(&mut self.writer, line));
+        }
     }
 }
 
 impl<W: Write> Observer for Console<W> {
     fn line(&mut self, text: &str) {
-        self.styled_line(&printable(text));
+        self.styled_lines(Amount::All, &[printable(text).into_owned()]);
     }
 
     fn phase(&mut self, name: &str) {
@@ -81,12 +101,12 @@ impl<W: Write> Observer for Console<W> {
     }
 
     fn evaluation(&mut self, row: &Evaluation) {
-        self.lines.evaluation(row).iter().for_each(|line| self.styled_line(line));
+        let lines = self.lines.evaluation(row);
+        self.styled_lines(Amount::All, &lines);
     }
 
     fn warning(&mut self, message: &str) {
-        let line = self.lines.warning(message);
-        self.styled_line(&line);
+        self.styled_lines(Amount::Warnings, &[self.lines.warning(message)]);
     }
 }
 
@@ -94,12 +114,13 @@ impl<W: Write> RunObserver for Console<W> {
     fn started(&mut self, started: &Started<'_>) {
         self.end_stage();
         self.has_evaluations = started.optimizer.is_some();
-        self.lines.started(started).iter().for_each(|line| self.styled_line(line));
+        let lines = self.lines.started(started);
+        self.styled_lines(Amount::All, &lines);
     }
 
     fn finished(&mut self, result: &RunResult) {
         self.end_stage();
-        self.lines.finished(result).iter().for_each(|line| self.styled_line(line));
+        self.styled_lines(Amount::Results, &self.lines.finished(result));
     }
 }
 

@@ -1,13 +1,12 @@
 //! Who watches a run: the driver reports what happens, an observer shows it.
 //!
-//! `console` shows plain lines, `bar` a bar on a terminal with the lines above it, `quiet` warnings alone or with the results. The first two
-//! have the same `lines`: the rows (`table`) and the end (`summary`, with the flux density at the probes from `probes`).
+//! `console` shows plain lines, or warnings and results alone, `bar` a bar on a terminal with the lines above it. Both have the same
+//! `lines`: the rows (`table`) and the end (`summary`, with the flux density at the probes from `probes`).
 
 mod bar;
 mod console;
 mod lines;
 mod probes;
-mod quiet;
 pub mod report;
 mod styles;
 mod summary;
@@ -23,8 +22,7 @@ use crate::files::RunResult;
 pub use fluxmorph_optimizer::driver::{Evaluation, Observer, Silent, column};
 
 pub use bar::{Bar, clear};
-pub use console::Console;
-pub use quiet::{Quiet, Results};
+pub use console::{Amount, Console};
 pub use styles::Styles;
 
 /// What is known when a run starts.

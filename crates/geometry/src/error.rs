@@ -4,14 +4,20 @@ use std::path::PathBuf;
 
 use crate::ids::{ElementId, NodeId};
 
+/// A place [m] for messages, to a micrometre.
+pub fn millimetres([x, y, z]: [f64; 3]) -> String {
+    let round = |c: f64| (c * 1e6).round() * 1e-3 + 0.0;
+    format!("({:.3}, {:.3}, {:.3}) mm", round(x), round(y), round(z))
+}
+
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum MeshError {
     /// A node has a coordinate that is not a number or not finite.
     #[error("node {node} lies at {point:?}: every coordinate must be finite")]
     NotFinite {
-        /// The node.
         node: NodeId,
         /// Its coordinates [m].
         point: [f64; 3],
@@ -22,7 +28,6 @@ pub enum MeshError {
          positive"
     )]
     Inverted {
-        /// The element.
         element: ElementId,
         /// Its signed volume [m³].
         volume: f64,
@@ -31,20 +36,10 @@ pub enum MeshError {
     },
     /// The number of coordinates is not the number of nodes.
     #[error("{points} points for {nodes} nodes: one point a node is needed")]
-    PointCount {
-        /// Points given.
-        points: usize,
-        /// Nodes of the topology.
-        nodes: usize,
-    },
+    PointCount { points: usize, nodes: usize },
     /// A tetrahedron or surface names a node that does not exist.
     #[error("node {node} is used, but the mesh has {nodes} nodes (numbered from 0)")]
-    DanglingNode {
-        /// The node used.
-        node: NodeId,
-        /// Number of nodes.
-        nodes: usize,
-    },
+    DanglingNode { node: NodeId, nodes: usize },
     /// Three or more tetrahedra share one face.
     #[error("the face {face:?} is shared by more than two tetrahedra: the mesh overlaps itself")]
     OverfullFace {
@@ -55,126 +50,54 @@ pub enum MeshError {
     #[error(
         "the elements {} and {} lie on the same side of their common face: the mesh is folded there", elements[0], elements[1]
     )]
-    Folded {
-        /// The two.
-        elements: [ElementId; 2],
-    },
+    Folded { elements: [ElementId; 2] },
     /// A region name that the mesh does not have.
     #[error("there is no region `{name}`; the mesh has: {known}")]
-    UnknownRegion {
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
+    UnknownRegion { name: String, known: String },
     /// A surface name that the mesh does not have.
     #[error("there is no surface `{name}`; the mesh has: {known}")]
-    UnknownSurface {
-        /// The name asked for.
-        name: String,
-        /// The names there are.
-        known: String,
-    },
+    UnknownSurface { name: String, known: String },
     /// A parameter of a generator is out of range.
     #[error("{parameter} = {value}: {expected}")]
     Parameter {
         /// Generator and parameter, with a dot between them.
         parameter: &'static str,
-        /// The value given.
         value: String,
-        /// What is expected, and what to do.
         expected: String,
     },
     /// A node with more elements than any mesh of a device has.
     #[error("node {} belongs to {tets} tetrahedra; at most {most} may meet at one: the mesh is corrupt or needs remeshing there", node.0)]
-    CrowdedNode {
-        /// The node.
-        node: NodeId,
-        /// Tetrahedra around it.
-        tets: usize,
-        /// Most there may be.
-        most: usize,
-    },
+    CrowdedNode { node: NodeId, tets: usize, most: usize },
     /// A refinement would pass a limit.
     #[error("a finer mesh would have more than {most} {what}: it is refined as far as it may be")]
-    RefinementLimit {
-        /// What there would be too many of.
-        what: &'static str,
-        /// Most there may be.
-        most: usize,
-    },
+    RefinementLimit { what: &'static str, most: usize },
     /// A sparse factorisation failed.
     #[error("the sparse factorisation of {unknowns} unknowns failed: {cause}")]
-    Factorisation {
-        /// Size of the matrix.
-        unknowns: usize,
-        /// What the library said.
-        cause: String,
-    },
+    Factorisation { unknowns: usize, cause: String },
     /// A mesh cannot be distributed over so many ranks.
     #[error(
         "{ranks} ranks cannot share a mesh of {nodes} nodes, since every rank owns at least one: take 1 to {nodes} ranks"
     )]
-    Ranks {
-        /// Ranks asked for.
-        ranks: usize,
-        /// Nodes of the mesh.
-        nodes: usize,
-    },
+    Ranks { ranks: usize, nodes: usize },
     /// A value to be written is not finite.
     #[error("the array `{array}` holds {value} at position {position}: only finite values are written")]
-    NotFiniteArray {
-        /// Name of the array.
-        array: String,
-        /// The value.
-        value: f64,
-        /// Its position.
-        position: usize,
-    },
+    NotFiniteArray { array: String, value: f64, position: usize },
     /// An array has not one value a node or an element.
     #[error("the array `{array}` has {length} values where {expected} are needed")]
-    ArrayLength {
-        /// Name of the array.
-        array: String,
-        /// Its length.
-        length: usize,
-        /// Number of nodes or elements.
-        expected: usize,
-    },
+    ArrayLength { array: String, length: usize, expected: usize },
     /// A VTU file could not be made or understood.
     #[error("VTU file: {cause}")]
-    Vtu {
-        /// What is wrong.
-        cause: String,
-    },
+    Vtu { cause: String },
     /// A Gmsh file is refused.
     #[error("{}, {cause}", path.display())]
-    Msh {
-        /// The file.
-        path: PathBuf,
-        /// Place and fault.
-        cause: Box<crate::io::MshError>,
-    },
+    Msh { path: PathBuf, cause: Box<crate::io::MshError> },
     /// The name of a region or surface cannot stand in a mesh file.
     #[error("the name `{}` {problem}, and cannot stand in a mesh file: give it another name", name.escape_debug())]
-    Name {
-        /// The name.
-        name: String,
-        /// What is wrong with it.
-        problem: &'static str,
-    },
+    Name { name: String, problem: &'static str },
     /// Two regions, or a region and the outside, do not touch.
     #[error("the regions of `{name}` have no face in common")]
-    NoInterface {
-        /// The two names with a bar between them.
-        name: String,
-    },
+    NoInterface { name: String },
     /// Reading or writing a file failed.
     #[error("{}: {cause}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What went wrong.
-        cause: std::io::Error,
-    },
+    File { path: PathBuf, cause: std::io::Error },
 }

@@ -27,7 +27,7 @@ pub mod soundness;
 pub mod tet4;
 pub mod topology;
 
-pub use error::MeshError;
+pub use error::{MeshError, millimetres};
 pub use ids::{CarrierId, ElementId, NodeId, RegionId};
 pub use mesh::Mesh;
 pub use parallel::Partition;

@@ -10,6 +10,7 @@ use crate::geometric::GeometricError;
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum Error {
     /// The mesh is wrong.
     #[error(transparent)]
@@ -22,7 +23,6 @@ pub enum Error {
     Field {
         /// Which one: of the state or an adjoint, at which frequency.
         problem: String,
-        /// Why.
         cause: Box<SolverError>,
     },
     /// A computed quantity is not finite, or not what the computation needs.
@@ -30,9 +30,7 @@ pub enum Error {
     NotFinite {
         /// What, of which state, region, term or variable.
         what: String,
-        /// Its value.
         value: f64,
-        /// What is needed, and what to do.
         expected: &'static str,
     },
     /// The mesh cannot follow the design.
@@ -46,26 +44,18 @@ pub enum Error {
     SurfaceMismatch(#[from] SurfaceMismatch),
     /// The optimisation method refuses or fails.
     #[error("the optimisation failed: {cause}")]
-    Optimisation {
-        /// What it said.
-        cause: &'static str,
-    },
+    Optimisation { cause: &'static str },
     /// The mesh of the first design is refused.
     #[error(
         "the first design has no mesh to compute on: {cause}; start from another design, or loosen the limit named"
     )]
-    FirstDesign {
-        /// Why.
-        cause: String,
-    },
+    FirstDesign { cause: String },
     /// A constraint that cannot be what the configuration says.
     #[error("the constraint `{name}` has the value {value:e} at the initial design: expected {expected}")]
     Constraint {
-        /// Its name.
         name: String,
         /// Its value, in SI.
         value: f64,
-        /// What is needed, and what to do.
         expected: &'static str,
     },
     /// The run does not repeat what its journal says.
@@ -73,12 +63,7 @@ pub enum Error {
         "evaluation {evaluation} of the journal does not answer what the optimisation asks for: {cause}; resume with \
          the program and on the processor that started the run, or start it again"
     )]
-    Replay {
-        /// The evaluation.
-        evaluation: usize,
-        /// What differs.
-        cause: String,
-    },
+    Replay { evaluation: usize, cause: String },
     /// A signal came before there was anything to keep.
     #[error("interrupted before there was anything to keep")]
     Interrupted,

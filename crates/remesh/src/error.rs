@@ -1,11 +1,12 @@
 //! What can be wrong with a remesh region or with a motion of it.
 
 use fluxmorph_geometry::parallel::RankError;
-use fluxmorph_geometry::{ElementId, MeshError, NodeId};
+use fluxmorph_geometry::{ElementId, MeshError, NodeId, millimetres};
 
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum RemeshError {
     /// A rank could not do its share.
     #[error(transparent)]
@@ -17,71 +18,36 @@ pub enum RemeshError {
     #[error(
         "element {element} lies in the remesh subregions `{first}` and `{second}`: they must not overlap"
     )]
-    Overlap {
-        /// The element.
-        element: ElementId,
-        /// The subregion that has it first.
-        first: String,
-        /// The other one.
-        second: String,
-    },
+    Overlap { element: ElementId, first: String, second: String },
     /// A subregion names an element that the mesh does not have.
     #[error(
         "the remesh subregion `{subregion}` names element {element}, but the mesh has {elements} elements"
     )]
-    DanglingElement {
-        /// The subregion.
-        subregion: String,
-        /// The element named.
-        element: ElementId,
-        /// Elements of the mesh.
-        elements: usize,
-    },
+    DanglingElement { subregion: String, element: ElementId, elements: usize },
     /// A surface or node list of the set-up names a node that the mesh does not have.
     #[error("{list} names node {node}, but the mesh has {nodes} nodes")]
-    DanglingNode {
-        /// Which list.
-        list: String,
-        /// The node named.
-        node: NodeId,
-        /// Nodes of the mesh.
-        nodes: usize,
-    },
+    DanglingNode { list: String, node: NodeId, nodes: usize },
     /// A parameter of a subregion is out of range.
     #[error("{parameter} = {value} of the remesh subregion `{subregion}`: {expected}")]
-    Parameter {
-        /// The subregion.
-        subregion: String,
-        /// Name of the parameter.
-        parameter: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range expected.
-        expected: &'static str,
-    },
+    Parameter { subregion: String, parameter: &'static str, value: f64, expected: &'static str },
     /// A design node is no node of the remesh region.
     #[error(
         "design node {node} at {point:?} m is not in the remesh region: enlarge the region so that it holds the \
          elements around every design node"
     )]
     DesignNodeOutside {
-        /// The node.
         node: NodeId,
         /// Where it lies [m].
         point: [f64; 3],
     },
     /// A design node is listed twice.
     #[error("design node {node} is listed twice: a node has one displacement")]
-    RepeatedDesignNode {
-        /// The node.
-        node: NodeId,
-    },
+    RepeatedDesignNode { node: NodeId },
     /// A surface with a boundary kind does not touch the remesh region.
     #[error(
         "no triangle of the surface `{surface}` ({kind}) is a face of the remesh region: drop it from the list"
     )]
     SurfaceElsewhere {
-        /// The surface.
         surface: String,
         /// Its kind: design, fixed, slide or free.
         kind: &'static str,
@@ -92,11 +58,9 @@ pub enum RemeshError {
          faces normal to x, y or z may slide; list it as fixed or free"
     )]
     SlideNormal {
-        /// The surface.
         surface: String,
         /// Centroid of the triangle [m].
         centroid: [f64; 3],
-        /// Its unit normal.
         normal: [f64; 3],
     },
     /// A part of the remesh region can move as a rigid body.
@@ -110,14 +74,12 @@ pub enum RemeshError {
     },
     /// A motion inverts an element.
     #[error(
-        "the motion inverts element {element} of region `{region}` at ({:.3}, {:.3}, {:.3}) mm: only {fraction:.4} of \
+        "the motion inverts element {element} of region `{region}` at {}: only {fraction:.4} of \
          it can be taken; move less, enlarge the remesh region or change its stiffness",
-        centroid[0] * 1e3, centroid[1] * 1e3, centroid[2] * 1e3
+        millimetres(*centroid)
     )]
     Inverted {
-        /// The first element to invert along the motion.
         element: ElementId,
-        /// Its region.
         region: String,
         /// Its centroid before the motion [m].
         centroid: [f64; 3],
@@ -130,36 +92,19 @@ pub enum RemeshError {
          {iterations} iterations, required {tolerance:.0e}; bring the stiffness and the shapes of the remesh region's \
          elements closer together"
     )]
-    NotConverged {
-        /// Size of the system.
-        unknowns: usize,
-        /// Iterations made.
-        iterations: usize,
-        /// Relative residual reached.
-        residual: f64,
-        /// What it should be.
-        tolerance: f64,
-    },
+    NotConverged { unknowns: usize, iterations: usize, residual: f64, tolerance: f64 },
     /// The law of motion has found no equilibrium.
     #[error(
         "the mesh motion did not come to rest in {steps} Newton steps: the displacements, or the stiffnesses of the remesh \
          region, span more than numbers hold; check units, bounds and the stiffness policy"
     )]
-    NotSettled {
-        /// Steps taken.
-        steps: usize,
-    },
+    NotSettled { steps: usize },
     /// The elastic system gives something that is no number.
     #[error(
         "the elastic system gives a {what} of {value}: the displacements, or the stiffnesses of the remesh region, span \
          more than numbers hold; check units, bounds and the stiffness policy"
     )]
-    NotFinite {
-        /// What was solved for.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    NotFinite { what: &'static str, value: f64 },
     /// The mesh or the linear algebra failed.
     #[error(transparent)]
     Mesh(#[from] MeshError),

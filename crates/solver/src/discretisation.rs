@@ -170,13 +170,9 @@ impl Discretisation {
         let conductors = weak_form.conductors();
         if self.space.family() == ElementFamily::Edge {
             if self.space.order() == Order::Linear {
-                return Err(SolverError::Parameter {
-                    what: "linear_solver.method".to_owned(),
-                    value: "two_level".to_owned(),
-                    expected:
-                        "a factor, or an incomplete one: first-order edge elements have no coarse level"
-                            .to_owned(),
-                });
+                let expected =
+                    "a factor, or an incomplete one: first-order edge elements have no coarse level";
+                return Err(SolverError::parameter("linear_solver.method", "two_level", expected));
             }
             let edges = Space::new(mesh.topology(), ElementFamily::Edge, Order::Linear);
             let coarse = Unknowns::new(mesh, &edges, &conductors, boundaries)?;

@@ -1,13 +1,14 @@
 //! What can go wrong in a field analysis.
 
-use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::parallel::RankError;
+use fluxmorph_geometry::{MeshError, millimetres};
 
 use crate::coil::{PlaneFault, RegionFault};
 
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum SolverError {
     /// The mesh or the sparse kernel refused.
     #[error(transparent)]
@@ -17,31 +18,23 @@ pub enum SolverError {
     Rank(#[from] RankError),
     /// A parameter of the model is out of range.
     #[error("{what} = {value}: {expected}")]
-    Parameter {
-        /// What was given.
-        what: String,
-        /// Its value.
-        value: String,
-        /// The range, and what to do.
-        expected: String,
-    },
+    Parameter { what: String, value: String, expected: String },
     /// One face with two conditions.
     #[error(
-        "the surfaces `{}` and `{}` share the face at ({:.3}, {:.3}, {:.3}) mm, with different conditions: a face takes \
+        "the surfaces `{}` and `{}` share the face at {}, with different conditions: a face takes \
          one; take it out of one of them",
-        surfaces[0], surfaces[1], place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        surfaces[0], surfaces[1], millimetres(*place)
     )]
     TwoConditions {
-        /// Names of the surfaces.
         surfaces: [String; 2],
         /// Centroid of the face [m].
         place: [f64; 3],
     },
     /// An applied field and another condition contradict each other.
     #[error(
-        "at ({:.3}, {:.3}, {:.3}) mm the applied field contradicts another condition: a flux-parallel plane must be parallel \
+        "at {} the applied field contradicts another condition: a flux-parallel plane must be parallel \
          to the field and hold the field's center, a flux-normal one at right angles to it",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     Conflict {
         /// A node at which both are asked [m].
@@ -49,74 +42,56 @@ pub enum SolverError {
     },
     /// Two applied fields that contradict each other.
     #[error(
-        "the surfaces `{}` and `{}` meet at ({:.3}, {:.3}, {:.3}) mm with different applied fields: one field is there. Apply \
+        "the surfaces `{}` and `{}` meet at {} with different applied fields: one field is there. Apply \
          one field to both, or leave one of them flux-parallel",
-        surfaces[0], surfaces[1], place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        surfaces[0], surfaces[1], millimetres(*place)
     )]
     TwoFields {
-        /// Names of the surfaces.
         surfaces: [String; 2],
         /// The middle of an edge that they share [m].
         place: [f64; 3],
     },
     /// A perfect conductor on a surface with an applied field.
     #[error(
-        "the perfect conductor `{conductor}` touches the surface `{surface}` of the applied field at ({:.3}, {:.3}, {:.3}) mm: \
+        "the perfect conductor `{conductor}` touches the surface `{surface}` of the applied field at {}: \
          no flux enters it, but the applied field does. Keep the conductor away from that surface",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     FieldOnConductor {
-        /// Name of the conductor.
         conductor: String,
-        /// Name of the surface.
         surface: String,
         /// The middle of an edge that they share [m].
         place: [f64; 3],
     },
     /// An analytic coil that meets no element.
     #[error("no current flows: {cause}")]
-    NoSource {
-        /// The coil's name.
-        coil: String,
-        /// Why, and what to do.
-        cause: String,
-    },
+    NoSource { coil: String, cause: String },
     /// A coil's window or winding meets a face on which its source would be wrong.
     #[error(
-        "the coil `{coil}` or its window meets {surface} at ({:.3}, {:.3}, {:.3}) mm: {reason}",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        "the coil `{coil}` or its window meets {surface} at {}: {reason}",
+        millimetres(*place)
     )]
     SourceOnBoundary {
-        /// Name of the coil.
         coil: String,
-        /// Which face.
         surface: String,
         /// Where [m].
         place: [f64; 3],
-        /// Why, and what to do.
         reason: PlaneFault,
     },
     /// No current can be made in a coil's region.
     #[error("the region of the coil `{coil}`: {fault}")]
-    CoilRegion {
-        /// Name of the coil.
-        coil: String,
-        /// Why, and what to do.
-        fault: RegionFault,
-    },
+    CoilRegion { coil: String, fault: RegionFault },
     /// A region that cannot stand for open space.
     #[error(
-        "the region `{region}` cannot be open space: at ({:.3}, {:.3}, {:.3}) mm {what}; a shell lies between two closed \
+        "the region `{region}` cannot be open space: at {} {what}; a shell lies between two closed \
          surfaces, or their parts between symmetry planes through the centre, of which every ray from the centre meets \
          each once",
-        at[0] * 1e3, at[1] * 1e3, at[2] * 1e3
+        millimetres(*at)
     )]
     Open {
-        /// Name of the region.
         region: String,
         /// Where [m].
         at: [f64; 3],
-        /// What is wrong there.
         what: String,
     },
     /// What open space cannot hold.
@@ -124,20 +99,10 @@ pub enum SolverError {
         "the open region `{region}` holds {what}; there is air alone, and a field that vanishes at infinity: matter and coils \
          with their windows belong inside"
     )]
-    OpenContents {
-        /// Name of the region.
-        region: String,
-        /// What is there.
-        what: &'static str,
-    },
+    OpenContents { region: String, what: &'static str },
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]
-    EmptyRegion {
-        /// Name of the region.
-        region: String,
-        /// What needs it.
-        expected: &'static str,
-    },
+    EmptyRegion { region: String, expected: &'static str },
     /// The iteration did not reach its residual.
     #[error(
         "the linear solver stopped at the relative residual {residual:e} after {iterations} iterations, not at the \
@@ -146,27 +111,21 @@ pub enum SolverError {
     NotConverged {
         /// True relative residual `|b − Ku|/|b|`.
         residual: f64,
-        /// The residual required.
         required: f64,
-        /// Iterations done.
         iterations: usize,
-        /// What it looks like.
         cause: NonConvergence,
     },
     /// The layer around a body on which a force is sought is not free.
     #[error(
-        "the force on `{body}` is taken in the layer of elements around it, which meets {what} in `{region}` at ({:.3}, \
-         {:.3}, {:.3}) mm: a body needs a layer of air around it; add what it touches to its regions",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        "the force on `{body}` is taken in the layer of elements around it, which meets {what} in `{region}` at {}: \
+         a body needs a layer of air around it; add what it touches to its regions",
+        millimetres(*place)
     )]
     Layer {
-        /// Name of the body.
         body: String,
-        /// The region that the layer meets.
         region: String,
         /// Where [m].
         place: [f64; 3],
-        /// What is there.
         what: &'static str,
     },
     /// A B–H law where the problem is shared out among ranks.
@@ -174,66 +133,48 @@ pub enum SolverError {
         "the region `{region}` has a B–H curve, which is solved for in one process: start the program without `mpirun`, or give \
          the material a relative_permeability"
     )]
-    CurveOnRanks {
-        /// Name of a region with a law.
-        region: String,
-    },
+    CurveOnRanks { region: String },
     /// A solid conductor above 0 Hz where the problem is shared out among ranks.
     #[error(
         "the coil `{coil}` is a solid conductor, whose current above 0 Hz is solved for in one process: start the program without \
          `mpirun`, or make it of strands"
     )]
-    SolidOnRanks {
-        /// Name of the coil.
-        coil: String,
-    },
+    SolidOnRanks { coil: String },
     /// Newton's method did not reach its residual.
     #[error(
         "Newton's method stopped after {steps} steps at the relative residual {residual:.1e}; least settled is the region \
-         `{region}` at ({:.3}, {:.3}, {:.3}) mm with |B| = {flux_density:.3} T: {failure}",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+         `{region}` at {} with |B| = {flux_density:.3} T: {failure}",
+        millimetres(*place)
     )]
     Newton {
-        /// Steps done.
         steps: usize,
         /// `|residual| / |load|`.
         residual: f64,
-        /// Name of the region whose field changes most.
         region: String,
         /// Where [m].
         place: [f64; 3],
         /// `|B|` there [T].
         flux_density: f64,
-        /// What it looks like.
         failure: NewtonFailure,
     },
     /// A field or objective that is not a finite number.
     #[error("the {what} is {value}: the field problem has no usable solution")]
-    NotFinite {
-        /// Which quantity.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    NotFinite { what: &'static str, value: f64 },
     /// A right side whose norm cannot be computed.
     #[error(
         "the largest entry of the right side is {largest:e}: its products in the iteration leave the range of \
          numbers; check currents, remanence, prescribed fields, weights and units"
     )]
-    OutOfRange {
-        /// Largest modulus of its entries.
-        largest: f64,
-    },
+    OutOfRange { largest: f64 },
     /// Something that moves has reached a place at which the field is observed.
     #[error(
-        "the observed place ({:.3}, {:.3}, {:.3}) mm would lie in {by}: a place that stays is of use where the body does not come; \
+        "the observed place {} would lie in {by}: a place that stays is of use where the body does not come; \
          narrow the bounds of the design, or observe another region",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     Covered {
         /// The place [m].
         place: [f64; 3],
-        /// What is there.
         by: String,
     },
     /// A probe lies outside the mesh.
@@ -241,7 +182,6 @@ pub enum SolverError {
         "point {point:?} m of the probe `{probe}` lies outside the mesh, whose box is {lower:?} to {upper:?} m"
     )]
     ProbeOutside {
-        /// Name of the probe.
         probe: String,
         /// The point [m].
         point: [f64; 3],
@@ -250,6 +190,13 @@ pub enum SolverError {
         /// Upper corner [m].
         upper: [f64; 3],
     },
+}
+
+impl SolverError {
+    /// [`SolverError::Parameter`] of these texts.
+    pub(crate) fn parameter(what: impl Into<String>, value: impl ToString, expected: &str) -> Self {
+        Self::Parameter { what: what.into(), value: value.to_string(), expected: expected.to_owned() }
+    }
 }
 
 /// What a linear system that is not solved looks like, and what may help.

@@ -100,13 +100,7 @@ pub(crate) fn check_coils(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), So
 
 /// Refuses numbers out of range, and applied fields that cannot be.
 pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let refuse = |what: &str, value: f64, expected: &str| {
-        Err(SolverError::Parameter {
-            what: what.to_owned(),
-            value: value.to_string(),
-            expected: expected.to_owned(),
-        })
-    };
+    let refuse = |what: &str, value: f64, expected: &str| Err(SolverError::parameter(what, value, expected));
     if !(setup.frequency >= 0.0 && setup.frequency.is_finite()) {
         return refuse("frequency", setup.frequency, "a frequency in hertz, zero or more");
     }
@@ -153,11 +147,11 @@ fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
     let coil = &setup.coils[coil].name;
     if setup.bh.iter().any(Option::is_some) {
         let expected = "materials with a permeability: above 0 Hz a circuit is solved with linear materials";
-        return Err(SolverError::Parameter {
-            what: "bh".to_owned(),
-            value: format!("a curve beside the solid conductor `{coil}`"),
-            expected: expected.to_owned(),
-        });
+        return Err(SolverError::parameter(
+            "bh",
+            format!("a curve beside the solid conductor `{coil}`"),
+            expected,
+        ));
     }
     if setup.ownership.is_some() {
         return Err(SolverError::SolidOnRanks { coil: coil.clone() });
@@ -167,9 +161,8 @@ fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
 
 /// Refuses B–H laws where they have no meaning.
 fn check_laws(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let refuse = |what: &str, value: String, expected: &str| {
-        Err(SolverError::Parameter { what: what.to_owned(), value, expected: expected.to_owned() })
-    };
+    let refuse =
+        |what: &str, value: String, expected: &str| Err(SolverError::parameter(what, value, expected));
     let has_law = |r: usize| setup.bh.get(r).is_some_and(Option::is_some);
     if setup.bh.len() > setup.materials.len() {
         return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");

@@ -209,12 +209,10 @@ fn coefficient(
     material: &Material,
     angular_frequency: f64,
 ) -> Result<c64, SolverError> {
-    let skin_depth = material.skin_depth(angular_frequency).ok_or_else(|| SolverError::Parameter {
-        what: format!("model of `{}`", conductor.name),
-        value: "impedance".to_owned(),
-        expected:
-            "an impedance surface needs a conductivity and a frequency above zero; use model = \"volume\""
-                .to_owned(),
+    let skin_depth = material.skin_depth(angular_frequency).ok_or_else(|| {
+        let expected =
+            "an impedance surface needs a conductivity and a frequency above zero; use model = \"volume\"";
+        SolverError::parameter(format!("model of `{}`", conductor.name), "impedance", expected)
     })?;
     Ok(impedance::surface_coefficient(angular_frequency, material.conductivity, skin_depth))
 }

@@ -138,13 +138,9 @@ impl Unknowns {
         let covered = conductors.surface.iter().map(|&triangle| face_key(triangle)).collect();
         let at_nodes = conditions(mesh, space, boundaries, &covered)?;
         if at_nodes.is_empty() && conductors.grounded.is_empty() && !conductors.surface.is_empty() {
-            return Err(SolverError::Parameter {
-                what: "boundaries".to_owned(),
-                value: "none".to_owned(),
-                expected: "a condition on an outer surface, or elements = \"edge\": a surface with sharp edges leaves \
-                           the potential of nodal elements open by a constant"
-                    .to_owned(),
-            });
+            let expected = "a condition on an outer surface, or elements = \"edge\": a surface with sharp edges leaves \
+                            the potential of nodal elements open by a constant";
+            return Err(SolverError::parameter("boundaries", "none", expected));
         }
         let potentials = at_nodes.values().filter_map(|at| at.potential).map(norm);
         let tolerance = CONFLICT * potentials.fold(0.0, f64::max);

@@ -61,18 +61,14 @@ impl Rest {
 /// Why bytes are no journal.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum JournalError {
     /// The file begins otherwise.
     #[error("it does not begin as a journal of fluxmorph does")]
     NotAJournal,
     /// The form is that of another program version.
     #[error("its form has the version {found}, expected {expected}")]
-    Form {
-        /// Version in the file.
-        found: u32,
-        /// Version that is read.
-        expected: u32,
-    },
+    Form { found: u32, expected: u32 },
     /// The header is damaged.
     #[error("its header is damaged")]
     Header,
@@ -108,20 +104,12 @@ impl Journal {
     /// refuses.
     pub fn read(directory: &RunDirectory) -> Result<Option<Contents>, OutputError> {
         let path = directory.journal();
-        match directory.disk().read(&path, LARGEST) {
-            Ok(bytes) => match parse(&bytes) {
-                Ok(contents) => Ok(Some(contents)),
-                Err(error) => {
-                    let message =
-                        format!("{error} (without the file `resume` computes all evaluations anew)");
-                    Err(OutputError::Damaged { path, message })
-                }
-            },
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                directory.refuse_older_journal().map(|()| None)
-            }
-            Err(error) => Err(OutputError::io("read", path)(error)),
-        }
+        let read = directory.disk().read(&path, LARGEST);
+        let Some(bytes) = OutputError::unless_missing(&path, read)? else {
+            return directory.refuse_older_journal().map(|()| None);
+        };
+        let advised = |error| format!("{error} (without the file `resume` computes all evaluations anew)");
+        parse(&bytes).map(Some).map_err(advised).map_err(OutputError::damaged(path))
     }
 
     /// The evaluations in the journal of a run directory, for a look at them: one that is being written, or was cut short, is

@@ -9,32 +9,26 @@ use crate::exit_code::ExitCode;
 /// Why a sweep is not begun. Nothing has been run or replaced then.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum SweepError {
     /// A list of values has a gap.
     #[error(
         "--set {key}: the value number {number} is empty; take the comma away, or write \"\" for an empty text"
     )]
     EmptyValue {
-        /// The key.
         key: String,
         /// Which value, from 1.
         number: usize,
     },
     /// A key has two lists of values.
     #[error("--set {key} is given twice; write all its values into one, separated by commas")]
-    KeyTwice {
-        /// The key.
-        key: String,
-    },
+    KeyTwice { key: String },
     /// The directories of the runs are not the configuration's business.
     #[error(
         "--set output.directory has {values} values, but the sweep names the directories of its runs itself; give one \
          directory for all with --out"
     )]
-    Directories {
-        /// How many values.
-        values: usize,
-    },
+    Directories { values: usize },
     /// The product is too large.
     #[error(
         "the values make {count} combinations: expected at most {MOST_COMBINATIONS}; give fewer values, or several sweeps"
@@ -48,20 +42,13 @@ pub enum SweepError {
         "the combinations `{first}` and `{second}` are the same configuration; give every value once, and only keys that \
          change something"
     )]
-    Same {
-        /// The earlier one.
-        first: String,
-        /// The later one.
-        second: String,
-    },
+    Same { first: String, second: String },
     /// Some configurations are wrong.
     #[error(
         "{faulty} of {of} combinations cannot be read, and nothing was run: correct the configuration or the values of --set"
     )]
     Faults {
-        /// How many.
         faulty: usize,
-        /// Of how many.
         of: usize,
         /// Combinations with faults that none before them has, by name; not more than are worth reading.
         reports: Vec<(String, ConfigError)>,
@@ -71,68 +58,39 @@ pub enum SweepError {
         "`{}` is not empty and holds no sweep; nothing in it was touched: choose an empty or new directory with --out",
         path.display()
     )]
-    NotASweep {
-        /// The directory.
-        path: PathBuf,
-    },
+    NotASweep { path: PathBuf },
     /// The directory holds a sweep over other keys or values.
     #[error(
         "`{}` holds another sweep: {cause}; give the same keys with at least the same values, choose another directory with \
          --out, or describe the directory anew with --force",
         path.display()
     )]
-    OtherSweep {
-        /// The directory.
-        path: PathBuf,
-        /// In what it differs.
-        cause: String,
-    },
+    OtherSweep { path: PathBuf, cause: String },
     /// A run directory holds something that the combination is not.
     #[error(
         "`{}` holds another run: {cause}; choose another directory with --out, or replace such runs with --force",
         path.display()
     )]
-    OtherRun {
-        /// The run directory.
-        path: PathBuf,
-        /// In what it differs.
-        cause: String,
-    },
+    OtherRun { path: PathBuf, cause: String },
     /// `--only` names no combination.
     #[error("--only {index}: the sweep has {count} combinations, counted from 0")]
-    NoSuch {
-        /// What was asked for.
-        index: usize,
-        /// How many there are.
-        count: usize,
-    },
+    NoSuch { index: usize, count: usize },
     /// `--only` or `--compare` without a sweep that was laid out, or after a change.
     #[error(
         "`{}` is not the directory of this sweep: {cause}; give the same command without --only and --compare to run it here, \
          with --script to lay it out",
         path.display()
     )]
-    NotLaidOut {
-        /// The directory.
-        path: PathBuf,
-        /// What is missing or differs.
-        cause: String,
-    },
+    NotLaidOut { path: PathBuf, cause: String },
     /// A file exists in the place of the script.
     #[error(
         "`{}` exists and is no script of a sweep; choose another name, or replace it with --force",
         path.display()
     )]
-    ScriptExists {
-        /// The file.
-        path: PathBuf,
-    },
+    ScriptExists { path: PathBuf },
     /// The program does not know where it is.
     #[error("cannot find the program itself: {source}; call it by its whole path")]
-    Program {
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Program { source: std::io::Error },
 }
 
 impl SweepError {

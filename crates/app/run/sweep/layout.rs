@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
 use crate::files::{
-    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, shell_word, to_json, write_whole,
+    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, read_json, shell_word, to_json,
+    write_whole,
 };
 
 /// The mark by which a directory is known as ours.
@@ -152,14 +153,12 @@ impl Layout {
 
     fn description(&self) -> Result<Description, OutputError> {
         let path = self.path.join(FILE);
-        let bytes = self.disk.read(&path, LARGEST).map_err(OutputError::io("read", &path))?;
-        let damaged = |message: String| OutputError::Damaged { path: path.clone(), message };
-        let read: Description = serde_json::from_slice(&bytes).map_err(|error| damaged(error.to_string()))?;
+        let read: Description = read_json(&*self.disk, &path, LARGEST)?;
         if read.program == PROGRAM {
-            Ok(read)
-        } else {
-            Err(damaged(format!("it is of the program `{}`", read.program.escape_debug())))
+            return Ok(read);
         }
+        let cause = format!("it is of the program `{}`", read.program.escape_debug());
+        Err(OutputError::damaged(path)(cause))
     }
 
     /// Whether there is nothing of others in the folder.
@@ -234,19 +233,19 @@ impl Sweep {
                 (Some(planned.limits.max_evaluations), planned.limits.max_time_s)
             }
         };
-        if let Some(evaluations) = evaluations {
-            add(&["--max-evaluations", &evaluations.to_string()]);
-        }
-        if let Some(seconds) = time {
-            add(&["--max-time", &seconds.to_string()]);
-        }
-        if self.outside == super::Outside::Allowed {
-            add(&["--allow-outside"]);
-        }
+        arguments.extend(self.shared_arguments(evaluations, time));
         if self.overwrite == OverwritePolicy::Replace || task == Task::Begin(OverwritePolicy::Replace) {
-            add(&["--force"]);
+            arguments.push("--force".to_owned());
         }
         arguments
+    }
+
+    /// Limits, and whether files may lie elsewhere.
+    pub(super) fn shared_arguments(&self, evaluations: Option<usize>, seconds: Option<f64>) -> Vec<String> {
+        let evaluations = evaluations.map(|count| ["--max-evaluations".to_owned(), count.to_string()]);
+        let seconds = seconds.map(|seconds| ["--max-time".to_owned(), seconds.to_string()]);
+        let outside = (self.outside == super::Outside::Allowed).then(|| "--allow-outside".to_owned());
+        evaluations.into_iter().chain(seconds).flatten().chain(outside).collect()
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::layout::command_text;
-use super::{Outside, Sweep, SweepError};
+use super::{Sweep, SweepError};
 use crate::error::Error;
 use crate::files::{Disk, OutputError, OverwritePolicy, shell_word, write_whole};
 
@@ -94,15 +94,7 @@ fn arguments(sweep: &Sweep, config: &Path, directory: &Path) -> Vec<String> {
         add("--set", format!("{}={}", setting.key, setting.values.join(",")));
     }
     add("--out", directory.display().to_string());
-    if let Some(evaluations) = sweep.limits.max_evaluations {
-        add("--max-evaluations", evaluations.to_string());
-    }
-    if let Some(seconds) = sweep.limits.max_time {
-        add("--max-time", seconds.to_string());
-    }
-    if sweep.outside == Outside::Allowed {
-        arguments.push("--allow-outside".to_owned());
-    }
+    arguments.extend(sweep.shared_arguments(sweep.limits.max_evaluations, sweep.limits.max_time));
     if sweep.overwrite == OverwritePolicy::Replace {
         arguments.push("--force".to_owned());
     }

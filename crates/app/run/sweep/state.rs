@@ -11,9 +11,6 @@ use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
 use crate::files::{Disk, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason};
 use crate::run;
 
-/// Largest result that is read [bytes].
-const LARGEST: u64 = 1 << 30;
-
 /// How far a combination is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum State {
@@ -148,9 +145,7 @@ pub(super) fn fingerprint(config: &Config) -> [u8; 32] {
 
 /// The result of a run, where it is that of the run's last end.
 pub(super) fn result(run: &RunDirectory, manifest: &Manifest) -> Option<RunResult> {
-    let bytes = run.disk().read(&run.result(), LARGEST).ok()?;
-    let result: RunResult = serde_json::from_slice(&bytes).ok()?;
-    (result.status == manifest.status).then_some(result)
+    RunResult::read(run).ok().filter(|result| result.status == manifest.status)
 }
 
 fn has_ended(manifest: &Manifest) -> bool {

@@ -1,6 +1,7 @@
 //! What a run directory holds, read for a page. What is missing is stated with its reason; what is damaged is an error.
 
-use std::path::{Path, PathBuf};
+use std::io::ErrorKind;
+use std::path::PathBuf;
 
 use fluxmorph_geometry::io::VtuArray;
 use fluxmorph_geometry::tet4::Point;
@@ -15,7 +16,7 @@ use crate::files::{Manifest, OutputError, Refinements, RunDirectory, RunResult};
 use crate::run::journal::Journal;
 use crate::show::Evaluation;
 
-/// Largest result and configuration that are read [bytes].
+/// Largest configuration that is read [bytes].
 const LARGEST_TEXT: u64 = 1 << 28;
 
 /// A run as its directory holds it.
@@ -65,9 +66,9 @@ impl RunData {
     /// [`OutputError::Damaged`], and files that cannot be read.
     pub(super) fn read(run: ReportedRun) -> Result<Self, Error> {
         let ReportedRun { directory, manifest, config, source } = run;
-        let result: Option<RunResult> = match text(&directory, &directory.result())? {
-            Some(text) => Some(serde_json::from_str(&text).map_err(damaged(&directory.result()))?),
-            None => None,
+        let result = match RunResult::read(&directory) {
+            Err(OutputError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => None,
+            read => Some(read?),
         };
         let records = Journal::read_records(&directory)?;
         let history: Vec<Evaluation> = records.iter().map(|record| record.row.clone()).collect();
@@ -107,10 +108,12 @@ impl RunData {
             directory.disk().names(directory.path()).map_err(OutputError::io("read", directory.path()))?;
         files.retain(|file| there.contains(file));
         files.extend(directory.fields_in_collection(&kept)?);
+        let path = directory.resolved();
+        let resolved = OutputError::unless_missing(&path, directory.disk().read(&path, LARGEST_TEXT))?;
         Ok(Self {
             // However the path is typed, the page is the same.
             directory: std::path::absolute(directory.path()).unwrap_or_else(|_| directory.path().to_owned()),
-            resolved: text(&directory, &directory.resolved())?,
+            resolved: resolved.map(String::from_utf8).transpose().map_err(OutputError::damaged(path))?,
             designs: designs(&records, &config, result.as_ref(), best, &outline),
             fields: [before, after],
             error,
@@ -152,10 +155,10 @@ fn error_map(directory: &RunDirectory, count: usize) -> Result<Option<Vec<f64>>,
     let mut contents = contents(directory, &path)?;
     let error = match contents.cell_data.remove("error_estimate") {
         Some(VtuArray::Scalar(error)) => error,
-        _ => return Err(damaged(&path)("it has no array `error_estimate`").into()),
+        _ => return Err(OutputError::damaged(&path)("it has no array `error_estimate`").into()),
     };
     if !error.iter().all(|v| v.is_finite()) {
-        return Err(damaged(&path)("it holds a value that is not finite").into());
+        return Err(OutputError::damaged(&path)("it holds a value that is not finite").into());
     }
     Ok(Some(error).filter(|error| error.len() == count))
 }
@@ -176,20 +179,6 @@ fn not_kept(config: &Config, evaluation: usize) -> String {
 /// An error in one line.
 fn reason(error: &Error) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
-}
-
-/// The text of a file; `None` where there is none.
-fn text(directory: &RunDirectory, path: &Path) -> Result<Option<String>, OutputError> {
-    match directory.disk().read(path, LARGEST_TEXT) {
-        Ok(bytes) => Ok(Some(String::from_utf8(bytes).map_err(damaged(path))?)),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(error) => Err(OutputError::io("read", path)(error)),
-    }
-}
-
-pub(super) fn damaged<E: std::fmt::Display>(path: &Path) -> impl FnOnce(E) -> OutputError {
-    let path = path.to_owned();
-    move |error| OutputError::Damaged { path, message: error.to_string() }
 }
 
 /// The last evaluation that was better than all before it.
@@ -248,20 +237,22 @@ impl Snapshot {
                 "the field file and the mesh of the configuration do not belong together".to_owned()
             ));
         }
-        let missing = |name: &str| damaged(&path)(format!("it has no array `{name}`"));
+        let missing = |name: &str| OutputError::damaged(&path)(format!("it has no array `{name}`"));
         let Some(VtuArray::Scalar(flux_density)) = contents.cell_data.remove("B_abs") else {
             return Err(missing("B_abs").into());
         };
         let deviation = match contents.cell_data.remove("deviation") {
             Some(VtuArray::Scalar(deviation)) => Some(deviation),
-            Some(_) => return Err(damaged(&path)("its array `deviation` is not one of numbers").into()),
+            Some(_) => {
+                return Err(OutputError::damaged(&path)("its array `deviation` is not one of numbers").into());
+            }
             None => None,
         };
         let points = contents.points;
         let numbers = points.iter().flatten().chain(&flux_density).chain(deviation.iter().flatten());
         let finite = numbers.copied().all(f64::is_finite);
         if !finite {
-            return Err(damaged(&path)("it holds a value that is not finite").into());
+            return Err(OutputError::damaged(&path)("it holds a value that is not finite").into());
         }
         Ok(Ok(Self { evaluation, points, flux_density, deviation }))
     }

@@ -5,12 +5,10 @@ use fluxmorph_geometry::tet4::volume;
 use maud::{Markup, html};
 
 use super::colour::ColourMap;
-use super::cut::{CutPlane, NodeMeans};
+use super::cut::{CutPlane, NodeMeans, Patch};
 use super::data::{RunData, Snapshot};
-use super::field::{TALLEST, boundaries};
-use super::frame::Frame;
+use super::picture::{Picture, pair};
 use super::plane::{Plane, bounds, extremes};
-use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, svg};
 use super::ticks::{Count, number};
 use super::window::Window;
 use crate::build::Outline;
@@ -60,7 +58,7 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Result<Markup,
     let all: Vec<Deviation<'_>> = fields.filter_map(|field| Deviation::of(outline, field)).collect();
     let last = all.last()?;
     let window = window(outline, last);
-    Some(drawn(outline, &window, &all))
+    Some(drawn(outline, window, &all))
 }
 
 /// Across the shortest extent of the elements, through their middle.
@@ -82,7 +80,7 @@ fn window(outline: &Outline, deviation: &Deviation<'_>) -> Window {
     }
 }
 
-fn drawn(outline: &Outline, window: &Window, all: &[Deviation<'_>]) -> Result<Markup, String> {
+fn drawn<'a>(outline: &Outline, window: Window, all: &[Deviation<'a>]) -> Result<Markup, String> {
     let [low, high] = extremes(all.iter().flat_map(|own| own.elements.iter().map(|e| own.values[e.index()])));
     let most = low.abs().max(high.abs());
     if !(most.is_finite() && most > 0.0) {
@@ -91,15 +89,8 @@ fn drawn(outline: &Outline, window: &Window, all: &[Deviation<'_>]) -> Result<Ma
     let (unit, name) = UNITS.into_iter().find(|(unit, _)| most >= 0.1 * unit).unwrap_or(UNITS[3]);
     let is_signed = low < 0.0;
     let (map, lowest) = if is_signed { (ColourMap::Signed, -most / unit) } else { (ColourMap::Field, 0.0) };
-    let pixels = [LEFT, WIDTH - RIGHT];
-    let scale = Scale { low: lowest, high: most / unit, count: Count::Linear, pixels };
-    let drawing =
-        Drawing { outline, window, frame: Frame::new(window.low, window.high, TALLEST), scale, map };
-    let title = |k: usize| match (all.len(), k) {
-        (1, _) => "Deviation".to_owned(),
-        (_, 0) => format!("Before (evaluation {})", all[0].field.evaluation),
-        _ => format!("After (evaluation {})", all[1].field.evaluation),
-    };
+    let range = (lowest, most / unit, Count::Linear);
+    let picture = Picture::new(outline, window, range, map, &format!("deviation [{name}]"));
     let figures: Vec<String> = all
         .iter()
         .map(|own| own.figures(outline).map(|figure| number(figure / unit, 3)))
@@ -110,60 +101,33 @@ fn drawn(outline: &Outline, window: &Window, all: &[Deviation<'_>]) -> Result<Ma
         [one] => format!("{one}."),
         _ => String::new(),
     };
+    let drawn = |(k, own): (usize, &Deviation<'a>)| {
+        let (id, label) = (format!("deviation-{k}"), picture.label("Deviation of the field", own.field));
+        let patches = patches(&picture, own, unit).into_iter();
+        (own.field, picture.draw((own.field, patches), &id, &label, [&html! {}, &html! {}]))
+    };
+    let pictures: Vec<_> = all.iter().enumerate().map(drawn).collect();
     Ok(html! {
         figure id="deviation" {
-            div class="pair" {
-                @for (k, own) in all.iter().enumerate() {
-                    div { h3 { (title(k)) } (drawing.draw(own, unit, name, &format!("deviation-{k}"))) }
-                }
-            }
+            (pair("Deviation", &pictures))
             figcaption {
-                "Deviation of the field from what is asked for, in " (window.describe("mm"))
+                "Deviation of the field from what is asked for, in " (picture.window.describe("mm"))
                 ", the same scale for all. " (words) " Elements count by their volume."
             }
         }
     })
 }
 
-/// What both pictures have in common.
-struct Drawing<'a> {
-    outline: &'a Outline,
-    window: &'a Window,
-    frame: Frame,
-    scale: Scale,
-    map: ColourMap,
-}
-
-impl Drawing<'_> {
-    fn draw(&self, own: &Deviation<'_>, unit: f64, name: &str, id: &str) -> Markup {
-        let Self { outline, window, frame, scale, map } = self;
-        let topology = outline.mesh.topology();
-        let means = NodeMeans { topology, points: &own.field.points, values: own.values };
-        let is_own = |e: &ElementId| own.elements.binary_search(e).is_ok();
-        let mut coloured = Vec::new();
-        for &e in &own.elements {
-            let points = topology.tet(e).map(|n| own.field.points[n.index()]);
-            if window.plane.cuts(&points) {
-                let values = topology.tet(e).map(|node| means.at(node, is_own) / unit);
-                for patch in window.plane.of_tet(points, values) {
-                    let corners = patch.map(|(p, _)| window.page.flat(p));
-                    coloured.push((corners, patch.map(|(_, v)| scale.share(v))));
-                }
-            }
-        }
-        let lines = format!("{id}-lines");
-        let inside = html! {
-            defs { path id=(lines) d=(boundaries(outline, window, frame, own.field)) {} }
-            @for class in ["outline-halo", "outline"] { use class=(class) href={ "#" (lines) } {} }
-        };
-        let content = html! {
-            (frame.image(*map, coloured.into_iter()))
-            (frame.clip(&format!("{id}-frame"), &inside))
-            (axes(&frame.x, &frame.y, window.page.titles.each_ref().map(String::as_str), [6, 5]))
-            (colour_bar(id, *map, scale, &format!("deviation [{name}]"), frame.bar_top()))
-        };
-        let plane = window.describe("millimetres");
-        let label = format!("Deviation of the field in {plane} at evaluation {}", own.field.evaluation);
-        svg(frame.height(), &label, &content)
-    }
+/// The patches in which the plane cuts the elements, with the deviation in a unit.
+fn patches(picture: &Picture<'_>, own: &Deviation<'_>, unit: f64) -> Vec<Patch> {
+    let topology = picture.outline.mesh.topology();
+    let means = NodeMeans { topology, points: &own.field.points, values: own.values };
+    let is_own = |e: &ElementId| own.elements.binary_search(e).is_ok();
+    let plane = &picture.window.plane;
+    let cut = own.elements.iter().map(|&e| (e, topology.tet(e).map(|n| own.field.points[n.index()])));
+    cut.filter(|(_, points)| plane.cuts(points))
+        .flat_map(|(e, points)| {
+            plane.of_tet(points, topology.tet(e).map(|node| means.at(node, is_own) / unit))
+        })
+        .collect()
 }

@@ -3,17 +3,20 @@
 use fluxmorph_geometry::tet4::volume;
 use maud::{Markup, html};
 
+use super::colour::ColourMap;
 use super::data::{RunData, Snapshot};
-use super::field::{Drawing, Shown, TALLEST};
+use super::field::draw;
 use super::field_cut::FieldCut;
-use super::frame::Frame;
-use super::plot::{LEFT, RIGHT, Scale, WIDTH};
+use super::picture::Picture;
 use super::ticks::{Count, number};
 use super::window::Window;
 use crate::build::Outline;
 
 /// Decades of the scale.
 const RANGE: f64 = 1e4;
+
+/// From shares in a cubic metre to per cent in a cubic centimetre.
+const PERCENT_PER_CM3: f64 = 1e-4;
 
 /// The figure with its caption; `None` where the field of the best design has no estimated error.
 pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Result<Markup, String>> {
@@ -39,15 +42,10 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
     let window = Window::new(data, outline, field);
     let cut = FieldCut::new(&window, outline, &shares);
     let values = cut.triangles.iter().flat_map(|triangle| triangle.patch.map(|(_, value)| value));
-    // Per cent in a cubic centimetre.
-    let shown =
-        Shown { name: "Share of the estimated error", sign: "share of the error [%/cm³]", factor: 1e-4 };
-    let high = shown.factor * values.fold(0.0, f64::max);
+    let high = PERCENT_PER_CM3 * values.fold(0.0, f64::max);
     if !(high.is_finite() && high > 0.0) {
         return Err("the estimated error is zero in the plane of the figure".to_owned());
     }
-    let scale = Scale { low: high / RANGE, high, count: Count::Logarithmic, pixels: [LEFT, WIDTH - RIGHT] };
-    let frame = Frame::new(window.low, window.high, TALLEST);
     let caption = format!(
         "Where the estimated error of the objective at the best design is made, in {}: the sizes of what all elements add, \
          as shares of their sum in each cubic centimetre, logarithmic scale. With their signs they add up to {}, of the \
@@ -56,10 +54,11 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
         number(sum, 3),
         number(total, 3)
     );
-    let drawing = Drawing { data, outline, window, frame, scale, shown };
+    let range = (high / RANGE, high, Count::Logarithmic);
+    let picture = Picture::new(outline, window, range, ColourMap::Field, "share of the error [%/cm³]");
     Ok(html! {
         figure id="error-map" {
-            (drawing.draw(&cut, "error-cut"))
+            (draw(data, &picture, &cut, ("error-cut", "Share of the estimated error", PERCENT_PER_CM3)))
             figcaption { (caption) }
         }
     })

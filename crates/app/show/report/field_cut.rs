@@ -7,7 +7,7 @@ use fluxmorph_geometry::tet4::{Point, area_vector, dot};
 
 use super::cut::{NodeMeans, Patch};
 use super::data::{RunData, Snapshot};
-use super::plot::{LEFT, RIGHT, Scale, WIDE, WIDTH};
+use super::plot::WIDE;
 use super::ticks::Count;
 use super::window::Window;
 use crate::build::Outline;
@@ -79,7 +79,11 @@ impl CutTriangle {
 ///
 /// Of the regions without an entry of their own, where there are any: the field in iron is a hundred times that around
 /// it, and would leave the others one colour.
-pub(super) fn colour_scale(data: &RunData, outline: &Outline, cuts: &[FieldCut<'_>]) -> Option<Scale> {
+pub(super) fn colour_range(
+    data: &RunData,
+    outline: &Outline,
+    cuts: &[FieldCut<'_>],
+) -> Option<(f64, f64, Count)> {
     let names = outline.mesh.topology().region_names();
     let is_air = |t: &&CutTriangle| !data.config.regions.contains_key(&names[t.region.index()]);
     let triangles = || cuts.iter().flat_map(|cut| &cut.triangles);
@@ -91,14 +95,13 @@ pub(super) fn colour_scale(data: &RunData, outline: &Outline, cuts: &[FieldCut<'
     let [low, high] = QUANTILES.map(|share| quantile(&samples, share));
     let (low, high) = (low?, high?);
     let lowest = low.max(1e-4 * high);
-    let (low, high, count) = if high <= 0.0 {
+    Some(if high <= 0.0 {
         (0.0, 1.0, Count::Linear)
     } else if high / lowest > WIDE {
         (lowest, high, Count::Logarithmic)
     } else {
         (if low < 0.3 * high { 0.0 } else { low }, high, Count::Linear)
-    };
-    Some(Scale { low, high, count, pixels: [LEFT, WIDTH - RIGHT] })
+    })
 }
 
 /// The value that a share of the whole weight does not exceed; samples are values with weights, ascending.

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use fluxmorph_geometry::io::{VtuContents, join_pieces, pvtu_pieces, vtu_contents};
 
-use super::data::damaged;
 use crate::files::{FieldForm, OutputError, RunDirectory};
 
 /// Largest field file that is read [bytes].
@@ -28,17 +27,17 @@ pub(super) fn field_contents(
     }
     let path = directory.field_header(evaluation);
     let bytes = directory.disk().read(&path, LARGEST_HEADER).map_err(OutputError::io("read", &path))?;
-    let names = pvtu_pieces(&bytes).map_err(damaged(&path))?;
+    let names = pvtu_pieces(&bytes).map_err(OutputError::damaged(&path))?;
     let piece = |name: String| {
         if !RunDirectory::is_piece_in_header(evaluation, &name) {
             let cause = format!("it names `{name}`, which is no piece of this evaluation");
-            return Err(damaged(&path)(cause));
+            return Err(OutputError::damaged(&path)(cause));
         }
         let contents = contents(directory, &directory.fields().join(&name))?;
         Ok((name, contents))
     };
     let pieces = names.into_iter().map(piece).collect::<Result<Vec<_>, OutputError>>()?;
-    let whole = join_pieces(pieces).map_err(damaged(&path))?;
+    let whole = join_pieces(pieces).map_err(OutputError::damaged(&path))?;
     Ok((path, whole))
 }
 
@@ -48,5 +47,5 @@ pub(super) fn field_contents(
 /// [`OutputError`] names the file.
 pub(super) fn contents(directory: &RunDirectory, path: &Path) -> Result<VtuContents, OutputError> {
     let bytes = directory.disk().read(path, LARGEST_FIELD).map_err(OutputError::io("read", path))?;
-    vtu_contents(&bytes).map_err(damaged(path))
+    vtu_contents(&bytes).map_err(OutputError::damaged(path))
 }

@@ -2,15 +2,12 @@
 
 use maud::{Markup, html};
 
-use super::histogram::{BAR, LONGEST, ROW, START};
-use super::plot::{rect, svg, text};
+use super::bars::{self, Row};
+use super::plot::svg;
 use super::ticks::number;
 use crate::build::multipole::{main_terms, name};
 use crate::config::Config;
 use crate::files::{HarmonicResult, MultipoleResult, RunResult};
-
-/// Room above the bars.
-const ABOVE: f64 = 22.0;
 
 /// A figure for every expansion that has terms beside the main ones, of the first state.
 pub(super) fn figures(config: &Config, result: &RunResult) -> Markup {
@@ -34,41 +31,23 @@ pub(super) fn figures(config: &Config, result: &RunResult) -> Markup {
 }
 
 /// Every term beside the main ones with its size before and after, in units.
-fn shown<'r>(
-    main: &[String],
-    [before, after]: [Option<&'r MultipoleResult>; 2],
-) -> Vec<(&'r str, [Option<f64>; 2])> {
+fn shown(main: &[String], [before, after]: [Option<&MultipoleResult>; 2]) -> Vec<Row> {
     let units = |set: Option<&MultipoleResult>, name: &str| {
         set.and_then(|set| set.terms.iter().find(|term| term.name == name)).and_then(|term| term.units)
     };
-    let of = |term: &'r HarmonicResult| {
-        (term.name.as_str(), [units(before, &term.name), units(after, &term.name)])
+    let row = |term: &HarmonicResult| {
+        let sizes = [("bar-before", units(before, &term.name)), ("bar-after", Some(term.units?))];
+        let bar = |(class, size): (_, Option<f64>)| size.map(|size| (class, size, number(size, 3)));
+        Some((term.name.clone(), sizes.map(bar).to_vec()))
     };
     let terms = after.into_iter().flat_map(|set| &set.terms).filter(|term| !main.contains(&term.name));
-    terms.map(of).filter(|(_, sizes)| sizes[1].is_some()).collect()
+    terms.filter_map(row).collect()
 }
 
-fn draw(expansion: &str, shown: &[(&str, [Option<f64>; 2])]) -> Markup {
-    let sizes = shown.iter().flat_map(|(_, sizes)| sizes).flatten();
-    let most = sizes.copied().fold(f64::MIN_POSITIVE, f64::max);
-    let bar = |class: &str, units: f64, y: f64| {
-        let length = LONGEST * units / most;
-        html! {
-            (rect(class, [START, y, length.max(0.8), BAR]))
-            (text("count", START + length + 4.0, y + 8.0, &number(units, 3)))
-        }
-    };
-    let content = html! {
-        (text("title", 2.0, 13.0, "term"))
-        (text("title", START, 13.0, "units of 1e-4"))
-        @for (i, (term, sizes)) in shown.iter().enumerate() {
-            @let top = ABOVE + ROW * i as f64;
-            (text("tick end", START - 8.0, top + 15.0, term))
-            @for (class, k) in [("bar-before", 0), ("bar-after", 1)] {
-                @if let Some(units) = sizes[k] { (bar(class, units, top + 2.0 + (BAR + 1.0) * k as f64)) }
-            }
-        }
-    };
+fn draw(expansion: &str, shown: &[Row]) -> Markup {
+    let sizes = shown.iter().flat_map(|(_, bars)| bars).flatten().map(|(_, size, _)| *size);
+    let most = sizes.fold(f64::MIN_POSITIVE, f64::max);
+    let (rows, bottom) = bars::rows(["term", "units of 1e-4"], shown, most);
     let label = format!("Terms of the expansion {expansion}, the largest {} units", number(most, 3));
-    svg(ABOVE + ROW * shown.len() as f64 + 4.0, &label, &content)
+    svg(bottom + 4.0, &label, &rows)
 }

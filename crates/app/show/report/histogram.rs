@@ -4,19 +4,11 @@ use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::quality::QualityReport;
 use maud::{Markup, html};
 
+use super::bars::{self, START};
 use super::data::{RunData, Snapshot};
-use super::plot::{WIDTH, rect, svg, text};
+use super::plot::{rect, svg, text};
 use super::ticks::{group_digits, number};
 use crate::build::Outline;
-
-/// Height of the two bars of a tenth, and the room above and below.
-pub(super) const ROW: f64 = 25.0;
-pub(super) const BAR: f64 = 9.0;
-const ABOVE: f64 = 22.0;
-
-/// Left end of the bars, and their longest.
-pub(super) const START: f64 = 66.0;
-pub(super) const LONGEST: f64 = WIDTH - START - 58.0;
 
 /// The figure with its caption.
 pub(super) fn figure(data: &RunData, outline: &Outline) -> Result<Markup, String> {
@@ -50,25 +42,18 @@ fn draw(before: Option<&QualityReport>, after: &QualityReport) -> Markup {
         .collect();
     let most = shown.iter().flat_map(|(_, _, report)| report.histogram).max().unwrap_or(1).max(1);
     let bins = after.histogram.len();
-    let bottom = ABOVE + ROW * bins as f64;
-    let tenth = |k: usize| format!("{:.1}–{:.1}", k as f64 / bins as f64, (k + 1) as f64 / bins as f64);
-    let bar = |class: &str, count: usize, y: f64| {
-        let length = LONGEST * count as f64 / most as f64;
-        let seen = length.max(if count > 0 { 0.8 } else { 0.0 });
-        html! {
-            (rect(class, [START, y, seen, BAR]))
-            (text("count", START + length + 4.0, y + 8.0, &group_digits(count)))
-        }
+    let row = |k: usize| {
+        let tenth = format!("{:.1}–{:.1}", k as f64 / bins as f64, (k + 1) as f64 / bins as f64);
+        let bar = |(class, _, report): &(&'static str, &str, &QualityReport)| {
+            let count = report.histogram[k];
+            Some((*class, count as f64, group_digits(count)))
+        };
+        (tenth, shown.iter().map(bar).collect())
     };
+    let rows: Vec<bars::Row> = (0..bins).map(row).collect();
+    let (rows, bottom) = bars::rows(["quality", "elements"], &rows, most as f64);
     let content = html! {
-        (text("title", 2.0, 13.0, "quality"))
-        (text("title", START, 13.0, "elements"))
-        @for (k, top) in (0..bins).map(|k| (k, ABOVE + ROW * k as f64)) {
-            (text("tick end", START - 8.0, top + 15.0, &tenth(k)))
-            @for (i, (class, _, report)) in shown.iter().enumerate() {
-                (bar(class, report.histogram[k], top + 2.0 + (BAR + 1.0) * i as f64))
-            }
-        }
+        (rows)
         @for (i, (class, name, _)) in shown.iter().enumerate() {
             (rect(class, [START + 80.0 * i as f64, bottom + 8.0, 10.0, 9.0]))
             (text("tick", START + 80.0 * i as f64 + 15.0, bottom + 16.5, name))

@@ -8,18 +8,14 @@ use maud::{Markup, html};
 
 use super::colour::ColourMap;
 use super::data::RunData;
-use super::field::boundaries;
 use super::field_cut::{CutTriangle, FieldCut};
-use super::frame::Frame;
 use super::markup::{Card, note, table};
-use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, path, svg};
+use super::picture::Picture;
+use super::plot::path;
 use super::ticks::{Count, number, trim_zeros};
 use super::window::Window;
 use crate::build::Outline;
 use crate::files::{SaturatedRegion, SaturationResult};
-
-/// Tallest drawing area.
-const TALLEST: f64 = 320.0;
 
 /// Forces of at most so many bodies have a card.
 const MOST_CARDS: usize = 2;
@@ -115,12 +111,9 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Markup> {
     if highest == 0.0 {
         return None;
     }
-    let frame = Frame::new(window.low, window.high, TALLEST);
-    let scale = Scale { low: 0.0, high: highest, count: Count::Linear, pixels: [LEFT, WIDTH - RIGHT] };
-    let coloured = iron.iter().map(|triangle| {
-        let corners = triangle.patch.map(|(p, _)| window.page.flat(p));
-        (corners, triangle.patch.map(|(_, b)| scale.share(b)))
-    });
+    let picture =
+        Picture::new(outline, window, (0.0, highest, Count::Linear), ColourMap::Field, "|B| in iron [T]");
+    let Picture { window, frame, .. } = &picture;
     let is_saturated = |triangle: &&&CutTriangle| {
         let mean = triangle.patch.iter().map(|(_, b)| b).sum::<f64>() / 3.0;
         knees[&triangle.region].is_some_and(|knee| mean > knee)
@@ -129,21 +122,13 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Markup> {
         format!("{}Z", path(&triangle.patch.map(|(p, _)| frame.at(window.page.flat(p)))))
     };
     let saturated: String = iron.iter().filter(is_saturated).map(outline_of).collect();
-    let inside = html! {
+    let hatched = html! {
         defs {
             pattern id="hatch" width="5" height="5" patternUnits="userSpaceOnUse" patternTransform="rotate(45)" {
                 path class="hatch" d="M0 0V5" {}
             }
-            path id="iron-lines" d=(boundaries(outline, &window, &frame, field)) {}
         }
         @if !saturated.is_empty() { path class="saturated" fill="url(#hatch)" d=(saturated) {} }
-        @for class in ["outline-halo", "outline"] { use class=(class) href="#iron-lines" {} }
-    };
-    let content = html! {
-        (frame.image(ColourMap::Field, coloured))
-        (frame.clip("iron-frame", &inside))
-        (axes(&frame.x, &frame.y, window.page.titles.each_ref().map(String::as_str), [6, 5]))
-        (colour_bar("iron", ColourMap::Field, &scale, "|B| in iron [T]", frame.bar_top()))
     };
     let caption = format!(
         "|B| in iron with a B–H curve, in {}, evaluation {}. Hatched: beyond the knee of the curve.",
@@ -153,7 +138,7 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Markup> {
     Some(html! {
         figure id="saturation" {
             h3 { "Saturation of iron" }
-            (svg(frame.height(), &caption, &content))
+            (picture.draw((field, iron.iter().map(|t| t.patch)), "iron", &caption, [&hatched, &html! {}]))
             figcaption { (caption) }
         }
     })

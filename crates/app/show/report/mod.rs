@@ -2,7 +2,7 @@
 //!
 //! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others show one
 //! thing each: `head`, `map`, `field`, `iron`, `error_map`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
-//! `plot` (axes) and `frame` (pictures to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
+//! `plot` (axes), `bars`, `frame` and `picture` (to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
 //! `field_cut`, `cut`, `coils` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
 //! configuration in plain words), `markup` (what the pages of this program share). The page holds its style and its script
 //! (`style.css`, `view.js`), asks no network, and says nothing of the moment at which it is made: equal directories make
@@ -10,6 +10,7 @@
 //!
 //! Does not live here: anything that solves a field or moves a mesh. What is shown was computed by the run.
 
+mod bars;
 mod circuits;
 mod coils;
 mod colour;
@@ -32,6 +33,7 @@ mod map;
 pub(crate) mod markup;
 mod observed;
 mod page;
+mod picture;
 mod plane;
 pub(crate) mod plot;
 mod png;

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::error::MeshError;
+use crate::error::{MeshError, millimetres};
 use crate::ids::{NodeId, RegionId};
 use crate::mesh::Mesh;
 use crate::tet4::{Point, centroid, cross, dot, norm, sub, volume};
@@ -84,12 +84,6 @@ pub fn open_shell(mesh: &Mesh, parameters: &OpenShellParameters) -> Result<Mesh,
 
 fn refuse(parameter: &'static str, value: &str, expected: &str) -> MeshError {
     MeshError::Parameter { parameter, value: value.to_owned(), expected: expected.to_owned() }
-}
-
-/// A place as text.
-fn millimetres(point: Point) -> String {
-    let [x, y, z] = point.map(|c| 1e3 * c);
-    format!("({x:.3}, {y:.3}, {z:.3}) mm")
 }
 
 /// The outer faces on which the shell stands, by their key.

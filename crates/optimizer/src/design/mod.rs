@@ -118,22 +118,19 @@ impl DesignSetup {
 /// Why a surface cannot carry the design variables asked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum DesignError {
     /// No triangle.
     #[error("the design surface has no triangles")]
     Empty,
     /// The grid's rectangle has no area.
     #[error("a control grid cannot be laid across the direction: the surface has no extent along {axis}")]
-    NoExtent {
-        /// The coordinate without extent.
-        axis: char,
-    },
+    NoExtent { axis: char },
     /// A surface that bends back cannot be seen as a height over the grid.
     #[error("a control grid cannot be laid over the surface: at {point:?} m it turns back towards {axis}")]
     Folded {
         /// The first such node [m].
         point: Point,
-        /// The coordinate across which the grid lies.
         axis: char,
     },
     /// A mirrored variable has no partner.
@@ -142,11 +139,9 @@ pub enum DesignError {
          mirror image"
     )]
     NoPartner {
-        /// Node or control point.
         what: &'static str,
         /// Its place [m].
         point: Point,
-        /// Normal of the mirror.
         axis: char,
         /// Place of the mirror [m].
         at: f64,
@@ -158,9 +153,7 @@ pub enum DesignError {
         "the direction {direction:?} leaves the mirror {axis} = {at} m: mirrored nodes would not move alike"
     )]
     Oblique {
-        /// The direction.
         direction: Point,
-        /// Normal of the mirror.
         axis: char,
         /// Place of the mirror [m].
         at: f64,
@@ -170,7 +163,6 @@ pub enum DesignError {
     WideFilter {
         /// [m]
         radius: f64,
-        /// Largest number of pairs.
         limit: usize,
     },
 }

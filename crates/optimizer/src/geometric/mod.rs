@@ -16,6 +16,7 @@ use fluxmorph_geometry::MeshError;
 /// Why a geometric function cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum GeometricError {
     /// A name that the mesh does not have.
     #[error(transparent)]
@@ -24,19 +25,13 @@ pub enum GeometricError {
     #[error(
         "the region `{region}` has no elements in the mesh: its volume is not defined; name a region that is meshed"
     )]
-    NoElements {
-        /// Its name.
-        region: String,
-    },
+    NoElements { region: String },
     /// The region is cut by two parallel outer planes along x, along y and along z.
     #[error(
         "the region `{region}` is replaced by its impedance surface and ends at two outer planes along each of x, y and \
          z: its volume does not follow from that surface; mesh the region instead"
     )]
-    Boxed {
-        /// Its name.
-        region: String,
-    },
+    Boxed { region: String },
     /// The design has no thickness.
     #[error(
         "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \

@@ -3,6 +3,7 @@
 //! These say why and what to do; which coil and which surface is said by the variant of
 //! [`SolverError`](crate::SolverError) that holds them.
 
+use fluxmorph_geometry::millimetres;
 use fluxmorph_geometry::tet4::Point;
 
 /// Why a coil may not meet a surface as it does.
@@ -51,6 +52,7 @@ pub enum PlaneFault {
 /// Why no current can be made in a region of the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum RegionFault {
     /// There is nothing to flow in.
     #[error("it has no elements; check the name of the region")]
@@ -59,30 +61,25 @@ pub enum RegionFault {
     #[error(
         "no triangle of the terminal `{terminal}` is a face of it; name a surface on which the winding is cut"
     )]
-    TerminalElsewhere {
-        /// Name of the surface.
-        terminal: String,
-    },
+    TerminalElsewhere { terminal: String },
     /// Both terminals in one place.
     #[error(
-        "its terminals `{from}` and `{to}` touch at ({:.3}, {:.3}, {:.3}) mm: the current would have no way to go; \
+        "its terminals `{from}` and `{to}` touch at {}: the current would have no way to go; \
          name two surfaces that are apart",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     TerminalsTouch {
-        /// Name of the surface the current comes from.
         from: String,
-        /// Name of the surface it goes to.
         to: String,
         /// The node they share [m].
         place: Point,
     },
     /// Terminals that the current has no way between, outside the region.
     #[error(
-        "its terminals lie on walls that nothing connects: the current would gather at ({:.3}, {:.3}, {:.3}) mm. Cut the \
+        "its terminals lie on walls that nothing connects: the current would gather at {}. Cut the \
          winding at flux-parallel surfaces that touch each other, directly or along other flux-parallel surfaces or conductors, \
          or let the coil close on itself around an axis",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     Unconnected {
         /// A node of one of the walls [m].
@@ -90,9 +87,9 @@ pub enum RegionFault {
     },
     /// A terminal of a solid conductor that another conductor touches.
     #[error(
-        "another conductor touches its terminal at ({:.3}, {:.3}, {:.3}) mm, and current would pass between them there; leave a \
+        "another conductor touches its terminal at {}, and current would pass between them there; leave a \
          gap, or make both one region",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     TerminalShared {
         /// A node of both [m].
@@ -108,13 +105,11 @@ pub enum RegionFault {
     /// A part of the region that carries nothing.
     #[error(
         "it has {parts} separate parts, and the terminal `{terminal}` does not touch the one at \
-         ({:.3}, {:.3}, {:.3}) mm; both terminals must touch every part, or make that part a coil of its own",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+         {}; both terminals must touch every part, or make that part a coil of its own",
+        millimetres(*place)
     )]
     PartWithoutTerminal {
-        /// Separate parts.
         parts: usize,
-        /// Name of the terminal that is missing.
         terminal: String,
         /// A node of the part [m].
         place: Point,
@@ -123,15 +118,12 @@ pub enum RegionFault {
     #[error(
         "it has {parts} separate parts, but a closed coil is one ring; give each part its own region and coil"
     )]
-    SeveralRings {
-        /// Separate parts.
-        parts: usize,
-    },
+    SeveralRings { parts: usize },
     /// The line lies in the conductor.
     #[error(
-        "the line given by center and axis passes through it at ({:.3}, {:.3}, {:.3}) mm; give any line through the \
+        "the line given by center and axis passes through it at {}; give any line through the \
          hole of the ring",
-        place[0] * 1e3, place[1] * 1e3, place[2] * 1e3
+        millimetres(*place)
     )]
     AxisInside {
         /// A place of the conductor next to the line [m].

@@ -24,11 +24,7 @@ impl Frame {
     /// [`SolverError::Parameter`] for another number.
     pub fn coordinate(centre: Point, axis: usize) -> Result<Self, SolverError> {
         if axis > 2 {
-            return Err(SolverError::Parameter {
-                what: "axis".to_owned(),
-                value: axis.to_string(),
-                expected: "0, 1 or 2 for x, y or z".to_owned(),
-            });
+            return Err(SolverError::parameter("axis", axis, "0, 1 or 2 for x, y or z"));
         }
         Ok(Self { centre, directions: [axis + 1, axis + 2, axis].map(|d| unit(d % 3)) })
     }
@@ -41,10 +37,8 @@ impl Frame {
     /// # Errors
     /// [`SolverError::Parameter`] for an axis without length and a direction along the axis.
     pub fn new(centre: Point, axis: Point, direction: Option<Point>) -> Result<Self, SolverError> {
-        let refuse = |what: &str, value: Point, expected: &str| SolverError::Parameter {
-            what: what.to_owned(),
-            value: format!("{value:?}"),
-            expected: expected.to_owned(),
+        let refuse = |what: &str, value: Point, expected: &str| {
+            SolverError::parameter(what, format!("{value:?}"), expected)
         };
         let normal = normalise(axis)
             .ok_or_else(|| refuse("axis", axis, "a vector with a length, such as [0.0, 0.0, 1.0]"))?;

@@ -77,14 +77,9 @@ impl Racetrack {
         if let Corner::Round { inner_radius } = corner
             && !(inner_radius > 0.0 && inner_radius <= half_window[0].min(half_window[1]))
         {
-            return Err(SolverError::Parameter {
-                what: "inner_radius".to_owned(),
-                value: format!("{inner_radius} m"),
-                expected:
-                    "it must be positive and at most the smaller half of the window; use corner = \"mitred\" \
-                           for sharp ones"
-                        .to_owned(),
-            });
+            let expected = "it must be positive and at most the smaller half of the window; use corner = \"mitred\" for sharp \
+                            ones";
+            return Err(SolverError::parameter("inner_radius", format!("{inner_radius} m"), expected));
         }
         Ok(Self { frame, half_window, width, height, corner })
     }
@@ -188,11 +183,9 @@ impl Racetrack {
 
 fn check_sizes(sizes: &[(&str, f64)]) -> Result<(), SolverError> {
     match sizes.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((what, value)) => Err(SolverError::Parameter {
-            what: (*what).to_owned(),
-            value: format!("{value} m"),
-            expected: "a coil needs a positive size".to_owned(),
-        }),
+        Some((what, value)) => {
+            Err(SolverError::parameter(*what, format!("{value} m"), "a coil needs a positive size"))
+        }
         None => Ok(()),
     }
 }

@@ -57,9 +57,8 @@ pub struct InductanceFunctional {
 
 impl InductanceFunctional {
     pub(super) fn new(model: &FieldModel, coils: &[&str], of: Inductive) -> Result<Self, SolverError> {
-        let refuse = |what: String, value: String, expected: &str| {
-            Err(SolverError::Parameter { what, value, expected: expected.to_owned() })
-        };
+        let refuse =
+            |what: String, value: String, expected: &str| Err(SolverError::parameter(what, value, expected));
         let windings = super::windings_of(model, coils)?;
         if windings.len() != of.coils() || windings.len() == 2 && windings[0] == windings[1] {
             let expected = if of.coils() == 1 { "one coil" } else { "two different coils" };
@@ -88,11 +87,9 @@ impl InductanceFunctional {
     ) -> Result<FunctionalValue, SolverError> {
         let windings = model.windings();
         let inductance = |j: usize, k: usize| -> Result<c64, SolverError> {
-            let response = state.response(k).ok_or_else(|| SolverError::Parameter {
-                what: "response to 1 A".to_owned(),
-                value: "none".to_owned(),
-                expected: "that of every coil of the functional (FieldModel::respond)".to_owned(),
-            })?;
+            let expected = "that of every coil of the functional (FieldModel::respond)";
+            let missing = || SolverError::parameter("response to 1 A", "none", expected);
+            let response = state.response(k).ok_or_else(missing)?;
             Ok(product(windings.load(j), response.values()))
         };
         let omega = model.angular_frequency();

@@ -38,11 +38,8 @@ impl Integral {
         let topology = model.topology();
         if let Some(index) = model.conductors().iter().position(|c| c.name == region) {
             if model.conductors()[index].law == SurfaceLaw::Perfect {
-                return Err(SolverError::Parameter {
-                    what: format!("model of `{region}`"),
-                    value: "perfect".to_owned(),
-                    expected: "a perfect conductor has no loss".to_owned(),
-                });
+                let what = format!("model of `{region}`");
+                return Err(SolverError::parameter(what, "perfect", "a perfect conductor has no loss"));
             }
             return Ok(Self::SurfaceLoss(index));
         }

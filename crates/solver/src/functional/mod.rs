@@ -217,11 +217,9 @@ impl Functional {
 /// Places of the windings of some coils by name.
 fn windings_of(model: &FieldModel, coils: &[&str]) -> Result<Vec<usize>, SolverError> {
     let place = |coil: &&str| {
-        model.windings().position(model, coil).ok_or_else(|| SolverError::Parameter {
-            what: "coil".to_owned(),
-            value: (*coil).to_owned(),
-            expected: "a coil of the model with the turns of its winding".to_owned(),
-        })
+        let expected = "a coil of the model with the turns of its winding";
+        let found = model.windings().position(model, coil);
+        found.ok_or_else(|| SolverError::parameter("coil", *coil, expected))
     };
     coils.iter().map(place).collect()
 }

@@ -211,11 +211,9 @@ impl MultipoleFunctional {
         };
         let known = |term: &&Harmonic| multipoles.terms.iter().any(|(own, _)| own == *term);
         if let Some(missing) = wanted.iter().find(|term| !known(term)) {
-            return Err(SolverError::Parameter {
-                what: "term of an expansion".to_owned(),
-                value: format!("{missing:?}"),
-                expected: "one up to the order of the expansion, of its kind".to_owned(),
-            });
+            let (value, expected) =
+                (format!("{missing:?}"), "one up to the order of the expansion, of its kind");
+            return Err(SolverError::parameter("term of an expansion", value, expected));
         }
         Ok(Self { multipoles, of })
     }

@@ -39,8 +39,7 @@ impl TerminalFunctional {
     pub(super) fn new(model: &FieldModel, coil: &str, of: AtTerminals) -> Result<Self, SolverError> {
         let winding = super::windings_of(model, &[coil])?[0];
         let refuse = |value: &str, expected: &str| {
-            let (what, value) = (format!("{of:?} of the coil `{coil}`"), value.to_owned());
-            Err(SolverError::Parameter { what, value, expected: expected.to_owned() })
+            Err(SolverError::parameter(format!("{of:?} of the coil `{coil}`"), value, expected))
         };
         if model.angular_frequency() == 0.0 && of != AtTerminals::FluxLinkage {
             return refuse("at 0 Hz", "a frequency above 0 Hz: no shape changes it in statics");

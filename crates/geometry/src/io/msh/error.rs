@@ -111,72 +111,41 @@ impl Excerpt {
 /// What is wrong in a Gmsh file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum MshFault {
     /// Something else was to stand there.
     #[error("expected {expected}, found `{found}`")]
     Unexpected {
-        /// What belongs there.
         expected: &'static str,
         /// What stands there, shortened.
         found: String,
     },
     /// The file ends too early.
     #[error("the file ends where {expected} is expected: it is cut off; write or copy it again")]
-    Truncated {
-        /// What belongs there.
-        expected: &'static str,
-    },
+    Truncated { expected: &'static str },
     /// A header promises more than the rest of the file can hold.
     #[error(
         "{claimed} {what} are announced, but the {bytes} bytes that remain hold at most {most}: the file is cut off or its header is wrong"
     )]
-    TooMany {
-        /// What is counted.
-        what: &'static str,
-        /// The number in the header.
-        claimed: u64,
-        /// Bytes that remain.
-        bytes: usize,
-        /// How many could be in them.
-        most: u64,
-    },
+    TooMany { what: &'static str, claimed: u64, bytes: usize, most: u64 },
     /// The blocks of a section do not add up to its header.
     #[error("{claimed} {what} are announced in the section's header, and its blocks announce {found}")]
-    CountMismatch {
-        /// What is counted.
-        what: &'static str,
-        /// The number in the header of the section.
-        claimed: u64,
-        /// The number in the headers of the blocks.
-        found: u64,
-    },
+    CountMismatch { what: &'static str, claimed: u64, found: u64 },
     /// A version that is not read.
     #[error("the version {found} of the format is not read: save the mesh as version 4.1 or 2.2")]
-    Version {
-        /// The version of the file.
-        found: String,
-    },
+    Version { found: String },
     /// The size of numbers is not that of 64 bits.
     #[error("the data size is {found} bytes, and only 8 is read: save the mesh on a 64-bit system")]
-    DataSize {
-        /// The size in the file.
-        found: String,
-    },
+    DataSize { found: String },
     /// A section comes too early or too late.
     #[error("the section must come {order}")]
-    Order {
-        /// Where it belongs.
-        order: &'static str,
-    },
+    Order { order: &'static str },
     /// A section comes twice.
     #[error("the section comes a second time")]
     SectionTwice,
     /// A section is missing.
     #[error("there is no section ${section}: save the mesh with its nodes and elements")]
-    MissingSection {
-        /// Its name without the dollar.
-        section: &'static str,
-    },
+    MissingSection { section: &'static str },
     /// The mesh is cut into partitions.
     #[error("the mesh is partitioned, which is not read: save it without partitions")]
     Partitioned,
@@ -185,19 +154,13 @@ pub enum MshFault {
     Name {
         /// The name, with control characters escaped.
         name: String,
-        /// What is wrong with it.
         problem: &'static str,
     },
     /// Two groups of one dimension have one name, or one group has two.
     #[error(
         "the name `{name}` belongs to group {first} of the same dimension: give every group its own name"
     )]
-    NameTwice {
-        /// The name.
-        name: String,
-        /// The group that has it already.
-        first: i32,
-    },
+    NameTwice { name: String, first: i32 },
     /// A group or an entity is declared twice.
     #[error("it is declared a second time")]
     DeclaredTwice,
@@ -206,22 +169,13 @@ pub enum MshFault {
     UnknownEntity,
     /// Two nodes have one tag.
     #[error("the tag was given at {first} already: every node needs its own tag")]
-    DuplicateNode {
-        /// The node that has it.
-        first: Place,
-    },
+    DuplicateNode { first: Place },
     /// An element names a node that is not there.
     #[error("it uses node {node}, which is not in $Nodes")]
-    DanglingNode {
-        /// The tag used.
-        node: u64,
-    },
+    DanglingNode { node: u64 },
     /// A coordinate is not finite.
     #[error("a coordinate is {value}: every coordinate must be finite")]
-    NotFinite {
-        /// The value.
-        value: f64,
-    },
+    NotFinite { value: f64 },
     /// A tetrahedron has no volume.
     #[error(
         "the tetrahedron at {centroid:?} m is flat: its volume of {volume:e} m³ is nothing but rounding; repair the mesh"
@@ -241,24 +195,13 @@ pub enum MshFault {
     #[error(
         "it belongs to the physical volumes `{first}` and `{second}`: every volume belongs to exactly one region"
     )]
-    TwoGroups {
-        /// One group.
-        first: String,
-        /// The other.
-        second: String,
-    },
+    TwoGroups { first: String, second: String },
     /// A tetrahedron comes twice.
     #[error("the tetrahedron has the nodes of element {first}: take one of them out")]
-    DuplicateElement {
-        /// The tag of the other.
-        first: u64,
-    },
+    DuplicateElement { first: u64 },
     /// Three or more tetrahedra share a face.
     #[error("two other tetrahedra have a face with nodes {face:?} too: the mesh overlaps itself")]
-    Overlap {
-        /// Tags of the nodes of the face.
-        face: [u64; 3],
-    },
+    Overlap { face: [u64; 3] },
     /// Two tetrahedra lie on the same side of a common face.
     #[error(
         "it lies on the same side of a common face as element {other}, in `{}` and `{}`, at {centroid:?} m: the mesh is folded, \
@@ -266,9 +209,7 @@ pub enum MshFault {
         regions[0], regions[1]
     )]
     Folded {
-        /// The tag of the other.
         other: u64,
-        /// Regions of both.
         regions: Box<[String; 2]>,
         /// Centroid of the tetrahedron [m].
         centroid: [f64; 3],
@@ -277,41 +218,20 @@ pub enum MshFault {
     #[error(
         "a {shape} stands in the physical volume `{group}`: only tetrahedra of first and second order are read; mesh the volume with them"
     )]
-    NotTetrahedron {
-        /// The shape.
-        shape: &'static str,
-        /// The group.
-        group: String,
-    },
+    NotTetrahedron { shape: &'static str, group: String },
     /// A type of element that the format does not know.
     #[error("the element type {code} is not known")]
-    UnknownType {
-        /// The code.
-        code: i32,
-    },
+    UnknownType { code: i32 },
     /// The type of the elements does not fit the dimension of their entity.
     #[error("a {shape} cannot lie in an entity of dimension {dimension}")]
-    WrongDimension {
-        /// The shape.
-        shape: &'static str,
-        /// The dimension.
-        dimension: i32,
-    },
+    WrongDimension { shape: &'static str, dimension: i32 },
     /// There is nothing to compute on.
     #[error("the file holds no tetrahedron: mesh in 3D, and save the physical volumes")]
     Empty,
     /// More than can be numbered.
     #[error("there are more than {most} {what}: too many for one mesh")]
-    TooLarge {
-        /// What is counted.
-        what: &'static str,
-        /// The limit.
-        most: u64,
-    },
+    TooLarge { what: &'static str, most: u64 },
     /// What the mesh itself refuses.
     #[error("{cause}")]
-    Mesh {
-        /// The message.
-        cause: String,
-    },
+    Mesh { cause: String },
 }
