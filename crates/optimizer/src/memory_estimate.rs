@@ -7,7 +7,7 @@
 //! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
 
 use fluxmorph_geometry::fem::workspace::LARGE_FACTOR;
-use fluxmorph_solver::linear::{Method, Reuse, SystemAnalysis, TWO_LEVELS_FROM};
+use fluxmorph_solver::linear::{Method, Reuse, SystemAnalysis, two_levels_from};
 use fluxmorph_solver::{FieldModel, Order};
 
 use crate::problem::Problem;
@@ -51,8 +51,8 @@ pub struct Sizes {
     unknowns: usize,
     /// Whether a factor preconditions one of them.
     has_factor: bool,
-    /// Whether two levels may take its place on a finer mesh.
-    may_have_two_levels: bool,
+    /// Unknowns from which two levels may take its place on a finer mesh.
+    two_levels_from: usize,
 }
 
 impl Sizes {
@@ -71,7 +71,11 @@ impl Sizes {
             tets,
             unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
             has_factor: solvers().any(|solver| is_factor(solver.method())),
-            may_have_two_levels: problem.states().iter().any(|state| state.angular_frequency() != 0.0),
+            two_levels_from: if problem.states().iter().any(|state| state.angular_frequency() != 0.0) {
+                two_levels_from(if quadratic { Order::Quadratic } else { Order::Linear })
+            } else {
+                usize::MAX
+            },
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
@@ -110,15 +114,15 @@ impl Sizes {
     /// and the most, with a factor.
     pub fn on_other_mesh(&self, growth: f64) -> [usize; 2] {
         let held = PROCESS + self.tets * HELD_BY_SETUP;
-        [self.may_have_two_levels, false].map(|may| held + self.grown(growth, may))
+        [self.two_levels_from, usize::MAX].map(|from| held + self.grown(growth, from))
     }
 
-    fn grown(&self, growth: f64, may_have_two_levels: bool) -> usize {
+    fn grown(&self, growth: f64, two_levels_from: usize) -> usize {
         let times = |bytes: usize, factor: f64| (bytes as f64 * factor) as usize;
         let unknowns = times(self.unknowns, growth);
         let preconditioners = if self.has_factor {
             let factor = times(self.preconditioners, growth.powf(FACTOR_GROWTH));
-            if !may_have_two_levels || unknowns < TWO_LEVELS_FROM {
+            if unknowns < two_levels_from {
                 factor
             } else {
                 factor.min(unknowns * TWO_LEVELS_PER_UNKNOWN).max(self.preconditioners)

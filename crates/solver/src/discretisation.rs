@@ -155,8 +155,8 @@ impl Discretisation {
         Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
 
-    /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones conductors in full and
-    /// aggregates elsewhere, by the couplings of `matrix`.
+    /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones ψ in full and aggregates of
+    /// `A`, by the couplings of `matrix`.
     ///
     /// # Errors
     /// As [`Unknowns::new`]; [`SolverError::Parameter`] for first-order edge elements, which have none.
@@ -183,10 +183,7 @@ impl Discretisation {
             let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
-        let mut conducts = vec![false; self.space.carrier_count()];
-        conductors.each(&self.space, |carriers| carriers.iter().for_each(|c| conducts[c.index()] = true));
-        let kept = |carrier: CarrierId| conducts[carrier.index()];
-        Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, kept, aggregation::PASSES))
+        Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, aggregation::PASSES))
     }
 
     /// What the unknowns of quadratic nodal elements are ordered by: the ends of their edges, each component's for itself, for

@@ -22,7 +22,7 @@ choice! {
         RealFactorSingle = "real_factor_single",
         /// An incomplete factor: little memory, many iterations.
         Incomplete = "incomplete",
-        /// Quadratic elements: linear ones on the same mesh, and an incomplete factor.
+        /// Nodal elements: a factor of a coarse space, and an incomplete one of the whole.
         TwoLevel = "two_level",
     }
 }

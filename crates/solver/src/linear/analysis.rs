@@ -70,14 +70,7 @@ impl SystemAnalysis {
         };
         analysis.method = match settings.method {
             LinearSolver::Fixed(method) => method,
-            LinearSolver::Automatic => {
-                let factor = analysis.cheapest_factor()?;
-                let unknowns = pattern.structure.row_count();
-                match factor {
-                    Some((method, _)) if unknowns < TWO_LEVELS_FROM => method,
-                    factor => analysis.two_levels_or(factor, &pattern)?,
-                }
-            }
+            LinearSolver::Automatic => analysis.cheapest(&pattern)?,
         };
         let reference = || (pattern.reference)();
         match analysis.method {
@@ -94,27 +87,27 @@ impl SystemAnalysis {
         Ok(analysis)
     }
 
-    /// Two levels where they are cheaper than the cheapest factor, and fit; without either, the incomplete factor.
-    fn two_levels_or(
-        &mut self,
-        factor: Option<(Method, f64)>,
-        pattern: &SystemPattern<'_>,
-    ) -> Result<Method, SolverError> {
+    /// The cheapest method that fits; without a factor or two levels, the incomplete factor.
+    fn cheapest(&mut self, pattern: &SystemPattern<'_>) -> Result<Method, SolverError> {
+        let unknowns = pattern.structure.row_count();
+        let is_large = self.order == Order::Linear && unknowns >= FACTORS_UP_TO;
+        let mut factor = if is_large { None } else { self.cheapest_factor()? };
+        if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.order)) {
+            return Ok(method);
+        }
         // A coarse level that cannot be made is none.
         self.two_level = two_levels(pattern).ok();
-        let fits = self.two_level.is_some() && self.fits(Method::TwoLevel);
-        let cost = if fits { self.cost_of_design(Method::TwoLevel)? } else { f64::INFINITY };
-        match factor {
-            Some((method, least)) if least <= cost => {
-                self.two_level = None;
-                Ok(method)
-            }
-            _ if fits => Ok(Method::TwoLevel),
-            _ => {
-                self.two_level = None;
-                Ok(Method::Incomplete)
+        if self.two_level.is_some() && self.fits(Method::TwoLevel) {
+            let cost = self.cost_of_design(Method::TwoLevel)?;
+            if factor.is_none_or(|(_, least)| cost < least) {
+                return Ok(Method::TwoLevel);
             }
         }
+        self.two_level = None;
+        if is_large {
+            factor = self.cheapest_factor()?;
+        }
+        Ok(factor.map_or(Method::Incomplete, |(method, _)| method))
     }
 
     /// The method that solutions begin with.
@@ -253,5 +246,15 @@ fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, Solv
     Ok(TwoLevelAnalysis::new(&matrix, prolongation)?)
 }
 
-/// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper.
-pub const TWO_LEVELS_FROM: usize = 60_000;
+/// Unknowns of linear elements from which a factor is not looked at where two levels fit: at half of that it takes twice as long,
+/// and its symbolic part alone as long as a solution.
+const FACTORS_UP_TO: usize = 200_000;
+
+/// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper, or
+/// as good as that.
+pub const fn two_levels_from(order: Order) -> usize {
+    match order {
+        Order::Linear => 45_000,
+        Order::Quadratic => 60_000,
+    }
+}

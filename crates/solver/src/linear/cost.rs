@@ -118,7 +118,7 @@ pub(crate) fn typical_iterations(method: Method, field: FieldKind, order: Order,
         (Method::RealFactor, FieldKind::Static) => 2,
         (Method::RealFactor | Method::RealFactorSingle, FieldKind::Harmonic) => 25,
         (Method::TwoLevel, _) if order == Order::Quadratic => 250,
-        (Method::TwoLevel, _) => 60,
+        (Method::TwoLevel, _) => (2.1 * (unknowns as f64).cbrt()) as usize,
         (Method::Incomplete, _) => (6.0 * (unknowns as f64).cbrt()) as usize,
     }
 }

@@ -21,7 +21,7 @@ pub enum Method {
     /// root of the number of unknowns.
     Incomplete,
     /// A factor in single precision for a coarse space, and an incomplete factor of the whole: linear elements on the same
-    /// mesh for quadratic ones; for linear ones, the conductors in full and aggregates of unknowns elsewhere.
+    /// mesh for quadratic ones; for linear ones, the scalar potential in full and aggregates of the unknowns of `A`.
     TwoLevel,
 }
 
@@ -67,7 +67,7 @@ impl Method {
 /// Who chooses the method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LinearSolver {
-    /// The program: the cheapest one whose factor fits ([`LinearSolverSettings::factor_bytes`]); two levels for quadratic elements.
+    /// The program: the cheapest one that fits ([`LinearSolverSettings::factor_bytes`]).
     #[default]
     Automatic,
     /// The user. Where it fails, a more robust one follows as with [`LinearSolver::Automatic`].

@@ -25,7 +25,7 @@ pub(crate) mod transfer;
 mod two_level;
 
 pub(crate) use analysis::SystemPattern;
-pub use analysis::{SystemAnalysis, TWO_LEVELS_FROM};
+pub use analysis::{SystemAnalysis, two_levels_from};
 pub use cache::LinearSolverCache;
 pub use distributed::{DistributedMethod, DistributedSettings, DistributedSystem};
 pub(crate) use method::FieldKind;
