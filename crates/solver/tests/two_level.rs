@@ -1,4 +1,4 @@
-//! The two-level preconditioner on skin-graded meshes of the shield: its iterations are few, its bits do not depend on the threads.
+//! The two-level preconditioner on skin-graded meshes of the shield: its iterations hardly grow, its bits do not depend on the threads.
 
 use crate::{STEEL, on_threads, over_a_plate};
 use fluxmorph_geometry::Mesh;
@@ -47,22 +47,24 @@ fn solved(mesh: &Mesh, order: Order) -> (usize, usize) {
     (report.iterations, model.unknown_count())
 }
 
-/// An incomplete factor alone needs more than five hundred on the largest of these meshes; they grow with its width (34, 49, 54).
+fn hardly_grows(order: Order, refinements: [f64; 3], most: usize) {
+    let counts = refinements.map(|refinement| solved(&mesh(refinement), order).0);
+    assert!(counts.iter().all(|&count| count <= most), "{counts:?}");
+    assert!(counts[2] <= counts[0] + counts[0] / 2, "{counts:?}");
+}
+
+/// The incomplete factor alone needs more than five hundred iterations on the largest of these meshes;
+/// two levels take 49, 54 and 58 (34 where the refinement is 0.25).
 #[test]
-fn linear_elements_take_few_iterations_on_skin_layers() {
-    for refinement in [0.25, 0.5, 0.75] {
-        let (count, unknowns) = solved(&mesh(refinement), Order::Linear);
-        assert!(count <= 60, "{count} on {unknowns} unknowns");
-    }
+fn the_iterations_of_linear_elements_hardly_grow_with_the_mesh() {
+    hardly_grows(Order::Linear, [0.5, 0.75, 1.0], 60);
 }
 
 /// Flat elements are hard for the smoother: about 300 iterations, but not more on finer meshes.
 #[test]
 #[ignore = "minutes: just test-long"]
 fn the_iterations_of_quadratic_elements_hardly_grow_with_the_mesh() {
-    let counts = [0.25, 0.4, 0.5].map(|refinement| solved(&mesh(refinement), Order::Quadratic).0);
-    assert!(counts.iter().all(|&count| count <= 350), "{counts:?}");
-    assert!(counts[2] <= counts[0] + counts[0] / 2, "{counts:?}");
+    hardly_grows(Order::Quadratic, [0.25, 0.4, 0.5], 350);
 }
 
 #[test]

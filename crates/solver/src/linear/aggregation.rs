@@ -2,8 +2,8 @@
 //!
 //! In a conductor much thicker than the skin depth the fields `(A, ψ) = (∇χ, −χ)` carry no current and almost no energy:
 //! a component-wise or local preconditioner does not see them, and an incomplete factor needs thousands of iterations.
-//! The unknowns of `ψ` therefore stay in the coarse space one by one; `A` may be aggregated in conductors as elsewhere. The
-//! system is close to one Laplacian a component there, for which piecewise constants on aggregates of about 2^passes strongly
+//! The unknowns of `ψ` therefore stay in the coarse space one by one; `A` is aggregated in conductors as elsewhere. In the air
+//! the system is close to one Laplacian a component, for which piecewise constants on aggregates of about 2^passes strongly
 //! coupled unknowns do (pairwise aggregation: Notay, Electron. Trans. Numer. Anal. 37 (2010) 123). The Galerkin product couples
 //! the components.
 
@@ -16,7 +16,7 @@ use fluxmorph_geometry::fem::{CsrMatrix, DofMap, c64};
 use crate::unknowns::PSI;
 
 /// Passes of pairing: 8 unknowns an aggregate. At a million tetrahedra one pass fewer saves a quarter of the iterations and takes
-/// 2.7 times as long for the coarse factor; one more costs half of the iterations.
+/// 2.7 times as long for the coarse factor; one more takes half as many iterations again.
 pub(crate) const PASSES: usize = 3;
 
 /// Share of the strongest coupling of an unknown below which another one is no partner: pairs across thin cells only.

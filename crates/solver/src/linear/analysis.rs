@@ -246,8 +246,8 @@ fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, Solv
     Ok(TwoLevelAnalysis::new(&matrix, prolongation)?)
 }
 
-/// Unknowns of linear elements from which a factor is not looked at where two levels fit: at half of that it takes twice as long,
-/// and its symbolic part alone as long as a solution.
+/// Unknowns of linear elements from which a factor is not looked at where two levels fit: there it takes three times as long, and
+/// the symbolic part alone takes seconds.
 const FACTORS_UP_TO: usize = 200_000;
 
 /// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper, or
