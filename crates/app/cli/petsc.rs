@@ -121,7 +121,9 @@ impl PetscSolver {
             counts[0].push(inside as i32);
             counts[1].push((columns.len() - inside) as i32);
         }
-        let shape = Shape { count: layout.count(), inside: &counts[0], outside: &counts[1] };
+        let [inside, outside] = &counts;
+        let aggregates = rows.aggregates.as_ref().map(|coarse| (coarse.of_row.as_slice(), coarse.count));
+        let shape = Shape { count: layout.count(), inside, outside, aggregates };
         let settings = Settings {
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,
@@ -148,25 +150,17 @@ impl PetscSolver {
 
 impl DistributedSolver for PetscSolver {
     fn set_matrix(&mut self, values: &[c64]) -> Result<(), String> {
-        let structure = &self.rows.structure;
-        let number = |&e: &u32| self.rows.layout.row_of(e as usize);
-        let columns: Vec<u32> = structure.columns.iter().map(number).collect();
-        let values: Vec<[f64; 2]> = values.iter().map(|v| [v.re, v.im]).collect();
-        self.solver.set(&structure.row_starts, &columns, &values)
+        let (structure, numbers) = (&self.rows.structure, self.rows.layout.row_numbers());
+        self.solver.set(&structure.row_starts, &structure.columns, numbers, values)
     }
 
     fn solve(&mut self, right_side: &[c64], solution: &mut [c64]) -> Result<Solved, String> {
-        let right_side: Vec<[f64; 2]> = right_side.iter().map(|b| [b.re, b.im]).collect();
-        let mut found = vec![[0.0; 2]; solution.len()];
-        let (iterations, residual, reason) = self.solver.solve(&right_side, &mut found, self.tolerance)?;
+        let (iterations, residual, reason) = self.solver.solve(right_side, solution, self.tolerance)?;
         self.check_options()?;
         if residual.is_nan() || residual > LOST {
             return Err(format!(
                 "the iteration reached the relative residual {residual:.1e} in {iterations} iterations ({reason}); {ADVICE}"
             ));
-        }
-        for (x, [re, im]) in solution.iter_mut().zip(found) {
-            *x = c64::new(re, im);
         }
         Ok(Solved { iterations, residual })
     }
@@ -212,6 +206,10 @@ fn solver_options(options: &SolverOptions) -> Vec<(&'static str, String)> {
             add("pc_asm_overlap", &overlap.to_string());
             add("pc_asm_type", if options.krylov == Krylov::Gmres { "restrict" } else { "basic" });
             add("sub_ksp_type", "preonly");
+            // Of the second level, where there is one.
+            add("coarse_ksp_type", "preonly");
+            add("coarse_pc_type", "cholesky");
+            add("coarse_pc_factor_mat_solver_type", "mumps");
             match (sub_solver, options.krylov) {
                 (SubSolver::Complete, _) => {
                     add("sub_pc_type", "cholesky");
@@ -250,7 +248,7 @@ fn option_pairs(text: &str) -> Vec<(&str, &str)> {
 
 /// Whether an option belongs to the solvers of the field, so that one of them must have asked for it once it has solved.
 fn is_field_option(name: &str) -> bool {
-    ["-ksp_", "-pc_", "-sub_", "-mat_mumps_"].iter().any(|start| name.starts_with(start))
+    ["-ksp_", "-pc_", "-sub_", "-coarse_", "-mat_mumps_"].iter().any(|start| name.starts_with(start))
 }
 
 #[cfg(test)]

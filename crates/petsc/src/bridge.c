@@ -174,6 +174,11 @@ typedef struct {
     Vec right_side, solution, residual;
     /* Of the iteration for complex symmetric matrices; NULL where PETSc iterates. */
     Vec preconditioned, direction, image;
+    /* Of the second level; NULL where there is one alone. */
+    PC smoother;
+    Mat prolongation, coarse_matrix;
+    KSP coarse;
+    Vec rest, restricted, correction;
     PetscInt own, first;
     PetscReal tolerance;
     int most;
@@ -191,6 +196,13 @@ void fm_solver_destroy(fm_solver *solver) {
     VecDestroy(&solver->preconditioned);
     VecDestroy(&solver->direction);
     VecDestroy(&solver->image);
+    PCDestroy(&solver->smoother);
+    MatDestroy(&solver->prolongation);
+    MatDestroy(&solver->coarse_matrix);
+    KSPDestroy(&solver->coarse);
+    VecDestroy(&solver->rest);
+    VecDestroy(&solver->restricted);
+    VecDestroy(&solver->correction);
     free(solver);
 }
 
@@ -213,8 +225,58 @@ static int agree(PetscErrorCode code) {
         }                                                                                                                      \
     } while (0)
 
+/* x += Q (b - K x) with Q = P (P' K P)^-1 P': the residual has no coarse part then. The coarse space is real: P' is plain. */
+static PetscErrorCode correct(fm_solver *solver, Vec right_side, Vec solution) {
+    TRY(MatMult(solver->matrix, solution, solver->rest));
+    TRY(VecAYPX(solver->rest, -1.0, right_side));
+    TRY(MatMultTranspose(solver->prolongation, solver->rest, solver->restricted));
+    TRY(KSPSolve(solver->coarse, solver->restricted, solver->correction));
+    TRY(MatMultAdd(solver->prolongation, solver->correction, solution, solution));
+    return 0;
+}
+
+/* z = S r + Q (r - K S r), with the preconditioner S of the options: "A-DEF2" of Tang, Nabben, Vuik and Erlangga, J. Sci.
+ * Comput. 39 (2009) 340. */
+static PetscErrorCode apply_two_levels(PC pc, Vec right_side, Vec solution) {
+    fm_solver *solver = NULL;
+    TRY(PCShellGetContext(pc, &solver));
+    TRY(PCApply(solver->smoother, right_side, solution));
+    TRY(correct(solver, right_side, solution));
+    return 0;
+}
+
+/* Puts a second level behind the preconditioner that the options name: row i of the prolongation has its one entry, 1, in
+ * column aggregates[i] of the `count` that this rank has. The coarse solver is called as the solver itself, with `coarse_`. */
+static int add_coarse_level(fm_solver *solver, const char *prefix, const uint32_t *aggregates, int64_t count) {
+    PetscInt first = 0;
+    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, (PetscInt)count, PETSC_DETERMINE, PETSC_DETERMINE, 1, NULL, 0, NULL,
+                     &solver->prolongation));
+    TRY(MatGetOwnershipRangeColumn(solver->prolongation, &first, NULL));
+    for (PetscInt row = 0; row < solver->own; row++) {
+        TRY(MatSetValue(solver->prolongation, solver->first + row, first + (PetscInt)aggregates[row], 1.0, INSERT_VALUES));
+    }
+    TRY(MatAssemblyBegin(solver->prolongation, MAT_FINAL_ASSEMBLY));
+    TRY(MatAssemblyEnd(solver->prolongation, MAT_FINAL_ASSEMBLY));
+    TRY(MatCreateVecs(solver->prolongation, &solver->restricted, &solver->rest));
+    TRY(VecDuplicate(solver->restricted, &solver->correction));
+    TRY(KSPCreate(PETSC_COMM_WORLD, &solver->coarse));
+    TRY(KSPSetOptionsPrefix(solver->coarse, prefix));
+    TRY(KSPAppendOptionsPrefix(solver->coarse, "coarse_"));
+    TRY(KSPSetFromOptions(solver->coarse));
+    TRY(KSPGetPC(solver->ksp, &solver->smoother));
+    TRY(PetscObjectReference((PetscObject)solver->smoother));
+    PC both = NULL;
+    TRY(PCCreate(PETSC_COMM_WORLD, &both));
+    TRY(PCSetType(both, PCSHELL));
+    TRY(PCShellSetContext(both, solver));
+    TRY(PCShellSetApply(both, apply_two_levels));
+    TRY(KSPSetPC(solver->ksp, both));
+    TRY(PCDestroy(&both));
+    return 0;
+}
+
 static int create(fm_solver *solver, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
-                double tolerance, int max_iterations, int symmetric) {
+                double tolerance, int max_iterations, int symmetric, const uint32_t *aggregates, int64_t aggregate_count) {
     PetscInt own = solver->own;
     if (count > (int64_t)PETSC_MAX_INT) {
         say("more equations than this PETSc can number: it needs one configured with --with-64-bit-indices");
@@ -252,13 +314,15 @@ static int create(fm_solver *solver, int64_t count, const int32_t *inside, const
     TRY(KSPSetOptionsPrefix(solver->ksp, prefix));
     TRY(KSPSetTolerances(solver->ksp, tolerance, 0.0, PETSC_DEFAULT, max_iterations));
     TRY(KSPSetFromOptions(solver->ksp));
-    return 0;
+    return aggregates == NULL ? 0 : add_coarse_level(solver, prefix, aggregates, aggregate_count);
 }
 
 /* A solver for `count` equations, of which this rank owns `own`; `inside` and `outside` are the entries of each own row in
- * the columns of this rank and in those of others; `symmetric` for the iteration of `cocg`. */
+ * the columns of this rank and in those of others; `symmetric` for the iteration of `cocg`; `aggregates` of the own rows, or
+ * NULL for one level. */
 int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
-                     double tolerance, int max_iterations, int symmetric, fm_solver **created) {
+                     double tolerance, int max_iterations, int symmetric, const uint32_t *aggregates, int64_t aggregate_count,
+                     fm_solver **created) {
     message[0] = 0;
     fm_solver *solver = calloc(1, sizeof *solver);
     *created = solver;
@@ -267,14 +331,15 @@ int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const in
         return 1;
     }
     solver->own = (PetscInt)own;
-    return create(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric);
+    return create(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric, aggregates, aggregate_count);
 }
 
 /* The name of what KSPSolve ended with. */
 const char *fm_reason(int reason) { return KSPConvergedReasons[reason]; }
 
 /* Inserts values into the own rows; no rank waits for another. */
-static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
+static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const uint32_t *numbers,
+                                    const double *values) {
     PetscInt longest = 0;
     for (PetscInt row = 0; row < solver->own; row++) {
         PetscInt length = (PetscInt)(starts[row + 1] - starts[row]);
@@ -285,7 +350,7 @@ static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, c
     for (PetscInt row = 0; row < solver->own; row++) {
         PetscInt length = (PetscInt)(starts[row + 1] - starts[row]), number = solver->first + row;
         for (PetscInt k = 0; k < length; k++) {
-            at[k] = (PetscInt)columns[starts[row] + (uint32_t)k];
+            at[k] = (PetscInt)numbers[columns[starts[row] + (uint32_t)k]];
         }
         const PetscScalar *entries = (const PetscScalar *)(values + 2 * (size_t)starts[row]);
         TRY(MatSetValues(solver->matrix, 1, &number, length, at, entries, INSERT_VALUES));
@@ -294,10 +359,39 @@ static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, c
     return 0;
 }
 
-/* Takes values: entries of own row i are at starts[i] .. starts[i + 1], `columns` are numbers in the distributed matrix. */
-int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const double *values) {
+/* Why a preconditioner that was set up cannot be applied on this rank. */
+static PetscErrorCode check_preconditioner(PC pc, PCFailedReason *found) {
+    PCFailedReason reason = PC_NOERROR;
+    TRY(PCGetFailedReasonRank(pc, &reason));
+    if (reason != PC_NOERROR) {
+        *found = reason;
+    }
+    return 0;
+}
+
+/* Factors what the second level has of the matrix. */
+static PetscErrorCode set_up_coarse_level(fm_solver *solver, PCFailedReason *found) {
+    MatReuse reuse = solver->coarse_matrix == NULL ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX;
+    TRY(MatPtAP(solver->matrix, solver->prolongation, reuse, PETSC_DEFAULT, &solver->coarse_matrix));
+    TRY(MatSetOption(solver->coarse_matrix, MAT_SYMMETRIC, PETSC_TRUE));
+    TRY(KSPSetOperators(solver->coarse, solver->coarse_matrix, solver->coarse_matrix));
+    TRY(KSPSetUp(solver->coarse));
+    PC pc = NULL;
+    TRY(KSPGetPC(solver->coarse, &pc));
+    TRY(check_preconditioner(pc, found));
+    TRY(PCSetOperators(solver->smoother, solver->matrix, solver->matrix));
+    TRY(PCSetUp(solver->smoother));
+    TRY(PCSetUpOnBlocks(solver->smoother));
+    TRY(check_preconditioner(solver->smoother, found));
+    return 0;
+}
+
+/* Takes values: entries of own row i are at starts[i] .. starts[i + 1], in columns whose numbers in the distributed matrix are
+ * numbers[columns[..]]. */
+int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *columns, const uint32_t *numbers,
+                  const double *values) {
     message[0] = 0;
-    if (agree(insert_values(solver, starts, columns, values))) {
+    if (agree(insert_values(solver, starts, columns, numbers, values))) {
         return 1;
     }
     TRY(MatAssemblyBegin(solver->matrix, MAT_FINAL_ASSEMBLY));
@@ -308,7 +402,10 @@ int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *col
     PC pc = NULL;
     PCFailedReason reason = PC_NOERROR;
     TRY(KSPGetPC(solver->ksp, &pc));
-    TRY(PCGetFailedReasonRank(pc, &reason));
+    TRY(check_preconditioner(pc, &reason));
+    if (solver->coarse != NULL) {
+        TRY(set_up_coarse_level(solver, &reason));
+    }
     int failed = reason != PC_NOERROR, any = 0;
     MPI_Allreduce(&failed, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
     if (any) {
@@ -323,6 +420,10 @@ int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *col
 static int cocg(fm_solver *solver, PetscReal target, PetscInt *done, KSPConvergedReason *reason) {
     PC pc = NULL;
     TRY(KSPGetPC(solver->ksp, &pc));
+    if (solver->coarse != NULL) {
+        /* For residuals without a coarse part the two levels are complex symmetric, and the iteration keeps them so. */
+        TRY(correct(solver, solver->right_side, solver->solution));
+    }
     TRY(MatMult(solver->matrix, solver->solution, solver->residual));
     TRY(VecAYPX(solver->residual, -1.0, solver->right_side));
     PetscScalar rho = 1.0, before = 1.0, curvature = 1.0;

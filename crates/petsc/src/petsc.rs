@@ -2,13 +2,15 @@
 //!
 //! PETSc is not made for several threads. MPI is started so that any thread may call it, one at a time: a lock sees to that.
 //! All functions but those that say otherwise are *collective*: every rank calls them, in the same order. Complex numbers are
-//! pairs of real ones.
+//! pairs of real ones, real part first, as C has them.
 
 #![allow(unsafe_code)]
 
 use std::ffi::{CStr, CString, c_char, c_double, c_int};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use num_complex::Complex64;
 
 /// A solver of `bridge.c`, which alone knows what is in it.
 #[repr(C)]
@@ -40,12 +42,15 @@ unsafe extern "C" {
         tolerance: c_double,
         max_iterations: c_int,
         symmetric: c_int,
+        aggregates: *const u32,
+        aggregate_count: i64,
         created: *mut *mut RawSolver,
     ) -> c_int;
     fn fm_solver_set(
         solver: *mut RawSolver,
         starts: *const u32,
         columns: *const u32,
+        numbers: *const u32,
         values: *const c_double,
     ) -> c_int;
     fn fm_solver_solve(
@@ -207,7 +212,7 @@ impl Petsc {
     /// What PETSc says.
     ///
     /// # Panics
-    /// Unless `inside` and `outside` have one number a row.
+    /// Unless `inside`, `outside` and the aggregates have one number a row.
     pub fn solver(&self, shape: &Shape<'_>, prefix: &str, settings: &Settings) -> Result<Solver, String> {
         Solver::new(Arc::clone(&self.session), shape, prefix, settings)
     }
@@ -234,6 +239,8 @@ pub struct Shape<'a> {
     pub inside: &'a [i32],
     /// Entries of every own row in columns of other ranks.
     pub outside: &'a [i32],
+    /// The aggregate of every own row and how many this rank has, where there is a second level.
+    pub aggregates: Option<(&'a [u32], usize)>,
 }
 
 /// A solver of PETSc.
@@ -256,13 +263,20 @@ impl Solver {
         settings: &Settings,
     ) -> Result<Self, String> {
         assert_eq!(shape.inside.len(), shape.outside.len(), "one number a row");
+        let is_one_a_row = |(aggregates, _): (&[u32], usize)| aggregates.len() == shape.inside.len();
+        assert!(shape.aggregates.is_none_or(is_one_a_row), "one aggregate a row");
+        let (aggregates, aggregate_count) = match shape.aggregates {
+            Some((aggregates, count)) => (aggregates.as_ptr(), count as i64),
+            None => (std::ptr::null(), 0),
+        };
         let _one = calling();
         let prefix = text(prefix);
         let (tolerance, symmetric) = (settings.tolerance, c_int::from(settings.is_complex_symmetric));
         let own = shape.inside.len();
         let mut raw = std::ptr::null_mut();
         let limit = c_int::try_from(settings.max_iterations).unwrap_or(c_int::MAX);
-        // SAFETY: both arrays have one number for each of `own` rows, as asserted; all pointers outlive the call.
+        // SAFETY: all arrays have one number for each of `own` rows, as asserted, or are null where that is allowed; all
+        // pointers outlive the call.
         let code = unsafe {
             let (inside, outside) = (shape.inside.as_ptr(), shape.outside.as_ptr());
             let (own, count) = (own as i64, shape.count as i64);
@@ -275,6 +289,8 @@ impl Solver {
                 tolerance,
                 limit,
                 symmetric,
+                aggregates,
+                aggregate_count,
                 &mut raw,
             )
         };
@@ -285,22 +301,32 @@ impl Solver {
         outcome.map(|()| solver)
     }
 
-    /// Takes the values of the own rows, pairs of numbers, and factors; `columns` are numbers in the distributed matrix.
+    /// Takes the values of the own rows, and factors; `columns` are those of the caller, with their numbers in the distributed
+    /// matrix in `numbers`.
     ///
     /// # Errors
     /// What PETSc says.
     ///
     /// # Panics
-    /// Unless the rows are as many as the solver has, and the columns and values those of the rows.
-    pub fn set(&mut self, starts: &[u32], columns: &[u32], values: &[[f64; 2]]) -> Result<(), String> {
+    /// Unless the rows are as many as the solver has, the columns and values those of the rows, and all columns numbered.
+    pub fn set(
+        &mut self,
+        starts: &[u32],
+        columns: &[u32],
+        numbers: &[u32],
+        values: &[Complex64],
+    ) -> Result<(), String> {
         assert_eq!(starts.len(), self.own + 1, "one start a row, and the end");
         assert!(starts.is_sorted(), "rows follow each other");
         let entries = starts[self.own] as usize;
         assert!(columns.len() == entries && values.len() == entries, "one column and value an entry");
+        assert!(columns.iter().all(|&c| (c as usize) < numbers.len()), "every column has a number");
         let _one = calling();
-        // SAFETY: the solver is one that was created; the arrays have the lengths that the starts say, as asserted.
+        // SAFETY: the solver is one that was created; the arrays have the lengths that the starts say, and every column a number,
+        // as asserted; a complex number is two doubles in C's order.
         outcome(unsafe {
-            fm_solver_set(self.raw, starts.as_ptr(), columns.as_ptr(), values.as_flattened().as_ptr())
+            let (starts, columns, numbers) = (starts.as_ptr(), columns.as_ptr(), numbers.as_ptr());
+            fm_solver_set(self.raw, starts, columns, numbers, values.as_ptr().cast())
         })
     }
 
@@ -311,19 +337,20 @@ impl Solver {
     /// What PETSc says.
     ///
     /// # Panics
-    /// Unless both vectors have one pair of numbers a row.
+    /// Unless both vectors have one number a row.
     pub fn solve(
         &mut self,
-        right_side: &[[f64; 2]],
-        solution: &mut [[f64; 2]],
+        right_side: &[Complex64],
+        solution: &mut [Complex64],
         tolerance: f64,
     ) -> Result<(usize, f64, String), String> {
-        assert!(right_side.len() == self.own && solution.len() == self.own, "one pair a row");
+        assert!(right_side.len() == self.own && solution.len() == self.own, "one number a row");
         let _one = calling();
         let (mut iterations, mut residual, mut reason): (c_int, c_double, c_int) = (0, f64::NAN, 0);
-        // SAFETY: the solver is one that was created; both vectors have a pair for each of its rows, as asserted.
+        // SAFETY: the solver is one that was created; both vectors have a number for each of its rows, as asserted;
+        // a complex number is two doubles in C's order.
         outcome(unsafe {
-            let (b, x) = (right_side.as_flattened().as_ptr(), solution.as_flattened_mut().as_mut_ptr());
+            let (b, x) = (right_side.as_ptr().cast(), solution.as_mut_ptr().cast());
             fm_solver_solve(self.raw, b, x, tolerance, &mut iterations, &mut residual, &mut reason)
         })?;
         // SAFETY: the reason is one that the library gave, and its name a static text that is terminated.

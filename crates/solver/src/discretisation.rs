@@ -7,7 +7,7 @@
 use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, Hosts, LocalMatrix, c64,
 };
-use fluxmorph_geometry::parallel::Ownership;
+use fluxmorph_geometry::parallel::{Aggregates, Ownership, RowLayout};
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
@@ -184,6 +184,18 @@ impl Discretisation {
             return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
         }
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, aggregation::PASSES))
+    }
+
+    /// The coarse space of the rows of this rank, by the couplings of their matrix; linear nodal elements alone have one.
+    pub(crate) fn aggregates(
+        &self,
+        layout: &RowLayout,
+        matrix: impl FnOnce() -> CsrMatrix<c64>,
+    ) -> Option<Aggregates> {
+        let is_aggregated =
+            (self.space.family(), self.space.order()) == (ElementFamily::Nodal, Order::Linear);
+        let (dofs, owned) = (&self.unknowns.dofs, layout.owned());
+        is_aggregated.then(|| aggregation::aggregates(dofs, owned, &matrix(), aggregation::PASSES))
     }
 
     /// What the unknowns of quadratic nodal elements are ordered by: the ends of their edges, each component's for itself, for

@@ -70,7 +70,7 @@ table! {
 }
 
 /// How the names of options begin that solvers read; all others are of the library itself, which reads and writes files.
-const KNOWN: [&str; 5] = ["-ksp_", "-pc_", "-sub_", "-mat_mumps_", "-elastic_"];
+const KNOWN: [&str; 6] = ["-ksp_", "-pc_", "-sub_", "-coarse_", "-mat_mumps_", "-elastic_"];
 
 /// What is wrong with options, and what is expected.
 fn fault_of(options: &str, krylov: PetscKrylov) -> Option<(String, String)> {

@@ -43,6 +43,17 @@ pub struct Rows {
     pub structure: Arc<CsrStructure>,
     /// Who owns which equation.
     pub layout: Arc<RowLayout>,
+    /// The coarse space of a second level, where there is one.
+    pub aggregates: Option<Arc<Aggregates>>,
+}
+
+/// A coarse space of piecewise constants on aggregates of own rows; no aggregate reaches beyond its rank.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Aggregates {
+    /// The aggregate of every own row, numbered from 0 on each rank.
+    pub of_row: Vec<u32>,
+    /// How many this rank has.
+    pub count: usize,
 }
 
 /// A distributed matrix and what solves with it. All operations are collective.

@@ -76,6 +76,11 @@ impl RowLayout {
         self.row_of[equation]
     }
 
+    /// Row of every equation.
+    pub fn row_numbers(&self) -> &[u32] {
+        &self.row_of
+    }
+
     /// Equations of this rank, in the order of its rows.
     pub fn owned(&self) -> &[u32] {
         &self.owned

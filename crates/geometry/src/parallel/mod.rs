@@ -20,7 +20,8 @@ pub mod rank_group;
 pub mod threads;
 
 pub use communicator::{
-    Communicator, DistributedSolver, Krylov, Preconditioning, Rows, Solved, SolverOptions, SubSolver,
+    Aggregates, Communicator, DistributedSolver, Krylov, Preconditioning, Rows, Solved, SolverOptions,
+    SubSolver,
 };
 pub use layout::RowLayout;
 pub use matrix::{DistributedMatrix, solution_of};

@@ -11,7 +11,7 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 use super::leader::{ASSEMBLE, DIFFERENTIATE, MOVING, STATE};
 use crate::adjoint::{self, Extent};
 use crate::linear::distributed::SOLVE;
-use crate::linear::{DistributedSettings, LinearSolverReport};
+use crate::linear::{DistributedMethod, DistributedSettings, LinearSolverReport};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 
@@ -29,13 +29,23 @@ pub(crate) struct Follower {
 }
 
 impl Follower {
-    /// Of a problem that every rank has set up.
-    pub(crate) fn new(model: FieldModel, ownership: Ownership, settings: &DistributedSettings) -> Self {
+    /// Of a problem that every rank has set up on a reference mesh.
+    pub(crate) fn new(
+        model: FieldModel,
+        reference: &Mesh,
+        ownership: Ownership,
+        settings: &DistributedSettings,
+    ) -> Self {
         let discretisation = model.discretisation();
         let (space, dofs) = (&discretisation.space, &discretisation.unknowns.dofs);
         let owner = |carrier: CarrierId| ownership.partition.owner_of(space.vertices_of(carrier)[0]);
         let layout = Arc::new(RowLayout::new(dofs, ownership.group.size(), ownership.group.rank(), owner));
-        let rows = Rows { structure: Arc::clone(discretisation.pattern.structure()), layout };
+        let aggregates = match settings.method_for(dofs.count()) {
+            DistributedMethod::Direct => None,
+            DistributedMethod::Schwarz => discretisation.aggregates(&layout, || model.assemble(reference)),
+        };
+        let structure = Arc::clone(discretisation.pattern.structure());
+        let rows = Rows { structure, layout, aggregates: aggregates.map(Arc::new) };
         let tolerance = model.setup().linear_solver.tolerance;
         let limit = model.setup().linear_solver.max_iterations.unwrap_or(MAX_ITERATIONS);
         let options = settings.options("", dofs.count(), (tolerance, limit));

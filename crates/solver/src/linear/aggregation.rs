@@ -12,6 +12,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::CarrierId;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap, c64};
+use fluxmorph_geometry::parallel::Aggregates;
 
 use crate::unknowns::PSI;
 
@@ -32,8 +33,22 @@ type Graph = Vec<Vec<(u32, f64)>>;
 ///
 /// The couplings are those of `matrix`: the coarse space is made once, on the reference mesh.
 pub(crate) fn prolongation(dofs: &DofMap<4>, matrix: &CsrMatrix<c64>, passes: usize) -> CsrMatrix<f64> {
-    let n = dofs.count();
-    let mut component = vec![PSI; n];
+    let n = dofs.count() as u32;
+    let all: Vec<u32> = (0..n).collect();
+    let Aggregates { of_row: columns, count } = aggregates(dofs, &all, matrix, passes);
+    let structure = CsrStructure { column_count: count, row_starts: (0..=n).collect(), columns };
+    CsrMatrix { structure: Arc::new(structure), values: vec![1.0; n as usize] }
+}
+
+/// The aggregate of every row of `matrix`, which are those of the equations `owned`; its columns are all equations, of which
+/// only the owned ones are aggregated.
+pub(crate) fn aggregates(
+    dofs: &DofMap<4>,
+    owned: &[u32],
+    matrix: &CsrMatrix<c64>,
+    passes: usize,
+) -> Aggregates {
+    let mut component = vec![PSI; dofs.count()];
     for node in (0..dofs.carrier_count()).map(CarrierId::new) {
         for c in 0..PSI {
             if let Some(equation) = dofs.equation(node, c) {
@@ -41,36 +56,40 @@ pub(crate) fn prolongation(dofs: &DofMap<4>, matrix: &CsrMatrix<c64>, passes: us
             }
         }
     }
-    let mut graph = couplings(matrix, &component);
-    let mut column: Vec<u32> = (0..n as u32).collect();
+    let mut graph = couplings(matrix, owned, &component);
+    let mut of_row: Vec<u32> = (0..owned.len() as u32).collect();
     for _ in 0..passes {
         let (aggregate, count) = pairs(&graph);
-        column.iter_mut().for_each(|own| *own = aggregate[*own as usize]);
+        of_row.iter_mut().for_each(|own| *own = aggregate[*own as usize]);
         graph = merge(&graph, &aggregate, count);
     }
     // Numbered in the order of their first unknown, so that neighbours stay neighbours.
     let mut number = vec![NONE; graph.len()];
-    let mut coarse = 0;
-    for own in &mut column {
+    let mut count = 0;
+    for own in &mut of_row {
         let number = &mut number[*own as usize];
         if *number == NONE {
-            *number = coarse;
-            coarse += 1;
+            *number = count;
+            count += 1;
         }
         *own = *number;
     }
-    let row_starts = (0..=n as u32).collect();
-    let structure = CsrStructure { column_count: coarse as usize, row_starts, columns: column };
-    CsrMatrix { structure: Arc::new(structure), values: vec![1.0; n] }
+    Aggregates { of_row, count: count as usize }
 }
 
-/// Couplings of the unknowns of `A` within their component.
-fn couplings(matrix: &CsrMatrix<c64>, component: &[usize]) -> Graph {
+/// Couplings of the owned unknowns of `A` within their component.
+fn couplings(matrix: &CsrMatrix<c64>, owned: &[u32], component: &[usize]) -> Graph {
     let structure = &matrix.structure;
+    let mut row_of = vec![NONE; component.len()];
+    for (row, &equation) in (0..).zip(owned) {
+        row_of[equation as usize] = row;
+    }
     let row = |i: usize| {
-        let partner = |c: usize| c != i && component[i] != PSI && component[c] == component[i];
-        let entries = structure.row(i).map(|k| (structure.columns[k], -matrix.values[k].re));
-        entries.filter(|entry| partner(entry.0 as usize)).collect()
+        let own = component[owned[i] as usize];
+        let entries = structure.row(i).map(|k| (structure.columns[k] as usize, -matrix.values[k].re));
+        let partners = entries.filter(|&(c, _)| own != PSI && component[c] == own);
+        let rows = partners.map(|(c, weight)| (row_of[c], weight));
+        rows.filter(|&(c, _)| c != NONE && c as usize != i).collect()
     };
     (0..structure.row_count()).map(row).collect()
 }
@@ -131,5 +150,22 @@ mod tests {
         let p = prolongation(&dofs, &matrix, 2);
         assert_eq!(p.structure.columns, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 4, 5, 6]);
         assert_eq!(p.structure.column_count, 7);
+    }
+
+    /// The same column over two ranks, which own every node of a half, and 5 besides the second.
+    #[test]
+    fn a_rank_aggregates_its_own_unknowns_alone() {
+        let n = 16usize;
+        let dofs = DofMap::<4>::new(n, |node, c| c == if node.index() < 12 { 0 } else { PSI });
+        let entry = |i, c| (c, c64::new(if c == i { 2.0 } else { -1.0 }, 0.0));
+        let row = |i: usize| (i.saturating_sub(1)..(i + 2).min(n)).map(|c| entry(i, c)).collect();
+        let of_rank = |owned: &[u32]| {
+            let matrix = CsrMatrix::from_rows(n, owned.iter().map(|&i| row(i as usize)));
+            aggregates(&dofs, owned, &matrix, 2)
+        };
+        let first = of_rank(&[0, 1, 2, 3, 4, 6, 7]);
+        assert_eq!((first.of_row, first.count), (vec![0, 0, 0, 0, 1, 2, 2], 3));
+        let second = of_rank(&[5, 8, 9, 10, 11, 12, 13, 14, 15]);
+        assert_eq!((second.of_row, second.count), (vec![0, 1, 1, 1, 1, 2, 3, 4, 5], 6));
     }
 }

@@ -59,13 +59,13 @@ impl FieldModel {
         let (sources, windings) = (Arc::new(sources), Arc::new(windings));
         let model =
             Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed: None };
-        Ok(model.distributed_over_ranks())
+        Ok(model.distributed_over_ranks(mesh))
     }
 
     /// The same, distributed where it has ranks and is not yet.
-    fn distributed_over_ranks(mut self) -> Self {
+    fn distributed_over_ranks(mut self, reference: &Mesh) -> Self {
         if let (Some((ownership, settings)), None) = (&self.setup.ownership, &self.distributed) {
-            let follower = Follower::new(self.clone(), ownership.clone(), settings);
+            let follower = Follower::new(self.clone(), reference, ownership.clone(), settings);
             self.distributed = Some(Arc::new(Distributed::new(&ownership.group, Box::new(follower))));
         }
         self
@@ -108,7 +108,7 @@ impl FieldModel {
         let distributed = self.distributed.clone().filter(|_| has_same_matrix);
         let (setup, shared) = (Arc::new(setup), Arc::clone(&self.shared));
         let model = Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed };
-        Ok(model.distributed_over_ranks())
+        Ok(model.distributed_over_ranks(mesh))
     }
 
     /// Checks a set-up; `ω` [rad/s] and the weak form.
