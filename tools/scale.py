@@ -34,11 +34,11 @@ MESHES = {
 # Settings of [analysis.petsc].
 SOLVERS = {
     "MUMPS": ["solver=mumps"],
-    "ASM, ILU(1), GMRES": ["solver=asm"],
-    "ASM, ILU(1), COCG": ["solver=asm", "krylov=cocg"],
+    "ASM, GMRES": ["solver=asm"],
+    "ASM, COCG": ["solver=asm", "krylov=cocg", "overlap=0"],
     "ASM, complete, GMRES": ["solver=asm", "sub_solver=complete"],
 }
-MEASURED = ["MUMPS", "ASM, ILU(1), GMRES"]
+MEASURED = ["MUMPS", "ASM, GMRES"]
 
 # Tables of a configuration that an analysis needs.
 KEPT = ["mesh", "analysis", "materials", "regions", "coils", "boundaries"]

@@ -11,7 +11,7 @@ fn options_of_petsc_pass_through_and_one_that_nothing_asks_for_is_named() {
         let settings = [&COARSE[..3], &["analysis.petsc.solver=asm", &setting]].concat();
         on(2, "solve", "shield.toml", &folder.path().join("run"), &settings)
     };
-    completed(with("-ksp_gmres_restart 40 -sub_pc_factor_levels 1").arg("--force"));
+    completed(with("-ksp_gmres_restart 40 -sub_pc_factor_levels 1 -coarse_pc_type lu").arg("--force"));
     finish(with("-ksp_tpye cg").arg("--force")).with(4, &["analysis.petsc.options", "`-ksp_tpye`"]);
     finish(with("-ksp_max_it 3").arg("--force")).with(4, &["reached the relative residual"]);
 }

@@ -108,7 +108,7 @@ impl PetscSolver {
         for (name, value) in &*field_options {
             petsc.set_option_default(&with_prefix(&prefix, name), value)?;
         }
-        for (name, value) in solver_options(options) {
+        for (name, value) in solver_options(options, rows.aggregates.is_some()) {
             petsc.set_option_default(&format!("-{prefix}{name}"), &value)?;
         }
         let (structure, layout) = (&rows.structure, &rows.layout);
@@ -176,7 +176,7 @@ fn with_prefix(prefix: &str, name: &str) -> String {
 /// Iterations are preconditioned from the right, and the norm of conjugate gradients is that of the residual itself, so that
 /// they stop by what is asked for. Conjugate gradients of either kind have the symmetric form of Schwarz's method, the other
 /// the restricted one. A direct solver is an iteration with a factor: what rounding leaves, one or two steps mend.
-fn solver_options(options: &SolverOptions) -> Vec<(&'static str, String)> {
+fn solver_options(options: &SolverOptions, has_coarse_level: bool) -> Vec<(&'static str, String)> {
     let mut list: Vec<(&str, String)> = Vec::new();
     let mut add = |name, value: &str| list.push((name, value.to_owned()));
     match options.krylov {
@@ -206,10 +206,13 @@ fn solver_options(options: &SolverOptions) -> Vec<(&'static str, String)> {
             add("pc_asm_overlap", &overlap.to_string());
             add("pc_asm_type", if options.krylov == Krylov::Gmres { "restrict" } else { "basic" });
             add("sub_ksp_type", "preonly");
-            // Of the second level, where there is one.
-            add("coarse_ksp_type", "preonly");
-            add("coarse_pc_type", "cholesky");
-            add("coarse_pc_factor_mat_solver_type", "mumps");
+            if has_coarse_level {
+                add("coarse_ksp_type", "preonly");
+                add("coarse_pc_type", "cholesky");
+                add("coarse_pc_factor_mat_solver_type", "mumps");
+                // Many pivots are put off in small fronts: 40 was too little on four ranks.
+                add("coarse_mat_mumps_icntl_14", "100");
+            }
             match (sub_solver, options.krylov) {
                 (SubSolver::Complete, _) => {
                     add("sub_pc_type", "cholesky");
@@ -220,6 +223,12 @@ fn solver_options(options: &SolverOptions) -> Vec<(&'static str, String)> {
                 (SubSolver::Incomplete, Krylov::Cg) => {
                     add("sub_pc_type", "icc");
                     add("sub_pc_factor_shift_type", "positive_definite");
+                }
+                // The coarse level has what thin elements leave to it: a factor without fill, of one triangle, does.
+                (SubSolver::Incomplete, _) if has_coarse_level => {
+                    add("sub_pc_type", "icc");
+                    add("sub_pc_factor_shift_type", "none");
+                    add("sub_pc_factor_mat_ordering_type", "rcm");
                 }
                 // One level of fill and a narrow band: without either, thin elements take ten times the iterations.
                 (SubSolver::Incomplete, _) => {
@@ -265,7 +274,8 @@ mod tests {
             let preconditioning = Preconditioning::Schwarz { overlap: 3, sub_solver: SubSolver::Incomplete };
             let options =
                 SolverOptions { prefix: "", krylov, preconditioning, tolerance: 1e-10, max_iterations: 9 };
-            let list = solver_options(&options);
+            let list = solver_options(&options, false);
+            assert_eq!(value(&list, "coarse_pc_type"), None);
             assert_eq!(value(&list, "pc_asm_type"), Some(kind));
             assert_eq!(value(&list, "pc_asm_overlap"), Some("3"));
         }

@@ -13,7 +13,8 @@ choice! {
         Automatic = "automatic",
         /// A factor over all ranks, by MUMPS: few iterations, much memory.
         Mumps = "mumps",
-        /// Additive Schwarz, one subdomain a rank: little memory, more iterations with every rank.
+        /// Additive Schwarz, one subdomain a rank: little memory. Of linear nodal elements it has a coarse level, with which more
+        /// ranks hardly take more iterations.
         Asm = "asm",
     }
 }
@@ -31,7 +32,7 @@ choice! {
 choice! {
     /// What solves on the subdomain of a rank.
     pub enum PetscSubSolver {
-        /// An incomplete factor with one level of fill.
+        /// An incomplete factor: without fill beside a coarse level, with one level of it elsewhere.
         Incomplete = "incomplete",
         /// A complete factor.
         Complete = "complete",

@@ -107,7 +107,8 @@ pub enum SubSolver {
 pub enum Preconditioning {
     /// A factor of the whole matrix, distributed over the ranks.
     Direct,
-    /// Additive Schwarz: one subdomain a rank, so many layers of the matrix graph larger than its own rows.
+    /// Additive Schwarz: one subdomain a rank, so many layers of the matrix graph larger than its own rows; with a second level
+    /// where there are [`Aggregates`].
     Schwarz {
         /// Layers of overlap.
         overlap: usize,
