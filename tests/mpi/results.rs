@@ -32,7 +32,7 @@ fn the_iterative_solvers_agree_with_the_direct_one() {
     ];
     for (k, (ranks, solver)) in solvers.iter().enumerate() {
         let own = folder.path().join(k.to_string());
-        let settings = [&settings, &["analysis.petsc.solver=asm"], *solver].concat();
+        let settings = [&settings[..], &["analysis.petsc.solver=asm"], *solver].concat();
         completed(&mut on(*ranks, "run", "shield.toml", &own, &settings));
         assert_same(&own, &direct);
         assert_eq!(result(&own)["linear_solver"]["methods"][0], "petsc asm");

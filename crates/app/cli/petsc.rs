@@ -183,7 +183,7 @@ fn solver_options(options: &SolverOptions, has_coarse_level: bool) -> Vec<(&'sta
         Krylov::Gmres => {
             add("ksp_type", "gmres");
             add("ksp_pc_side", "right");
-            // Vectors of a restart: with PETSc's 30 the iterations are several times as many (docs/scale.md).
+            // Vectors of a restart: with PETSc's 30 the iterations are several times as many.
             add("ksp_gmres_restart", "200");
         }
         // The bridge iterates; PETSc has the preconditioner.
@@ -210,7 +210,7 @@ fn solver_options(options: &SolverOptions, has_coarse_level: bool) -> Vec<(&'sta
                 add("coarse_ksp_type", "preonly");
                 add("coarse_pc_type", "cholesky");
                 add("coarse_pc_factor_mat_solver_type", "mumps");
-                // Many pivots are put off in small fronts: 40 was too little on four ranks.
+                // Room for delayed pivots, of which small fronts have many: 40 was too little on four ranks.
                 add("coarse_mat_mumps_icntl_14", "100");
             }
             match (sub_solver, options.krylov) {

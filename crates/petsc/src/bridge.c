@@ -245,15 +245,23 @@ static PetscErrorCode apply_two_levels(PC pc, Vec right_side, Vec solution) {
     return 0;
 }
 
-/* Puts a second level behind the preconditioner that the options name: row i of the prolongation has its one entry, 1, in
- * column aggregates[i] of the `count` that this rank has. The coarse solver is called as the solver itself, with `coarse_`. */
-static int add_coarse_level(fm_solver *solver, const char *prefix, const uint32_t *aggregates, int64_t count) {
+/* Row i of the prolongation has its one entry, 1, in column aggregates[i] of this rank's; no rank waits for another. */
+static PetscErrorCode insert_aggregates(fm_solver *solver, const uint32_t *aggregates) {
     PetscInt first = 0;
-    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, (PetscInt)count, PETSC_DETERMINE, PETSC_DETERMINE, 1, NULL, 0, NULL,
-                     &solver->prolongation));
     TRY(MatGetOwnershipRangeColumn(solver->prolongation, &first, NULL));
     for (PetscInt row = 0; row < solver->own; row++) {
         TRY(MatSetValue(solver->prolongation, solver->first + row, first + (PetscInt)aggregates[row], 1.0, INSERT_VALUES));
+    }
+    return 0;
+}
+
+/* Puts a second level behind the preconditioner that the options name, with the `count` aggregates of this rank and those of the
+ * others. The coarse solver is called as the solver itself, with `coarse_`. */
+static int add_coarse_level(fm_solver *solver, const char *prefix, const uint32_t *aggregates, int64_t count) {
+    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, (PetscInt)count, PETSC_DETERMINE, PETSC_DETERMINE, 1, NULL, 0, NULL,
+                     &solver->prolongation));
+    if (agree(insert_aggregates(solver, aggregates))) {
+        return 1;
     }
     TRY(MatAssemblyBegin(solver->prolongation, MAT_FINAL_ASSEMBLY));
     TRY(MatAssemblyEnd(solver->prolongation, MAT_FINAL_ASSEMBLY));
@@ -359,18 +367,23 @@ static PetscErrorCode insert_values(fm_solver *solver, const uint32_t *starts, c
     return 0;
 }
 
-/* Why a preconditioner that was set up cannot be applied on this rank. */
-static PetscErrorCode check_preconditioner(PC pc, PCFailedReason *found) {
+/* What cannot be applied on this rank though it was set up, and why; an earlier failure stays. */
+typedef struct {
+    const char *what;
+    PCFailedReason reason;
+} failure;
+
+static PetscErrorCode check_preconditioner(PC pc, const char *what, failure *found) {
     PCFailedReason reason = PC_NOERROR;
     TRY(PCGetFailedReasonRank(pc, &reason));
-    if (reason != PC_NOERROR) {
-        *found = reason;
+    if (reason != PC_NOERROR && found->reason == PC_NOERROR) {
+        *found = (failure){what, reason};
     }
     return 0;
 }
 
 /* Factors what the second level has of the matrix. */
-static PetscErrorCode set_up_coarse_level(fm_solver *solver, PCFailedReason *found) {
+static PetscErrorCode set_up_coarse_level(fm_solver *solver, failure *found) {
     MatReuse reuse = solver->coarse_matrix == NULL ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX;
     TRY(MatPtAP(solver->matrix, solver->prolongation, reuse, PETSC_DEFAULT, &solver->coarse_matrix));
     TRY(MatSetOption(solver->coarse_matrix, MAT_SYMMETRIC, PETSC_TRUE));
@@ -378,11 +391,11 @@ static PetscErrorCode set_up_coarse_level(fm_solver *solver, PCFailedReason *fou
     TRY(KSPSetUp(solver->coarse));
     PC pc = NULL;
     TRY(KSPGetPC(solver->coarse, &pc));
-    TRY(check_preconditioner(pc, found));
+    TRY(check_preconditioner(pc, "the factor of the coarse level", found));
     TRY(PCSetOperators(solver->smoother, solver->matrix, solver->matrix));
     TRY(PCSetUp(solver->smoother));
     TRY(PCSetUpOnBlocks(solver->smoother));
-    TRY(check_preconditioner(solver->smoother, found));
+    TRY(check_preconditioner(solver->smoother, "the factor of a subdomain", found));
     return 0;
 }
 
@@ -400,16 +413,19 @@ int fm_solver_set(fm_solver *solver, const uint32_t *starts, const uint32_t *col
     TRY(KSPSetUp(solver->ksp));
     TRY(KSPSetUpOnBlocks(solver->ksp));
     PC pc = NULL;
-    PCFailedReason reason = PC_NOERROR;
+    failure found = {NULL, PC_NOERROR};
     TRY(KSPGetPC(solver->ksp, &pc));
-    TRY(check_preconditioner(pc, &reason));
+    TRY(check_preconditioner(pc, "the preconditioner", &found));
     if (solver->coarse != NULL) {
-        TRY(set_up_coarse_level(solver, &reason));
+        TRY(set_up_coarse_level(solver, &found));
     }
-    int failed = reason != PC_NOERROR, any = 0;
+    int failed = found.reason != PC_NOERROR, any = 0;
     MPI_Allreduce(&failed, &any, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
     if (any) {
-        say(failed ? PCFailedReasons[reason] : "the preconditioner of another rank failed");
+        if (failed) {
+            snprintf(message, sizeof message, "%s failed: %s", found.what, PCFailedReasons[found.reason]);
+        }
+        say("the preconditioner of another rank failed");
         return 1;
     }
     return 0;

@@ -15,7 +15,7 @@ use crate::linear::{DistributedMethod, DistributedSettings, LinearSolverReport};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 
-/// Iterations after which an iteration gives up: ten times what thin elements were seen to take (docs/scale.md).
+/// Iterations after which an iteration gives up: twice what Schwarz's method without a coarse level took on thin elements (docs/scale.md).
 const MAX_ITERATIONS: usize = 3000;
 
 /// What a rank holds of a field problem.

@@ -54,7 +54,7 @@ impl DistributedMethod {
 pub const LARGEST_DIRECT: usize = 1_000_000;
 
 impl Default for DistributedSettings {
-    /// By size; two layers of overlap: with one the iterations were more than twice as many (docs/scale.md).
+    /// By size; two layers of overlap: with one the iterations were more than twice as many without a coarse level.
     fn default() -> Self {
         Self { method: None, krylov: Krylov::default(), overlap: 2, sub_solver: SubSolver::default() }
     }
