@@ -22,9 +22,10 @@ fn on_threads(device: &Device, home: &Path, threads: &str) -> Essence {
     essence(&files(&out))
 }
 
-/// Numbers of threads that are compared with one: where runs take milliseconds, and where they take seconds.
+/// Numbers of threads that are compared with one: where runs take milliseconds, and where they take seconds. Three divide nothing
+/// that is cut into powers of two, and leave one without a core on small machines.
 const ALL: [&str; 3] = ["2", "4", "8"];
-const FEW: [&str; 2] = ["2", "8"];
+const FEW: [&str; 1] = ["3"];
 
 fn same_on(numbers: &[&str], device: &Device) {
     let home = folder();
@@ -52,12 +53,13 @@ fn any_number_of_threads_writes_the_same_bits_with_every_linear_solver() {
 #[test]
 fn any_number_of_threads_writes_the_same_bits_on_systems_cut_into_many_tasks() {
     let home = folder();
-    let device = slow(home.path()).with("optimizer.max_evaluations=2");
-    same_on(&FEW, &device.clone().with("analysis.linear_solver.method=direct"));
+    // A state, its adjoint and the gradient: motion and further designs are compared on small systems.
+    let device = slow(home.path()).with("optimizer.max_evaluations=1");
+    let fine = [1, 2].map(|region| format!("mesh.boxes.regions.{region}.cells=[10, 10, 6]"));
+    let fine = fine.iter().fold(device.clone(), |device, cells| device.with(cells));
+    same_on(&FEW, &fine.with("analysis.linear_solver.method=direct"));
     // Iterations of an incomplete factor in three parts.
-    let coarse = [1, 2].map(|region| format!("mesh.boxes.regions.{region}.cells=[6, 6, 4]"));
-    let coarse = coarse.iter().fold(device, |device, cells| device.with(cells));
-    same_on(&FEW, &coarse.with("analysis.linear_solver.method=incomplete"));
+    same_on(&FEW, &device.with("analysis.linear_solver.method=incomplete"));
 }
 
 #[test]
@@ -70,7 +72,7 @@ fn any_number_of_threads_writes_the_same_bits_of_edge_elements() {
 
 #[test]
 fn any_number_of_threads_writes_the_same_bits_of_the_shields() {
-    let few = |device: Device| device.with("output.fields=every").with("optimizer.max_evaluations=3");
+    let few = |device: Device| device.with("output.fields=every").with("optimizer.max_evaluations=2");
     same_on(&FEW, &few(shipped("shield_quick", &[])));
     // Without the check on a finer mesh, which the first has.
     for name in ["shield_two_frequencies", "shield_two_loads"] {

@@ -89,7 +89,9 @@ fn a_run_that_is_killed_within_newtons_method_ends_as_if_it_had_not_been() {
 #[test]
 fn a_terminal_that_is_closed_loses_nothing() {
     let home = folder();
-    let device = shipped("shield_quick", &["--set", "output.fields=every"]);
+    let device = shipped("shield_quick", &["--set", "output.fields=every"])
+        .with("optimizer.max_evaluations=6")
+        .with("output.verify_refinement=0");
     let (expected, duration) = device.undisturbed(home.path());
     let out = home.path().join("out");
     let mut child = device.command("run", &out).stderr(Stdio::null()).spawn().expect("the program starts");

@@ -76,12 +76,12 @@ pub(crate) fn block(folder: &Path, evaluations: usize) -> Device {
     written("block", folder, &[CONSTRAINT, LINEAR, ("max_evaluations = 6", &evaluations)])
 }
 
-/// The block on elements so small that an evaluation takes about a second.
+/// The block on elements so small that an evaluation takes far longer than the answer to a signal.
 pub(crate) fn slow(folder: &Path) -> Device {
     let changes = [
         ("cells = [1, 1, 1]", "cells = [6, 6, 6]"),
-        ("cells = [2, 2, 1]", "cells = [10, 10, 6]"),
-        ("cells = [2, 2, 1]", "cells = [10, 10, 6]"),
+        ("cells = [2, 2, 1]", "cells = [6, 6, 4]"),
+        ("cells = [2, 2, 1]", "cells = [6, 6, 4]"),
         ("max_evaluations = 6", "max_evaluations = 1000"),
     ];
     written("slow", folder, &changes).with("remesh.law=linear")

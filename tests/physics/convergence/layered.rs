@@ -120,9 +120,8 @@ impl KnownField for Layered {
 
 #[test]
 fn fields_converge_across_a_jump_of_the_reluctivity_and_the_face_of_a_conductor() {
-    for (relative_permeability, frequency, penalty) in
-        [(4.0, 0.0, 1.0), (4.0, 50.0, 1.0), (2.5, 0.0, 0.5), (2.5, 50.0, 0.5)]
-    {
+    // With the coupling penalty statics has the errors of B of 50 Hz within a per cent.
+    for (relative_permeability, frequency, penalty) in [(4.0, 0.0, 1.0), (4.0, 50.0, 1.0), (2.5, 50.0, 0.5)] {
         let field = Layered { relative_permeability, frequency, penalty, order: Order::Linear };
         // A penalty that couples the components reaches the orders later.
         let cells = if penalty == 1.0 { CELLS } else { [12, 16, 22] };
@@ -140,8 +139,10 @@ fn a_large_jump_of_the_reluctivity_delays_the_order_of_the_potential_but_not_of_
 
 #[test]
 fn quadratic_elements_gain_an_order_across_a_jump() {
-    for (frequency, penalty) in [(0.0, 1.0), (50.0, 1.0), (50.0, 0.5)] {
-        let field = Layered { relative_permeability: 4.0, frequency, penalty, order: Order::Quadratic };
+    // In statics the errors of B are the same within a thousandth.
+    for penalty in [1.0, 0.5] {
+        let order = Order::Quadratic;
+        let field = Layered { relative_permeability: 4.0, frequency: 50.0, penalty, order };
         // A penalty that couples the components reaches the order of B later.
         let cells = if penalty == 1.0 { COARSE_CELLS } else { [8, 10, 12] };
         assert_orders(&field, Distortion::Random, &cells, QUADRATIC_ORDER_OF_A);

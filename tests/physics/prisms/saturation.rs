@@ -133,7 +133,7 @@ fn saturated_prisms_are_exact_on_edge_elements() {
             let c = constant(&prism, &curve);
             let exact = flux_density(&curve, c);
             let mean = prism.source.over(&prism.observation) / prism.observation.area();
-            for discretisation in ALL {
+            for discretisation in ALL.into_iter().filter(|one| one.name.starts_with("edge")) {
                 let (mesh, mut setup) = set_up(&prism, &mesh, 1.0);
                 let regions = mesh.topology().region_names().to_vec();
                 let law = |name: &String| (name == "iron").then(|| Arc::new(curve.clone()));
@@ -159,10 +159,8 @@ fn saturated_prisms_are_exact_on_edge_elements() {
                     100.0 * of_iron,
                     100.0 * observed
                 );
-                if discretisation.name.starts_with("edge") {
-                    assert!(of_iron.max(observed) < 0.005, "{} {}", prism.name, discretisation.name);
-                    solved += 1;
-                }
+                assert!(of_iron.max(observed) < 0.005, "{} {}", prism.name, discretisation.name);
+                solved += 1;
             }
         }
     }
