@@ -196,13 +196,8 @@ impl Session<'_> {
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let initial = self.initial_states(first.clone(), optimised.stop_reason, observer)?;
-        let errors = self.estimate_errors(first, (best, optimised.stop_reason), at_best, observer)?;
-        if let Some([_, at_best]) = &errors {
-            recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
-        }
-        let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let problem = &self.setup.problem;
-        let result = RunResult {
+        let mut result = RunResult {
             evaluations: optimised.evaluations,
             iterations: optimised.iterations,
             objective: Some(ObjectiveResult {
@@ -228,6 +223,12 @@ impl Session<'_> {
                 observer,
             )?
         };
+        self.keep_search(&mut result, observer)?;
+        let errors = self.estimate_errors(first, (best, optimised.stop_reason), at_best, observer);
+        if let Some([_, at_best]) = &errors {
+            recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
+        }
+        let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved };
         drop(optimised);
@@ -286,6 +287,24 @@ impl Session<'_> {
         self.setup.problem.shape().map(|shape| shape.initial()).unwrap_or_default()
     }
 
+    /// Writes what the search has found, and its page: estimates and checks may need more memory or patience than there is.
+    fn keep_search(&self, result: &mut RunResult, observer: &mut dyn RunObserver) -> Result<(), Error> {
+        if let Some(warning) =
+            result.objective.as_ref().and_then(|own| reservations::wrong_sign(self.config, own))
+        {
+            observer.warning(&warning);
+            result.warnings.push(warning);
+        }
+        check_finite(result)?;
+        result.write(&self.directory)?;
+        if self.is_checked(result.stop_reason)
+            && let Some(page) = (self.searched)(&self.directory)
+        {
+            observer.note(&format!("report of the search, to be checked: {}", page.display()));
+        }
+        Ok(())
+    }
+
     /// The result with the gain checked on a fresh mesh, by other elements and by its estimated errors; the run's own problem
     /// is gone then.
     fn confirm(
@@ -295,15 +314,6 @@ impl Session<'_> {
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
-        if let Some(warning) =
-            result.objective.as_ref().and_then(|own| reservations::wrong_sign(self.config, own))
-        {
-            observer.warning(&warning);
-            result.warnings.push(warning);
-        }
-        // The check may need more memory or patience than there is: what the run has found is safe before.
-        check_finite(&result)?;
-        result.write(&self.directory)?;
         // A mesh that is refined where it counts may be finer there than one that is generated anew.
         let fresh = if Self::is_refined(refinements) {
             None
@@ -312,11 +322,6 @@ impl Session<'_> {
         };
         let sizes = Sizes::of(&self.setup.problem);
         self.setup.problem.release();
-        if self.is_checked(result.stop_reason)
-            && let Some(page) = (self.searched)(&self.directory)
-        {
-            observer.note(&format!("report of the search, to be checked: {}", page.display()));
-        }
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
         let stop_reason = result.stop_reason;
