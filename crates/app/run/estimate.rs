@@ -17,10 +17,9 @@ use crate::config::{Config, ElementOrder, Elements, SourceMap};
 use crate::error::Error;
 use crate::show::Observer;
 
-/// Bytes that an estimate takes for each tetrahedron beside the problem: pattern, matrix and incomplete factor of second
-/// order, of edge elements and of nodal ones. Measured on the shield, the pole and the actuator: 8.6 to 10.1 kB in all, and 7.1 to
-/// 9.7 kB.
-const ESTIMATE_BYTES_PER_TET: [usize; 2] = [9_000, 8_200];
+/// Bytes that an estimate takes for each tetrahedron beside the problem: pattern, matrix and smoother of second order, of edge
+/// elements and of nodal ones. Measured on the shield, the pole and the actuator: 8.6 to 10.1 kB in all, and 8.1 to 10.7 kB.
+const ESTIMATE_BYTES_PER_TET: [usize; 2] = [9_000, 9_100];
 
 /// Error of second order over what halved edges change.
 const OF_HALVED_EDGES: f64 = 4.0 / 3.0;
@@ -72,7 +71,7 @@ pub(crate) fn estimate(
             if effort == Effort::Affordable =>
         {
             observer.notice(
-                "the error of the mesh is not estimated: that would cost more than three evaluations; \
+                "the error of the mesh is not estimated: that would take iterations worth more than three evaluations; \
                  accuracy.estimate = true has the time",
             );
             None

@@ -33,8 +33,9 @@ const HELD_BY_SETUP: usize = 300;
 /// the flat cells of skin layers are halved. What lies between is wrong by a quarter at both ends for eight times the elements.
 const FACTOR_GROWTH: f64 = 1.2;
 
-/// Bytes of both levels of the two-level preconditioner per unknown: 474 and 598 on the TEAM problems.
-const TWO_LEVELS_PER_UNKNOWN: usize = 600;
+/// Bytes of both levels of the two-level preconditioner per unknown: 474 and 598 on the TEAM problems, and of quadratic elements
+/// 1.1 to 1.8 kB on shields.
+const TWO_LEVELS_PER_UNKNOWN: [usize; 2] = [600, 1400];
 
 /// What an evaluation of a problem adds to the process [bytes], and what that grows with on another mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +54,8 @@ pub struct Sizes {
     has_factor: bool,
     /// Unknowns from which two levels may take its place on a finer mesh.
     two_levels_from: usize,
+    /// Bytes of these per unknown.
+    two_levels_per_unknown: usize,
 }
 
 impl Sizes {
@@ -64,6 +67,7 @@ impl Sizes {
         let elastic = problem.shape().map_or(0, |shape| shape.motion().map().solver_bytes());
         let tets = problem.original().topology().tets().len();
         let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
+        let harmonic = problem.states().iter().filter(|state| state.angular_frequency() != 0.0);
         let mut sizes = Self {
             arrays: tets * element + elastic,
             matrices: 0,
@@ -71,11 +75,11 @@ impl Sizes {
             tets,
             unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
             has_factor: solvers().any(|solver| is_factor(solver.method())),
-            two_levels_from: if problem.states().iter().any(|state| state.angular_frequency() != 0.0) {
-                two_levels_from(if quadratic { Order::Quadratic } else { Order::Linear })
-            } else {
-                usize::MAX
-            },
+            two_levels_from: harmonic
+                .map(|state| two_levels_from((state.space().family(), state.space().order())))
+                .min()
+                .unwrap_or(usize::MAX),
+            two_levels_per_unknown: TWO_LEVELS_PER_UNKNOWN[usize::from(quadratic)],
         };
         // Factors that serve the next design are held all at once, the others one after the other.
         let mut largest = (0, 0);
@@ -125,7 +129,7 @@ impl Sizes {
             if unknowns < two_levels_from {
                 factor
             } else {
-                factor.min(unknowns * TWO_LEVELS_PER_UNKNOWN).max(self.preconditioners)
+                factor.min(unknowns * self.two_levels_per_unknown).max(self.preconditioners)
             }
         } else {
             times(self.preconditioners, growth)

@@ -43,7 +43,7 @@ const REQUIRED: f64 = 1e-2;
 /// Iterations after which the corrections are given up. A dozen or two are usual.
 const MOST_ITERATIONS: usize = 300;
 
-/// Evaluations that an affordable estimate may cost.
+/// Evaluations that the iterations of an affordable estimate may cost.
 const MOST_EVALUATIONS: f64 = 3.0;
 
 /// Counted work that is affordable whatever an evaluation costs [ns]: two seconds.
@@ -52,7 +52,7 @@ const ALWAYS_AFFORDABLE: f64 = 2e9;
 /// How much an estimate may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// As much as three evaluations, or two seconds.
+    /// Iterations of as much work as three evaluations, or two seconds.
     Affordable,
     /// As much as it takes.
     Any,

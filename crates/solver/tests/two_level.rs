@@ -60,18 +60,20 @@ fn the_iterations_of_linear_elements_hardly_grow_with_the_mesh() {
     hardly_grows(Order::Linear, [0.5, 0.75, 1.0], 60);
 }
 
-/// Flat elements are hard for the smoother: about 300 iterations, but not more on finer meshes.
+/// 110, 120 and 111 on 98 573, 111 000 and 150 477 unknowns; with an incomplete factor as smoother some 300.
 #[test]
-#[ignore = "minutes: just test-long"]
+#[ignore = "a minute: just test-long"]
 fn the_iterations_of_quadratic_elements_hardly_grow_with_the_mesh() {
-    hardly_grows(Order::Quadratic, [0.25, 0.4, 0.5], 350);
+    hardly_grows(Order::Quadratic, [0.25, 0.4, 0.5], 135);
 }
 
 #[test]
 fn the_bits_do_not_depend_on_the_threads() {
     let mesh = mesh(0.25);
-    let values = || model(&mesh, Order::Linear).solve(&mesh).expect("it converges").0.values().to_vec();
-    let one = on_threads(1, values);
-    assert_eq!(on_threads(2, values), one);
-    assert_eq!(on_threads(4, values), one);
+    for order in [Order::Linear, Order::Quadratic] {
+        let values = || model(&mesh, order).solve(&mesh).expect("it converges").0.values().to_vec();
+        let one = on_threads(1, values);
+        assert_eq!(on_threads(2, values), one);
+        assert_eq!(on_threads(4, values), one);
+    }
 }

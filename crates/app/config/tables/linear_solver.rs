@@ -22,7 +22,8 @@ choice! {
         RealFactorSingle = "real_factor_single",
         /// An incomplete factor: little memory, many iterations.
         Incomplete = "incomplete",
-        /// Nodal elements: a factor of a coarse space, and an incomplete one of the whole.
+        /// Nodal elements: a factor of a coarse space, and for the whole an incomplete one, or block Gauss–Seidel where they are of
+        /// second order.
         TwoLevel = "two_level",
     }
 }

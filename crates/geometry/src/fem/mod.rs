@@ -21,6 +21,7 @@ pub mod lifted_ordering;
 pub mod ordering;
 pub mod pattern;
 pub mod scalar;
+pub mod strong_sets;
 pub mod workspace;
 
 pub use assemble::LocalMatrix;
@@ -34,3 +35,4 @@ pub use ldlt::{FactorScalar, Ldlt, LdltAnalysis};
 pub use lifted_ordering::{Hosts, lifted_dissection};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
 pub use scalar::{Scalar, advance, axpy, c32, c64, dot, norm, scale_add};
+pub use strong_sets::StrongSets;

@@ -12,7 +12,7 @@ use fluxmorph_geometry::fem::{
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
 use super::two_level::{self, TwoLevelAnalysis};
-use crate::elements::Order;
+use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 
 /// What a system is analysed by.
@@ -35,7 +35,7 @@ pub(crate) type Prolong<'a> = dyn Fn(&CsrMatrix<c64>) -> Result<CsrMatrix<f64>, 
 pub struct SystemAnalysis {
     pub(super) settings: LinearSolverSettings,
     field: FieldKind,
-    order: Order,
+    elements: (ElementFamily, Order),
     structure: Arc<CsrStructure>,
     hosts: Option<Hosts>,
     method: Method,
@@ -54,13 +54,13 @@ impl SystemAnalysis {
     /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
     pub(crate) fn new(
         mut pattern: SystemPattern<'_>,
-        (field, order): (FieldKind, Order),
+        (field, elements): (FieldKind, (ElementFamily, Order)),
         settings: LinearSolverSettings,
     ) -> Result<Self, SolverError> {
         let mut analysis = Self {
             settings,
             field,
-            order,
+            elements,
             structure: Arc::clone(pattern.structure),
             hosts: pattern.hosts.take(),
             method: Method::Incomplete,
@@ -76,7 +76,7 @@ impl SystemAnalysis {
         match analysis.method {
             Method::Incomplete => analysis.incomplete = Some(two_level::incomplete_analysis(&reference())),
             Method::TwoLevel if analysis.two_level.is_none() => {
-                analysis.two_level = Some(two_levels(&pattern)?);
+                analysis.two_level = Some(two_levels(&pattern, analysis.elements)?);
             }
             _ => {}
         }
@@ -90,13 +90,13 @@ impl SystemAnalysis {
     /// The cheapest method that fits; without a factor or two levels, the incomplete factor.
     fn cheapest(&mut self, pattern: &SystemPattern<'_>) -> Result<Method, SolverError> {
         let unknowns = pattern.structure.row_count();
-        let is_large = self.order == Order::Linear && unknowns >= FACTORS_UP_TO;
+        let is_large = unknowns >= factors_up_to(self.elements);
         let mut factor = if is_large { None } else { self.cheapest_factor()? };
-        if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.order)) {
+        if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.elements)) {
             return Ok(method);
         }
         // A coarse level that cannot be made is none.
-        self.two_level = two_levels(pattern).ok();
+        self.two_level = two_levels(pattern, self.elements).ok();
         if self.two_level.is_some() && self.fits(Method::TwoLevel) {
             let cost = self.cost_of_design(Method::TwoLevel)?;
             if factor.is_none_or(|(_, least)| cost < least) {
@@ -192,8 +192,7 @@ impl SystemAnalysis {
         match (method, &self.two_level) {
             (Method::Incomplete, _) => Ok(Costs::incomplete(&sizes)),
             (Method::TwoLevel, levels) => {
-                let coarse = levels.as_ref().map_or(Sizes::default(), |levels| levels.coarse_sizes());
-                Ok(Costs::two_level(&sizes, Costs::complete(Method::DirectSingle, &coarse)))
+                Ok(levels.as_ref().map_or(Costs::default(), |levels| levels.costs(sizes.matrix_entries)))
             }
             _ => {
                 let complete = self.complete()?;
@@ -206,7 +205,7 @@ impl SystemAnalysis {
 
     /// Iterations to expect of a method with a factor of the matrix itself.
     pub(super) fn typical_iterations(&self, method: Method) -> usize {
-        typical_iterations(method, self.field, self.order, self.structure.row_count())
+        typical_iterations(method, self.field, self.elements, self.structure.row_count())
     }
 
     /// Ordering and symbolic factor.
@@ -240,21 +239,31 @@ impl SystemAnalysis {
 }
 
 /// Analyses both levels of the matrix on the reference mesh.
-fn two_levels(pattern: &SystemPattern<'_>) -> Result<Arc<TwoLevelAnalysis>, SolverError> {
+fn two_levels(
+    pattern: &SystemPattern<'_>,
+    elements: (ElementFamily, Order),
+) -> Result<Arc<TwoLevelAnalysis>, SolverError> {
     let matrix = (pattern.reference)();
     let prolongation = (pattern.prolongation)(&matrix)?;
-    Ok(TwoLevelAnalysis::new(&matrix, prolongation)?)
+    Ok(TwoLevelAnalysis::new(&matrix, prolongation, elements)?)
 }
 
-/// Unknowns of linear elements from which a factor is not looked at where two levels fit: there it takes three times as long, and
-/// the symbolic part alone takes seconds.
-const FACTORS_UP_TO: usize = 200_000;
+/// Unknowns from which a factor is not looked at where two levels fit: its symbolic part alone takes seconds, and its memory is
+/// twice that of two levels and more.
+const fn factors_up_to(elements: (ElementFamily, Order)) -> usize {
+    match elements {
+        (_, Order::Linear) => 200_000,
+        (ElementFamily::Nodal, Order::Quadratic) => 400_000,
+        (ElementFamily::Edge, Order::Quadratic) => usize::MAX,
+    }
+}
 
-/// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is always cheaper, or
-/// as good as that.
-pub const fn two_levels_from(order: Order) -> usize {
-    match order {
-        Order::Linear => 45_000,
-        Order::Quadratic => 60_000,
+/// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is cheaper, or as good
+/// as that.
+pub const fn two_levels_from(elements: (ElementFamily, Order)) -> usize {
+    match elements {
+        (_, Order::Linear) => 45_000,
+        (ElementFamily::Nodal, Order::Quadratic) => 150_000,
+        (ElementFamily::Edge, Order::Quadratic) => 60_000,
     }
 }

@@ -4,7 +4,7 @@
 //! matter, and these move little from machine to machine; a clock would make the bits of a run depend on the load.
 
 use super::method::{FieldKind, Method, Reuse};
-use crate::elements::Order;
+use crate::elements::{ElementFamily, Order};
 
 /// Nanoseconds a byte that is streamed from memory in a product.
 const BYTE: f64 = 0.15;
@@ -17,6 +17,9 @@ pub(super) const SINGLE_ENTRY: usize = 12;
 
 /// Nanoseconds of an incomplete factorisation an entry of its lower half.
 const ELIMINATION: f64 = 100.0;
+
+/// Nanoseconds of gathering an entry of the matrix for Gauss–Seidel.
+const GATHERING: f64 = 20.0;
 
 /// Sizes of a system: what costs are made of.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,13 +75,26 @@ impl Costs {
         }
     }
 
-    /// Costs of two levels: two products, a sweep of the incomplete factor, a solution with the coarse one.
-    pub(crate) fn two_level(sizes: &Sizes, coarse: Self) -> Self {
-        let smoother = Self::incomplete(sizes);
+    /// Costs of block Gauss–Seidel with its residual: three passes over half of the entries in single precision and two solutions
+    /// with the factors of the sets, beside the product of the iteration. `sets` has no matrix entries.
+    pub(crate) fn gauss_seidel(sizes: &Sizes, sets: &Sizes) -> Self {
+        let factors = Self::complete(Method::DirectSingle, sets);
         Self {
-            factor: smoother.factor + coarse.factor,
-            iteration: sizes.product() + smoother.iteration + coarse.iteration,
+            factor: factors.factor + GATHERING * sizes.matrix_entries as f64,
+            iteration: sizes.product()
+                + 2.0 * factors.iteration
+                + 1.5 * (sizes.matrix_entries * SINGLE_ENTRY) as f64 * BYTE,
         }
+    }
+
+    /// These, with a further product with the matrix in every iteration.
+    pub(crate) fn with_product(self, sizes: &Sizes) -> Self {
+        Self { iteration: self.iteration + sizes.product(), ..self }
+    }
+
+    /// The sum of both.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self { factor: self.factor + other.factor, iteration: self.iteration + other.iteration }
     }
 
     /// Mean cost of a design with state and adjoint.
@@ -111,13 +127,21 @@ impl Service {
 }
 
 /// Iterations of a method with a factor of the matrix itself: measured, and steady from mesh to mesh but for incomplete ones.
-pub(crate) fn typical_iterations(method: Method, field: FieldKind, order: Order, unknowns: usize) -> usize {
+pub(crate) fn typical_iterations(
+    method: Method,
+    field: FieldKind,
+    (family, order): (ElementFamily, Order),
+    unknowns: usize,
+) -> usize {
     match (method, field) {
         (Method::Direct, _) => 2,
         (Method::DirectSingle, _) | (Method::RealFactorSingle, FieldKind::Static) => 4,
         (Method::RealFactor, FieldKind::Static) => 2,
         (Method::RealFactor | Method::RealFactorSingle, FieldKind::Harmonic) => 25,
-        (Method::TwoLevel, _) if order == Order::Quadratic => 250,
+        (Method::TwoLevel, _) if order == Order::Quadratic => match family {
+            ElementFamily::Nodal => 115,
+            ElementFamily::Edge => 250,
+        },
         (Method::TwoLevel, _) => (2.1 * (unknowns as f64).cbrt()) as usize,
         (Method::Incomplete, _) => (6.0 * (unknowns as f64).cbrt()) as usize,
     }
@@ -217,8 +241,9 @@ mod tests {
     #[test]
     fn small_systems_are_factored_and_large_ones_in_real_numbers() {
         // Counts of solver_notes: 37 thousand and 550 thousand unknowns.
+        let elements = (ElementFamily::Nodal, Order::Linear);
         let step = |method, sizes: &Sizes| {
-            let iterations = typical_iterations(method, FieldKind::Harmonic, Order::Linear, 1);
+            let iterations = typical_iterations(method, FieldKind::Harmonic, elements, 1);
             let service = Service::typical(method, Reuse::WhileItPays, iterations, FieldKind::Harmonic);
             Costs::complete(method, sizes).of_design(service)
         };

@@ -150,7 +150,7 @@ impl Precondition for Unscaled {
 }
 
 /// What brings a residual to norm one: at the end of an iteration it is far below what single precision can hold.
-fn magnification(r: &[c64]) -> f64 {
+pub(super) fn magnification(r: &[c64]) -> f64 {
     let size = norm(r);
     if size > 0.0 && size.is_finite() { 1.0 / size } else { 1.0 }
 }

@@ -20,8 +20,9 @@ pub enum Method {
     /// Incomplete `L D Lᵀ` without fill, in single precision: the memory of the matrix, iterations that grow with the cube
     /// root of the number of unknowns.
     Incomplete,
-    /// A factor in single precision for a coarse space, and an incomplete factor of the whole: linear elements on the same
-    /// mesh for quadratic ones; for linear ones, the scalar potential in full and aggregates of the unknowns of `A`.
+    /// A factor in single precision for a coarse space, and a smoother of the whole: linear elements on the same mesh for
+    /// quadratic ones, smoothed by block Gauss–Seidel; for linear ones the scalar potential in full and aggregates of the
+    /// unknowns of `A`, smoothed by an incomplete factor.
     TwoLevel,
 }
 

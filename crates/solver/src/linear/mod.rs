@@ -14,6 +14,7 @@ pub mod cocg;
 mod cost;
 pub mod distributed;
 mod factor;
+mod gauss_seidel;
 pub(crate) mod gmres;
 mod method;
 mod preconditioner;

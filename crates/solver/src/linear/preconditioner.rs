@@ -22,7 +22,7 @@ pub(super) struct Preconditioner {
 #[derive(Debug)]
 enum Action {
     Factor(Box<dyn Precondition>),
-    TwoLevel(TwoLevel),
+    TwoLevel(Box<TwoLevel>),
 }
 
 /// What the diagonal is multiplied by before an incomplete factorisation: without it pivots of thin elements vanish.
@@ -41,7 +41,7 @@ impl Preconditioner {
         let action = match method {
             Method::TwoLevel => {
                 let levels = analysis.two_level().ok_or_else(|| missing(matrix, method))?;
-                Action::TwoLevel(TwoLevel::new(levels, matrix)?)
+                Action::TwoLevel(Box::new(TwoLevel::new(levels, matrix)?))
             }
             _ => Action::Factor(factor(analysis, matrix, method)?),
         };

@@ -28,6 +28,16 @@ impl Transfer {
         self.prolongation.structure.column_count
     }
 
+    /// Whether the coarse level has an unknown by itself; one number a row.
+    pub(crate) fn is_coarse(&self) -> Vec<bool> {
+        let (p, r) = (&self.prolongation.structure, &self.restriction.structure);
+        let alone = |row: usize| match p.columns[p.row(row)] {
+            [column] => r.row(column as usize).len() == 1,
+            _ => false,
+        };
+        (0..p.row_count()).map(alone).collect()
+    }
+
     /// Memory held [bytes].
     pub(crate) fn bytes(&self) -> usize {
         let of = |m: &CsrMatrix<f64>| m.values.len() * 12 + m.structure.row_starts.len() * 4;
@@ -178,5 +188,16 @@ mod tests {
         transfer.add_prolongation(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
         assert_eq!(z[1], c64::new(0.5, 0.0));
         assert_eq!(transfer.restrict(&z)[1], c64::new(0.0, 2.5));
+    }
+
+    #[test]
+    fn an_unknown_that_shares_its_coarse_one_is_not_coarse() {
+        let p = CsrMatrix::from_rows(
+            3,
+            [vec![(0, 1.0)], vec![(1, 1.0)], vec![(1, 1.0)], vec![(0, 0.5), (2, 0.5)]],
+        );
+        assert_eq!(Transfer::new(p).is_coarse(), [false, false, false, false]);
+        let p = CsrMatrix::from_rows(2, [vec![(0, 1.0)], vec![(1, 1.0)], vec![(1, 1.0)]]);
+        assert_eq!(Transfer::new(p).is_coarse(), [true, false, false]);
     }
 }

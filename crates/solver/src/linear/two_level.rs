@@ -1,7 +1,8 @@
-//! The two-level preconditioner: a coarse space that a factor in single precision solves, and an incomplete factor for the
-//! rest.
+//! The two-level preconditioner: a coarse space that a factor in single precision solves, and a smoother for the rest.
 //!
-//! With the smoother `S`, and `Q = P (Pᵀ K P)⁻¹ Pᵀ`, one application is
+//! The smoother is block Gauss–Seidel for quadratic nodal elements, whose incomplete factor is a poor smoother on flat cells, and
+//! an incomplete factor for the others: for linear elements it costs half as much and does as well, and strong couplings of edge
+//! elements join most unknowns to one block. With the smoother `S`, and `Q = P (Pᵀ K P)⁻¹ Pᵀ`, one application is
 //!
 //! ```text
 //! z = S r + Q (r − K S r)
@@ -16,12 +17,15 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, c32, c64, ordering};
+use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, StrongSets, c32, c64, ordering};
 use rayon::prelude::*;
 
-use super::cost::Sizes;
+use super::cost::{Costs, Sizes};
 use super::factor::{Precondition, Scaled, Unscaled};
+use super::gauss_seidel::{GaussSeidel, GaussSeidelAnalysis};
+use super::method::Method;
 use super::transfer::Transfer;
+use crate::elements::{ElementFamily, Order};
 
 /// Rows per parallel task.
 const ROWS: usize = 1024;
@@ -29,7 +33,9 @@ const ROWS: usize = 1024;
 /// What the diagonal is multiplied by before the incomplete factorisation. Between 1.0 and 1.05 the iterations hardly change.
 const DIAGONAL_FACTOR: f64 = 1.02;
 
-/// Coupling over the diagonal from which two unknowns stay in one part of the incomplete factor.
+/// Coupling over the diagonal from which two unknowns stay in one part of the incomplete factor, and in one block of
+/// Gauss–Seidel. At 0.3 quadratic elements on a shield take 150 iterations instead of 110, at 0.2 90, but there the couplings join half of
+/// the unknowns of a fine mesh to one set, whose factor is nearly that of the whole.
 const STRONG: f64 = 0.25;
 
 /// What follows from the pattern and the couplings on the reference mesh.
@@ -38,54 +44,99 @@ pub(super) struct TwoLevelAnalysis {
     transfer: Transfer,
     structure: Arc<CsrStructure>,
     coarse: Arc<LdltAnalysis>,
-    incomplete: Arc<IncompleteAnalysis>,
+    smoother: SmootherAnalysis,
+}
+
+#[derive(Debug)]
+enum SmootherAnalysis {
+    Incomplete(Arc<IncompleteAnalysis>),
+    GaussSeidel(Arc<GaussSeidelAnalysis>),
 }
 
 impl TwoLevelAnalysis {
-    /// Analyses both levels of a matrix and a prolongation onto its unknowns.
+    /// Analyses both levels of a matrix and a prolongation onto its unknowns, which are those of such elements.
     ///
     /// # Errors
-    /// [`MeshError::Factorisation`] when the coarse factor does not fit.
-    pub(super) fn new(matrix: &CsrMatrix<c64>, prolongation: CsrMatrix<f64>) -> Result<Arc<Self>, MeshError> {
+    /// [`MeshError::Factorisation`] when the coarse factor or that of the sets does not fit.
+    pub(super) fn new(
+        matrix: &CsrMatrix<c64>,
+        prolongation: CsrMatrix<f64>,
+        elements: (ElementFamily, Order),
+    ) -> Result<Arc<Self>, MeshError> {
         let transfer = Transfer::new(prolongation);
         let structure = transfer.coarse_structure(&matrix.structure);
         let coarse = LdltAnalysis::new(&structure, ordering::dissection(&structure))?;
-        let incomplete = incomplete_analysis(matrix);
-        Ok(Arc::new(Self { transfer, structure, coarse, incomplete }))
+        let smoother = match elements {
+            (ElementFamily::Nodal, Order::Quadratic) => {
+                let sets = blocks(matrix, &transfer);
+                SmootherAnalysis::GaussSeidel(Arc::new(GaussSeidelAnalysis::new(&matrix.structure, &sets)?))
+            }
+            _ => SmootherAnalysis::Incomplete(incomplete_analysis(matrix)),
+        };
+        Ok(Arc::new(Self { transfer, structure, coarse, smoother }))
     }
 
-    /// Sizes of the coarse level.
-    pub(super) fn coarse_sizes(&self) -> Sizes {
-        Sizes {
+    /// Costs for a matrix with so many entries.
+    pub(super) fn costs(&self, matrix_entries: usize) -> Costs {
+        let sizes = Sizes { matrix_entries, ..Sizes::default() };
+        let coarse = Sizes {
             matrix_entries: self.structure.columns.len(),
             factor_entries: self.coarse.factor_entries(),
             multiplications: self.coarse.multiplications(),
-        }
+        };
+        let smoother = match &self.smoother {
+            SmootherAnalysis::Incomplete(_) => Costs::incomplete(&sizes).with_product(&sizes),
+            SmootherAnalysis::GaussSeidel(own) => Costs::gauss_seidel(&sizes, &own.sizes()),
+        };
+        smoother.and(Costs::complete(Method::DirectSingle, &coarse))
     }
 
     /// Memory of both factors and the transfer [bytes].
     pub(super) fn bytes(&self) -> usize {
-        self.coarse.factor_entries() * size_of::<c32>()
-            + self.incomplete.bytes::<c32>()
-            + self.transfer.bytes()
+        let smoother = match &self.smoother {
+            SmootherAnalysis::Incomplete(analysis) => analysis.bytes::<c32>(),
+            SmootherAnalysis::GaussSeidel(analysis) => analysis.bytes(),
+        };
+        self.coarse.factor_entries() * size_of::<c32>() + smoother + self.transfer.bytes()
     }
+}
+
+/// The blocks of Gauss–Seidel. What the coarse space has by itself joins none.
+fn blocks(matrix: &CsrMatrix<c64>, transfer: &Transfer) -> StrongSets {
+    let is_strong = couples_strongly(matrix);
+    let is_coarse = transfer.is_coarse();
+    StrongSets::new(&matrix.structure, |row, k| {
+        is_strong(row, k) && !is_coarse[row] && !is_coarse[matrix.structure.columns[k] as usize]
+    })
 }
 
 /// Order and parts of an incomplete factor, after the strong couplings of a matrix.
 pub(super) fn incomplete_analysis(matrix: &CsrMatrix<c64>) -> Arc<IncompleteAnalysis> {
-    let diagonal = diagonal(matrix);
-    IncompleteAnalysis::in_parts(&matrix.structure, |row, k| {
+    IncompleteAnalysis::in_parts(&matrix.structure, couples_strongly(matrix))
+}
+
+/// Whether an entry of a row couples strongly: it is larger than a part of the geometric mean of the diagonal entries.
+fn couples_strongly(matrix: &CsrMatrix<c64>) -> impl Fn(usize, usize) -> bool {
+    let of = |row: usize| matrix.entry(row, row).unwrap_or_default().norm();
+    let diagonal: Vec<f64> = (0..matrix.structure.row_count()).into_par_iter().map(of).collect();
+    move |row, k| {
         let column = matrix.structure.columns[k] as usize;
         matrix.values[k].norm_sqr() > STRONG * STRONG * diagonal[row] * diagonal[column]
-    })
+    }
 }
 
 /// The preconditioner of one matrix.
 #[derive(Debug)]
 pub(super) struct TwoLevel {
     analysis: Arc<TwoLevelAnalysis>,
-    smoother: Unscaled,
+    smoother: Smoother,
     coarse: Scaled<c32>,
+}
+
+#[derive(Debug)]
+enum Smoother {
+    Incomplete(Unscaled),
+    GaussSeidel(GaussSeidel),
 }
 
 impl TwoLevel {
@@ -96,13 +147,22 @@ impl TwoLevel {
     pub(super) fn new(analysis: &Arc<TwoLevelAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
         let coarse = analysis.transfer.coarse_matrix(&analysis.structure, matrix);
         let coarse = Scaled::complete(&analysis.coarse, &coarse)?;
-        let smoother = Unscaled::new(&analysis.incomplete, matrix, DIAGONAL_FACTOR)?;
+        let smoother = match &analysis.smoother {
+            SmootherAnalysis::Incomplete(incomplete) => {
+                Smoother::Incomplete(Unscaled::new(incomplete, matrix, DIAGONAL_FACTOR)?)
+            }
+            SmootherAnalysis::GaussSeidel(own) => Smoother::GaussSeidel(GaussSeidel::new(own, matrix)?),
+        };
         Ok(Self { analysis: Arc::clone(analysis), smoother, coarse })
     }
 
     /// Memory of both factors [bytes].
     pub(super) fn bytes(&self) -> usize {
-        self.smoother.bytes() + self.coarse.bytes()
+        let smoother = match &self.smoother {
+            Smoother::Incomplete(factor) => factor.bytes(),
+            Smoother::GaussSeidel(own) => own.bytes(),
+        };
+        smoother + self.coarse.bytes()
     }
 
     /// Moves `x` so that the residual `b − K x` has no coarse part: where a deflated iteration starts.
@@ -115,8 +175,13 @@ impl TwoLevel {
     /// Overwrites `z` with `M⁻¹ r`; `matrix` is the one that is solved with.
     pub(super) fn apply(&self, matrix: &CsrMatrix<c64>, r: &[c64], z: &mut [c64]) {
         let mut rest = vec![c64::default(); r.len()];
-        self.smoother.apply(r, z);
-        residual(matrix, r, z, &mut rest);
+        match &self.smoother {
+            Smoother::Incomplete(factor) => {
+                factor.apply(r, z);
+                residual(matrix, r, z, &mut rest);
+            }
+            Smoother::GaussSeidel(own) => own.apply(r, z, &mut rest),
+        }
         self.correct(&rest, z);
     }
 
@@ -128,12 +193,6 @@ impl TwoLevel {
         self.coarse.apply(&restricted, &mut coarse);
         transfer.add_prolongation(&coarse, z);
     }
-}
-
-/// Moduli of the diagonal entries.
-fn diagonal(matrix: &CsrMatrix<c64>) -> Vec<f64> {
-    let of = |row: usize| matrix.entry(row, row).unwrap_or_default().norm();
-    (0..matrix.structure.row_count()).into_par_iter().map(of).collect()
 }
 
 /// `rest = r − K z`.

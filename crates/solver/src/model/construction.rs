@@ -34,7 +34,9 @@ impl FieldModel {
             prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
         };
         let analysis = match ownership {
-            None => Some(SystemAnalysis::new(pattern, (field, setup.order), setup.linear_solver)?),
+            None => {
+                Some(SystemAnalysis::new(pattern, (field, (setup.family, setup.order)), setup.linear_solver)?)
+            }
             Some(_) => None,
         };
         let of_coils =

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::ordering;
+use crate::fem::strong_sets::StrongSets;
 
 /// Rows a slab should have at least: below, a parallel task costs more than it brings.
 const ROWS_PER_SLAB: usize = 4096;
@@ -58,7 +59,7 @@ impl IncompleteAnalysis {
     /// A separator that cuts strong couplings doubles the iterations on skin-graded meshes, so rows that are coupled strongly
     /// stay together. Couplings above a quarter of the diagonal are those of the cells much thinner than wide.
     pub fn in_parts(structure: &Arc<CsrStructure>, strong: impl Fn(usize, usize) -> bool) -> Arc<Self> {
-        Self::with_parts(structure, parts(structure, &chains(structure, strong)))
+        Self::with_parts(structure, parts(structure, &StrongSets::new(structure, strong)))
     }
 
     fn with_parts(structure: &Arc<CsrStructure>, parts: Parts) -> Arc<Self> {
@@ -133,9 +134,9 @@ struct Parts {
 }
 
 /// Cuts the levels of a graph into slabs with about equally many rows, and separators of one level each.
-fn parts(structure: &CsrStructure, chains: &Chains) -> Parts {
+fn parts(structure: &CsrStructure, sets: &StrongSets) -> Parts {
     let n = structure.row_count();
-    let level = levels(structure, chains);
+    let level = levels(structure, sets);
     let level_count = level.iter().max().map_or(0, |&last| last as usize + 1);
     let mut sizes = vec![0usize; level_count];
     for &l in &level {
@@ -171,76 +172,44 @@ fn parts(structure: &CsrStructure, chains: &Chains) -> Parts {
     Parts { order, slabs, separators }
 }
 
-/// Sets of rows that are coupled strongly: they stay together.
-struct Chains {
-    /// Set of every row.
-    of: Vec<u32>,
-    /// Start of every set in `rows`.
-    starts: Vec<u32>,
-    rows: Vec<u32>,
-}
-
-/// The connected sets of the graph of strong couplings.
-fn chains(structure: &CsrStructure, strong: impl Fn(usize, usize) -> bool) -> Chains {
-    let n = structure.row_count();
-    let mut of = vec![u32::MAX; n];
-    let (mut starts, mut rows) = (vec![0u32], Vec::with_capacity(n));
-    for seed in 0..n {
-        if of[seed] != u32::MAX {
-            continue;
-        }
-        let chain = starts.len() as u32 - 1;
-        let mut next = rows.len();
-        of[seed] = chain;
-        rows.push(seed as u32);
-        while let Some(&row) = rows.get(next) {
-            next += 1;
-            for k in structure.row(row as usize) {
-                let c = structure.columns[k];
-                if of[c as usize] == u32::MAX && strong(row as usize, k) {
-                    of[c as usize] = chain;
-                    rows.push(c);
-                }
-            }
-        }
-        starts.push(rows.len() as u32);
-    }
-    Chains { of, starts, rows }
-}
-
-/// Distance of every row from the start of its connected component, in steps from chain to chain.
-fn levels(structure: &CsrStructure, chains: &Chains) -> Vec<u32> {
-    let count = chains.starts.len() - 1;
+/// Distance of every row from the start of its connected component, in steps from set to set.
+fn levels(structure: &CsrStructure, sets: &StrongSets) -> Vec<u32> {
+    let count = sets.count();
     let mut level = vec![u32::MAX; count];
     let mut queue = Vec::with_capacity(count);
     let mut scratch = vec![u32::MAX; count];
-    for chain in 0..count {
-        if level[chain] != u32::MAX {
+    for set in 0..count {
+        if level[set] != u32::MAX {
             continue;
         }
-        // The last chain that is reached is far out: levels from there are many and narrow.
+        // The last set that is reached is far out: levels from there are many and narrow.
         queue.clear();
-        spread(structure, chains, chain, &mut scratch, &mut queue);
-        let start = queue.last().map_or(chain, |&last| last as usize);
+        spread(structure, sets, set, &mut scratch, &mut queue);
+        let start = queue.last().map_or(set, |&last| last as usize);
         queue.clear();
-        spread(structure, chains, start, &mut level, &mut queue);
+        spread(structure, sets, start, &mut level, &mut queue);
     }
-    chains.of.iter().map(|&chain| level[chain as usize]).collect()
+    (0..structure.row_count()).map(|row| level[sets.of(row)]).collect()
 }
 
-/// Breadth-first search from one chain; `queue` gets the chains in the order in which they are reached.
-fn spread(structure: &CsrStructure, chains: &Chains, start: usize, level: &mut [u32], queue: &mut Vec<u32>) {
+/// Breadth-first search from one set; `queue` gets the sets in the order in which they are reached.
+fn spread(
+    structure: &CsrStructure,
+    sets: &StrongSets,
+    start: usize,
+    level: &mut [u32],
+    queue: &mut Vec<u32>,
+) {
     level[start] = 0;
     queue.push(start as u32);
     let mut next = 0;
-    while let Some(&chain) = queue.get(next) {
+    while let Some(&set) = queue.get(next) {
         next += 1;
-        let rows = chains.starts[chain as usize] as usize..chains.starts[chain as usize + 1] as usize;
-        for &row in &chains.rows[rows] {
+        for &row in sets.rows(set as usize) {
             for &c in &structure.columns[structure.row(row as usize)] {
-                let other = chains.of[c as usize] as usize;
+                let other = sets.of(c as usize);
                 if level[other] == u32::MAX {
-                    level[other] = level[chain as usize] + 1;
+                    level[other] = level[set as usize] + 1;
                     queue.push(other as u32);
                 }
             }
