@@ -25,7 +25,7 @@ fn on_threads(device: &Device, home: &Path, threads: &str) -> Essence {
 /// Numbers of threads that are compared with one: where runs take milliseconds, and where they take seconds. Three divide nothing
 /// that is cut into powers of two, and leave one without a core on small machines.
 const ALL: [&str; 3] = ["2", "4", "8"];
-const FEW: [&str; 1] = ["3"];
+const FEW: [&str; 2] = ["2", "3"];
 
 fn same_on(numbers: &[&str], device: &Device) {
     let home = folder();

@@ -12,7 +12,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgr
 use fluxmorph_remesh::Moved;
 
 use super::Session;
-use super::estimate::estimate;
+use super::estimate::{estimate, left_out};
 use super::facets::described;
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
@@ -64,9 +64,10 @@ impl Session<'_> {
         let problem = &self.setup.problem;
         let cache = &mut SolverCache::default();
         // It was solved when the search began: what fails now costs the estimate, not the run.
-        let first = problem.analyse(initial, Derivatives::None, cache, &mut NoProgress);
-        let report = |error| observer.notice(&format!("the error of the mesh is not estimated: {error}"));
-        let first = first.map_err(report).ok()?;
+        let first = match problem.analyse(initial, Derivatives::None, cache, &mut NoProgress) {
+            Ok(first) => first,
+            Err(error) => return left_out(error, observer),
+        };
         Some([self.estimate_error(&first, observer)?, at_best])
     }
 }

@@ -75,17 +75,19 @@ pub(crate) fn estimate(
         Err(Error::Optimizer(OptimizerError::Solver(SolverError::NotConverged { .. })))
             if effort == Effort::Affordable =>
         {
-            observer.notice(
-                "the error of the mesh is not estimated: that would take iterations worth more than three evaluations; \
-                 accuracy.estimate = true has the time",
-            );
-            None
+            left_out(
+                "that would take iterations worth more than three evaluations; accuracy.estimate = true has the time",
+                observer,
+            )
         }
-        Err(error) => {
-            observer.notice(&format!("the error of the mesh is not estimated: {error}"));
-            None
-        }
+        Err(error) => left_out(error, observer),
     }
+}
+
+/// Reports why there is no estimate.
+pub(super) fn left_out<T>(reason: impl std::fmt::Display, observer: &mut dyn Observer) -> Option<T> {
+    observer.notice(&format!("the error of the mesh is not estimated: {reason}"));
+    None
 }
 
 /// Of second order, without the places where the error is made.

@@ -140,7 +140,7 @@ impl Precondition for Unscaled {
         let mut column: Vec<c32> = r.par_iter().map(|r| c32::of_entry(r * factor)).collect();
         self.0.solve_in_place(&mut column);
         z.par_iter_mut().zip(&column).for_each(|(z, x)| {
-            *z = c64::new(f64::from(x.re), f64::from(x.im)) / factor;
+            *z = double(*x) / factor;
         });
     }
 
@@ -155,12 +155,25 @@ pub(super) fn magnification(r: &[c64]) -> f64 {
     if size > 0.0 && size.is_finite() { 1.0 / size } else { 1.0 }
 }
 
-fn scaled_entry<T: Representation>(matrix: &CsrMatrix<c64>, scale: &[f64], row: usize, k: usize) -> T {
+/// An entry of the scaled matrix; `k` is its place among all.
+pub(super) fn scaled_entry<T: Representation>(
+    matrix: &CsrMatrix<c64>,
+    scale: &[f64],
+    row: usize,
+    k: usize,
+) -> T {
     T::of_entry(matrix.values[k] * (scale[row] * scale[matrix.structure.columns[k] as usize]))
 }
 
+pub(super) fn double(x: c32) -> c64 {
+    c64::new(f64::from(x.re), f64::from(x.im))
+}
+
 /// `1/√(Re k_ii + Im k_ii)`.
-fn scaling(matrix: &CsrMatrix<c64>) -> Result<Vec<f64>, MeshError> {
+///
+/// # Errors
+/// [`MeshError::Factorisation`] where that is not positive.
+pub(super) fn scaling(matrix: &CsrMatrix<c64>) -> Result<Vec<f64>, MeshError> {
     let n = matrix.structure.row_count();
     let failed = |row: usize, value: f64| MeshError::Factorisation {
         unknowns: n,

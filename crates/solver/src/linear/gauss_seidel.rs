@@ -1,5 +1,5 @@
-//! Symmetric block Gauss–Seidel as a smoother: sets of strongly coupled unknowns are solved for at once, one colour of sets after the
-//! other.
+//! Symmetric block Gauss–Seidel as a smoother: sets of strongly coupled unknowns are solved for at once, one colour of sets after
+//! the other.
 //!
 //! With `K = L + D + Lᵀ`, `D` the blocks of the sets and `L` the couplings with sets of earlier colours, one application is
 //!
@@ -10,7 +10,7 @@
 //! Complex symmetric, and never indefinite where `K` is not. On cells much flatter than wide a field that is constant across
 //! them is small in energy and large in every unknown: an incomplete factor, which drops what elimination brings between the
 //! unknowns of a chain, does not see it, and a set that is solved exactly does. Numbers are in single precision, of the matrix
-//! scaled to a diagonal of modulus one. Unknowns of one colour are worked on in parallel; the bits do not depend on the threads.
+//! scaled as for a factor. Unknowns of one colour are worked on in parallel; the bits do not depend on the threads.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use fluxmorph_geometry::fem::{CsrMatrix, Ldlt, LdltAnalysis, StrongSets, c32, c6
 use rayon::prelude::*;
 
 use super::cost::Sizes;
-use super::factor::magnification;
+use super::factor::{Representation, double, magnification, scaled_entry, scaling};
 
 /// Rows per parallel task.
 const ROWS: usize = 1024;
@@ -80,19 +80,18 @@ impl GaussSeidelAnalysis {
                 Ok(Colour { larger: first, rows, blocks: blocks.transpose()? })
             })
             .collect::<Result<Vec<_>, MeshError>>()?;
-        let couplings = |side: Side| {
-            let mut found = Couplings { row_starts: vec![0], columns: Vec::new() };
-            for colour in &colours {
-                for new in colour.rows.clone() {
-                    let row = structure.row(order[new] as usize);
-                    let others = structure.columns[row].iter().map(|&c| number[c as usize]);
-                    found.columns.extend(others.filter(|&c| colour.couples(c as usize, side)));
-                    found.row_starts.push(found.columns.len() as u32);
-                }
+        let on_side = |side: Side| {
+            let mut found = Couplings { row_starts: vec![0; order.len() + 1], columns: Vec::new() };
+            couplings(structure, (&order, &number), &colours, side).for_each(|coupling| {
+                found.columns.push(coupling.column);
+                found.row_starts[coupling.row + 1] += 1;
+            });
+            for row in 0..order.len() {
+                found.row_starts[row + 1] += found.row_starts[row];
             }
             found
         };
-        Ok(Self { earlier: couplings(Side::Earlier), later: couplings(Side::Later), order, colours })
+        Ok(Self { earlier: on_side(Side::Earlier), later: on_side(Side::Later), order, colours })
     }
 
     /// Memory of this analysis and of the numbers of one matrix [bytes].
@@ -129,14 +128,38 @@ enum Side {
     Later,
 }
 
-impl Colour {
-    /// Whether a column belongs to a colour on one side.
-    fn couples(&self, column: usize, side: Side) -> bool {
-        match side {
-            Side::Earlier => column < self.rows.start,
-            Side::Later => column >= self.rows.end,
-        }
-    }
+/// An entry of the matrix that couples two colours.
+struct Coupling {
+    /// In the new numbering.
+    row: usize,
+    column: u32,
+    /// Its place in the matrix.
+    entry: usize,
+}
+
+/// The couplings with colours on one side, row by row in the new numbering.
+fn couplings(
+    structure: &CsrStructure,
+    (order, number): (&[u32], &[u32]),
+    colours: &[Colour],
+    side: Side,
+) -> impl Iterator<Item = Coupling> {
+    let of_row = move |row: usize| {
+        let of_entry = move |entry: usize| {
+            let column = number[structure.columns[entry] as usize];
+            Coupling { row, column, entry }
+        };
+        structure.row(order[row] as usize).map(of_entry)
+    };
+    let of_colour = move |Colour { rows, .. }: &Colour| {
+        let Range { start, end } = *rows;
+        let is_there = move |found: &Coupling| match side {
+            Side::Earlier => (found.column as usize) < start,
+            Side::Later => found.column as usize >= end,
+        };
+        (start..end).flat_map(of_row).filter(is_there)
+    };
+    colours.iter().flat_map(of_colour)
 }
 
 /// A colour for every set, so that sets of one colour are not coupled: the first that is free, large sets first.
@@ -195,9 +218,9 @@ fn blocks(
 #[derive(Debug)]
 pub(super) struct GaussSeidel {
     analysis: Arc<GaussSeidelAnalysis>,
-    /// `1/√|k_ii|`.
+    /// Of every row of the matrix.
     scale: Vec<f64>,
-    /// `1/d_i`, for the rows that are sets by themselves.
+    /// `1/d_i` in the new numbering, for the rows that are sets by themselves.
     inverse: Vec<c32>,
     factors: Vec<Option<Ldlt<c32>>>,
     earlier: Vec<c32>,
@@ -208,44 +231,31 @@ impl GaussSeidel {
     /// Takes the values of a matrix with the analysed pattern.
     ///
     /// # Errors
-    /// [`MeshError::Factorisation`] where a diagonal entry or a pivot of a set vanishes.
+    /// [`MeshError::Factorisation`] where a diagonal entry is not positive or a pivot of a set vanishes.
     pub(super) fn new(
         analysis: &Arc<GaussSeidelAnalysis>,
         matrix: &CsrMatrix<c64>,
     ) -> Result<Self, MeshError> {
         let GaussSeidelAnalysis { order, colours, .. } = &**analysis;
         let structure = &matrix.structure;
-        let diagonal: Vec<c64> =
-            order.par_iter().map(|&i| matrix.entry(i as usize, i as usize).unwrap_or_default()).collect();
-        if let Some(row) = diagonal.iter().position(|d| !(d.norm() > 0.0 && d.is_finite())) {
-            let cause = format!("the diagonal entry of unknown {} is {}", order[row], diagonal[row]);
-            return Err(MeshError::Factorisation { unknowns: order.len(), cause });
-        }
-        let scale: Vec<f64> = diagonal.iter().map(|d| 1.0 / d.norm().sqrt()).collect();
-        let inverse = diagonal.iter().zip(&scale).map(|(d, s)| single((d * s * s).inv())).collect();
-        let number = ordering::inverse_permutation(order);
+        let scale = scaling(matrix)?;
+        let scaled =
+            |row: usize, entry: usize| -> c32 { scaled_entry(matrix, &scale, order[row] as usize, entry) };
+        let inverse = order.iter().map(|&i| {
+            let (d, s) = (matrix.entry(i as usize, i as usize).unwrap_or_default(), scale[i as usize]);
+            c32::of_entry((d * s * s).inv())
+        });
+        let inverse = inverse.collect();
         let factors = colours.iter().map(|colour| {
             let Some((blocks, entries)) = &colour.blocks else { return Ok(None) };
-            let scale_of = |old: u32| scale[number[old as usize] as usize];
-            let entry = |row: usize, k: usize| {
-                let k = entries[k] as usize;
-                single(matrix.values[k] * (scale[colour.larger + row] * scale_of(structure.columns[k])))
-            };
-            Ldlt::new(blocks, entry).map(Some)
+            Ldlt::new(blocks, |row, k| scaled(colour.larger + row, entries[k] as usize)).map(Some)
         });
         let factors = factors.collect::<Result<_, _>>()?;
+        let number = ordering::inverse_permutation(order);
         let values = |side: Side, count: usize| {
             let mut values = Vec::with_capacity(count);
-            for colour in colours {
-                for new in colour.rows.clone() {
-                    for k in structure.row(order[new] as usize) {
-                        let column = number[structure.columns[k] as usize] as usize;
-                        if colour.couples(column, side) {
-                            values.push(single(matrix.values[k] * (scale[new] * scale[column])));
-                        }
-                    }
-                }
-            }
+            let all = couplings(structure, (order, &number), colours, side);
+            all.for_each(|coupling| values.push(scaled(coupling.row, coupling.entry)));
             values
         };
         let earlier = values(Side::Earlier, analysis.earlier.columns.len());
@@ -264,10 +274,10 @@ impl GaussSeidel {
     pub(super) fn apply(&self, r: &[c64], z: &mut [c64], rest: &mut [c64]) {
         let GaussSeidelAnalysis { order, colours, earlier, later } = &*self.analysis;
         let scaled: Vec<c64> =
-            order.par_iter().zip(&self.scale).map(|(&old, s)| r[old as usize] * *s).collect();
+            order.par_iter().map(|&old| r[old as usize] * self.scale[old as usize]).collect();
         let factor = magnification(&scaled);
         // The right side, then `s`.
-        let mut s: Vec<c32> = scaled.into_par_iter().map(|r| single(r * factor)).collect();
+        let mut s: Vec<c32> = scaled.into_par_iter().map(|r| c32::of_entry(r * factor)).collect();
         let mut y = vec![c32::default(); s.len()];
         for (colour, factor) in colours.iter().zip(&self.factors) {
             let (before, own) = y.split_at_mut(colour.rows.start);
@@ -285,9 +295,10 @@ impl GaussSeidel {
         y.par_iter_mut().zip(&x).for_each(|(y, x)| *y = x - *y);
         s.par_iter_mut().for_each(|s| *s = c32::default());
         subtract((earlier, &self.earlier), &(0..order.len()), &y, 0, &mut s);
-        for (new, &old) in order.iter().enumerate() {
-            z[old as usize] = double(x[new]) * (self.scale[new] / factor);
-            rest[old as usize] = double(s[new]) / (factor * self.scale[new]);
+        for ((&old, &x), &s) in order.iter().zip(&x).zip(&s) {
+            let old = old as usize;
+            z[old] = double(x) * (self.scale[old] / factor);
+            rest[old] = double(s) / (factor * self.scale[old]);
         }
     }
 
@@ -326,14 +337,6 @@ fn subtract(
             *b -= c32::new(by_re[0] - by_im[1], by_re[1] + by_im[0]);
         }
     });
-}
-
-fn single(x: c64) -> c32 {
-    c32::new(x.re as f32, x.im as f32)
-}
-
-fn double(x: c32) -> c64 {
-    c64::new(f64::from(x.re), f64::from(x.im))
 }
 
 #[cfg(test)]

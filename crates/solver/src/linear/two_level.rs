@@ -34,8 +34,8 @@ const ROWS: usize = 1024;
 const DIAGONAL_FACTOR: f64 = 1.02;
 
 /// Coupling over the diagonal from which two unknowns stay in one part of the incomplete factor, and in one block of
-/// Gauss–Seidel. At 0.3 quadratic elements on a shield take 150 iterations instead of 110, at 0.2 90, but there the couplings join half of
-/// the unknowns of a fine mesh to one set, whose factor is nearly that of the whole.
+/// Gauss–Seidel. At 0.3 quadratic elements on a shield take 150 iterations instead of 110, at 0.2 90, but there the couplings
+/// join half of the unknowns of a fine mesh to one set, whose factor is nearly that of the whole.
 const STRONG: f64 = 0.25;
 
 /// What follows from the pattern and the couplings on the reference mesh.
