@@ -7,7 +7,7 @@
 //! Does not live here: how much memory there is, and what is refused for lack of it (`memory_limit`).
 
 use fluxmorph_geometry::fem::workspace::LARGE_FACTOR;
-use fluxmorph_solver::linear::{Method, Reuse, SystemAnalysis, two_levels_from};
+use fluxmorph_solver::linear::{FieldKind, Method, Reuse, SystemAnalysis, two_levels_from};
 use fluxmorph_solver::{FieldModel, Order};
 
 use crate::problem::Problem;
@@ -68,6 +68,7 @@ impl Sizes {
         let tets = problem.original().topology().tets().len();
         let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
         let harmonic = problem.states().iter().filter(|state| state.angular_frequency() != 0.0);
+        let of_harmonic = |elements| two_levels_from(FieldKind::Harmonic, elements);
         let mut sizes = Self {
             arrays: tets * element + elastic,
             matrices: 0,
@@ -76,7 +77,7 @@ impl Sizes {
             unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
             has_factor: solvers().any(|solver| is_factor(solver.method())),
             two_levels_from: harmonic
-                .map(|state| two_levels_from((state.space().family(), state.space().order())))
+                .map(|state| of_harmonic((state.space().family(), state.space().order())))
                 .min()
                 .unwrap_or(usize::MAX),
             two_levels_per_unknown: TWO_LEVELS_PER_UNKNOWN[usize::from(quadratic)],

@@ -1,9 +1,13 @@
-//! Sets of unknowns that are coupled strongly: the connected parts of the graph of the strong couplings.
+//! Sets of unknowns that are coupled strongly: the connected parts of the graph of the strong couplings, or of those among them
+//! that make no set too large.
 //!
 //! On skin-graded meshes they are chains along the thin cells, and sheets where cells are thin along two axes. What treats
-//! unknowns one after the other must not cut them.
+//! unknowns one after the other must not cut them, or only where they hang together least.
+
+use rayon::prelude::*;
 
 use super::csr::CsrStructure;
+use crate::disjoint_sets::DisjointSets;
 
 /// The sets, numbered in the order of their first row.
 #[derive(Debug)]
@@ -45,6 +49,36 @@ impl StrongSets {
         Self { of, starts, rows }
     }
 
+    /// Sets of at most `most` rows: couplings join the sets of their ends, the strongest first, unless both together are larger.
+    ///
+    /// `strength(row, k)` is how strongly the stored entry `k` of `row` couples, symmetric; `None` joins nothing.
+    pub fn of_at_most(
+        most: usize,
+        structure: &CsrStructure,
+        strength: impl Fn(usize, usize) -> Option<f32> + Sync,
+    ) -> Self {
+        let n = structure.row_count();
+        let of_row = |row: usize| {
+            let later = structure.row(row).filter(move |&k| structure.columns[k] as usize > row);
+            later.filter_map(|k| Some((strength(row, k)?, row as u32, structure.columns[k]))).collect()
+        };
+        let mut couplings: Vec<(f32, u32, u32)> =
+            (0..n).into_par_iter().flat_map_iter(|row| -> Vec<_> { of_row(row) }).collect();
+        // Of equals the first: the order does not depend on the threads.
+        couplings.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        let (mut joined, mut sizes) = (DisjointSets::new(n), vec![1usize; n]);
+        for (_, row, column) in couplings {
+            let [a, b] = [row, column].map(|end| joined.root(end as usize));
+            let size = sizes[a] + sizes[b];
+            if a != b && size <= most {
+                joined.join([a, b]);
+                sizes[a.min(b)] = size;
+            }
+        }
+        let of: Vec<usize> = (0..n).map(|row| joined.root(row)).collect();
+        Self::new(structure, |row, k| of[row] == of[structure.columns[k] as usize])
+    }
+
     /// How many there are.
     pub fn count(&self) -> usize {
         self.starts.len() - 1
@@ -66,16 +100,39 @@ impl StrongSets {
 mod tests {
     use super::*;
 
-    #[test]
-    fn what_is_coupled_strongly_is_one_set() {
-        // A chain of six rows, whose third coupling is weak.
+    /// A chain of six rows, each coupled with its neighbours.
+    fn chain() -> CsrStructure {
         let row = |i: usize| i.saturating_sub(1)..(i + 2).min(6);
         let columns: Vec<u32> = (0..6).flat_map(|i| row(i).map(|c| c as u32)).collect();
-        let starts = (0..=6).map(|i| (0..i).map(|i| row(i).len() as u32).sum()).collect();
-        let structure = CsrStructure { column_count: 6, row_starts: starts, columns };
+        let row_starts = (0..=6).map(|i| (0..i).map(|i| row(i).len() as u32).sum()).collect();
+        CsrStructure { column_count: 6, row_starts, columns }
+    }
+
+    #[test]
+    fn what_is_coupled_strongly_is_one_set() {
+        // The third coupling is weak.
+        let structure = chain();
         let sets = StrongSets::new(&structure, |row, k| row.min(structure.columns[k] as usize) != 2);
         assert_eq!(sets.count(), 2);
         assert_eq!((sets.rows(0), sets.rows(1)), ([0, 1, 2].as_slice(), [3, 4, 5].as_slice()));
         assert_eq!((0..6).map(|row| sets.of(row)).collect::<Vec<_>>(), [0, 0, 0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn a_set_is_cut_where_it_hangs_together_least() {
+        let structure = chain();
+        let strengths = [0.5, 0.9, 0.3, 0.7, 0.6];
+        let strength = |row: usize, k: usize| Some(strengths[row.min(structure.columns[k] as usize)]);
+        let of = |most: usize| {
+            let sets = StrongSets::of_at_most(most, &structure, strength);
+            (0..sets.count()).map(|set| sets.rows(set).to_vec()).collect::<Vec<_>>()
+        };
+        assert_eq!(of(6), [[0, 1, 2, 3, 4, 5]]);
+        assert_eq!(of(4), [[0, 1, 2], [3, 4, 5]]);
+        // 0.9 and 0.7 come first; what is left cannot be joined to them.
+        assert_eq!(of(2), [vec![0], vec![1, 2], vec![3, 4], vec![5]]);
+        assert_eq!(of(1).len(), 6);
+        let none = StrongSets::of_at_most(6, &structure, |_, _| None);
+        assert_eq!(none.count(), 6);
     }
 }

@@ -92,7 +92,7 @@ impl SystemAnalysis {
         let unknowns = pattern.structure.row_count();
         let is_large = unknowns >= factors_up_to(self.elements);
         let mut factor = if is_large { None } else { self.cheapest_factor()? };
-        if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.elements)) {
+        if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.field, self.elements)) {
             return Ok(method);
         }
         // A coarse level that cannot be made is none.
@@ -260,10 +260,11 @@ const fn factors_up_to(elements: (ElementFamily, Order)) -> usize {
 
 /// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is cheaper, or as good
 /// as that.
-pub const fn two_levels_from(elements: (ElementFamily, Order)) -> usize {
-    match elements {
-        (_, Order::Linear) => 45_000,
-        (ElementFamily::Nodal, Order::Quadratic) => 150_000,
-        (ElementFamily::Edge, Order::Quadratic) => 60_000,
+pub const fn two_levels_from(field: FieldKind, elements: (ElementFamily, Order)) -> usize {
+    match (elements, field) {
+        ((_, Order::Linear), _) => 45_000,
+        ((ElementFamily::Nodal, Order::Quadratic), FieldKind::Harmonic) => 50_000,
+        ((ElementFamily::Nodal, Order::Quadratic), FieldKind::Static) => 150_000,
+        ((ElementFamily::Edge, Order::Quadratic), _) => 60_000,
     }
 }

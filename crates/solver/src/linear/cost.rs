@@ -139,7 +139,7 @@ pub(crate) fn typical_iterations(
         (Method::RealFactor, FieldKind::Static) => 2,
         (Method::RealFactor | Method::RealFactorSingle, FieldKind::Harmonic) => 25,
         (Method::TwoLevel, _) if order == Order::Quadratic => match family {
-            ElementFamily::Nodal => 115,
+            ElementFamily::Nodal => 80,
             ElementFamily::Edge => 250,
         },
         (Method::TwoLevel, _) => (2.1 * (unknowns as f64).cbrt()) as usize,

@@ -94,7 +94,7 @@ impl LinearSolverSettings {
 
 /// Whether the matrix is real.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FieldKind {
+pub enum FieldKind {
     /// Magnetostatics: the matrix is real.
     Static,
     /// Eddy currents: it is complex symmetric.
