@@ -17,13 +17,19 @@ use crate::error::SolverError;
 use crate::family::{self, Local, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
-use crate::prolongation::{ScalarSpace, injection, prolongation};
+use crate::prolongation::{ScalarSpace, components, injection, prolongation};
 use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, Space};
 use crate::surface::SurfaceTerm;
 use crate::tangents::Tangents;
 use crate::unknowns::{PSI, Unknowns};
 use crate::weak_form::WeakForm;
+
+/// Relative residual from which iterations are few, so that the coarse factor may be most of the work.
+const ROUGH: f64 = 1e-4;
+
+/// Coarse unknowns from which it is, and linear functions are joined to aggregates then.
+const JOINED_FROM: usize = 100_000;
 
 /// A finite-element space with its unknowns and the pattern of their matrix.
 #[derive(Debug)]
@@ -155,8 +161,8 @@ impl Discretisation {
         Ok(Self { space, unknowns, pattern, groups, local, lifted })
     }
 
-    /// The prolongation from a coarse space: linear elements for quadratic ones; for linear ones ψ in full and aggregates of
-    /// `A`, by the couplings of `matrix`.
+    /// The prolongation from a coarse space: linear elements for quadratic ones, joined to aggregates where there are many and the
+    /// tolerance is rough; for linear ones ψ in full and aggregates of `A`, by the couplings of `matrix`.
     ///
     /// # Errors
     /// As [`Unknowns::new`]; [`SolverError::Parameter`] for first-order edge elements, which have none.
@@ -165,7 +171,7 @@ impl Discretisation {
         mesh: &Mesh,
         weak_form: &WeakForm,
         boundaries: &[(String, Boundary)],
-        matrix: &CsrMatrix<c64>,
+        (matrix, tolerance): (&CsrMatrix<c64>, f64),
     ) -> Result<CsrMatrix<f64>, SolverError> {
         let conductors = weak_form.conductors();
         if self.space.family() == ElementFamily::Edge {
@@ -181,7 +187,13 @@ impl Discretisation {
         if self.space.order() == Order::Quadratic {
             let vertices = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
             let coarse = Unknowns::new(mesh, &vertices, &conductors, boundaries)?;
-            return Ok(prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default()));
+            let linear = prolongation(&coarse, &self.space, &self.unknowns, ScalarSpace::default());
+            let is_joined = tolerance >= ROUGH && linear.structure.column_count >= JOINED_FROM;
+            return Ok(if is_joined {
+                aggregation::of_linear_functions(linear, components(&coarse), matrix)
+            } else {
+                linear
+            });
         }
         Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, aggregation::PASSES))
     }

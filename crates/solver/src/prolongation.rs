@@ -78,6 +78,12 @@ pub fn prolongation(
     CsrMatrix { structure: Arc::new(structure), values }
 }
 
+/// The components of `A` of the columns of [`prolongation`] with [`ScalarSpace::Quadratic`], without those of `ψ`, which follow.
+pub(crate) fn components(coarse: &Unknowns) -> Vec<usize> {
+    let of_node = |node| (0..PSI).filter(move |&c| coarse.dofs.equation(node, c).is_some());
+    (0..coarse.dofs.carrier_count()).map(CarrierId::new).flat_map(of_node).collect()
+}
+
 /// The unknowns of first-order edge elements as unknowns of second-order ones, whose functions they are too; shape
 /// `(fine.dofs.count(), coarse.dofs.count())`.
 pub fn injection(coarse: &Unknowns, fine: &Unknowns) -> CsrMatrix<f64> {
@@ -123,6 +129,7 @@ mod tests {
     use super::*;
     use crate::boundary::Boundary;
     use crate::elements::{ElementFamily, Order};
+    use crate::linear::aggregation;
     use crate::linear::transfer::Transfer;
     use crate::material::Material;
     use crate::model::FieldModel;
@@ -181,32 +188,66 @@ mod tests {
         }
     }
 
-    /// With conditions on planes the linear space is a subspace of the quadratic one.
-    #[test]
-    fn the_galerkin_product_is_the_matrix_of_linear_elements() {
+    fn coarse_shield() -> Mesh {
         let parameters = ShieldParameters {
             refinement: 0.25,
             skin: vec![1e-3],
             side_skin: Vec::new(),
             ..ShieldParameters::default()
         };
-        let mesh = shield(&parameters).expect("a coarse shield");
+        shield(&parameters).expect("a coarse shield")
+    }
+
+    fn model(mesh: &Mesh, order: Order) -> FieldModel {
         let steel = Material { relative_permeability: 800.0, conductivity: 7e6 };
         let names = mesh.topology().region_names();
-        let model = |order| {
-            let setup = FieldModelSetup {
-                family: ElementFamily::Nodal,
-                frequency: 60.0,
-                order,
-                materials: names.iter().map(|n| if n == "plate" { steel } else { Material::AIR }).collect(),
-                boundaries: ["x_min", "y_min", "z_max"]
-                    .map(|surface| (surface.to_owned(), Boundary::FluxParallel))
-                    .to_vec(),
-                ..FieldModelSetup::default()
-            };
-            FieldModel::new(&mesh, setup).expect("a sound problem")
+        let setup = FieldModelSetup {
+            family: ElementFamily::Nodal,
+            frequency: 60.0,
+            order,
+            materials: names.iter().map(|n| if n == "plate" { steel } else { Material::AIR }).collect(),
+            boundaries: ["x_min", "y_min", "z_max"]
+                .map(|surface| (surface.to_owned(), Boundary::FluxParallel))
+                .to_vec(),
+            ..FieldModelSetup::default()
         };
-        let (linear, quadratic) = (model(Order::Linear), model(Order::Quadratic));
+        FieldModel::new(mesh, setup).expect("a sound problem")
+    }
+
+    /// Linear functions that are joined are so within their component: a field whose components are constant stays one.
+    #[test]
+    fn joined_functions_hold_what_is_constant_in_a_component() {
+        let mesh = coarse_shield();
+        let (linear, quadratic) = (model(&mesh, Order::Linear), model(&mesh, Order::Quadratic));
+        let coarse = linear.unknowns();
+        let p = prolongation(coarse, quadratic.space(), quadratic.unknowns(), ScalarSpace::Quadratic);
+        let components = components(coarse);
+        let of_a = components.len();
+        let joined =
+            aggregation::of_linear_functions(p.clone(), components.clone(), &quadratic.assemble(&mesh));
+        let (before, after) = (p.structure.column_count, joined.structure.column_count);
+        // Four an aggregate, but for what finds no partner; ψ in full.
+        assert!(after - (before - of_a) < of_a / 3, "{after} of {before}, {of_a} of them of A");
+        for row in 0..p.structure.row_count() {
+            let sum = |p: &CsrMatrix<f64>| p.values[p.structure.row(row)].iter().sum::<f64>();
+            assert_eq!(sum(&p), sum(&joined), "row {row}");
+        }
+        let mut component_of = vec![None; after];
+        for row in 0..p.structure.row_count() {
+            let own = p.structure.columns[p.structure.row(row)].iter().map(|&c| components.get(c as usize));
+            let Some(own) = own.reduce(|a, b| if a == b { a } else { None }) else { continue };
+            for k in joined.structure.row(row) {
+                let known = component_of[joined.structure.columns[k] as usize].get_or_insert(own);
+                assert_eq!(*known, own, "row {row}");
+            }
+        }
+    }
+
+    /// With conditions on planes the linear space is a subspace of the quadratic one.
+    #[test]
+    fn the_galerkin_product_is_the_matrix_of_linear_elements() {
+        let mesh = coarse_shield();
+        let (linear, quadratic) = (model(&mesh, Order::Linear), model(&mesh, Order::Quadratic));
         let (space, fine) = (quadratic.space(), quadratic.unknowns());
         let transfer = Transfer::new(prolongation(linear.unknowns(), space, fine, ScalarSpace::Linear));
         let matrix = quadratic.assemble(&mesh);

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::parallel::Aggregates;
 use rayon::prelude::*;
 
 /// Rows per parallel task.
@@ -36,6 +37,23 @@ impl Transfer {
             _ => false,
         };
         (0..p.row_count()).map(alone).collect()
+    }
+
+    /// The prolongation from aggregates of coarse unknowns, which count as equal.
+    pub(crate) fn joined(&self, aggregates: &Aggregates) -> CsrMatrix<f64> {
+        let CsrMatrix { structure, values } = &self.prolongation;
+        let row = |row: usize| {
+            let mut joined: Vec<(usize, f64)> = Vec::new();
+            for k in structure.row(row) {
+                let column = aggregates.of_row[structure.columns[k] as usize] as usize;
+                match joined.iter_mut().find(|entry| entry.0 == column) {
+                    Some(entry) => entry.1 += values[k],
+                    None => joined.push((column, values[k])),
+                }
+            }
+            joined
+        };
+        CsrMatrix::from_rows(aggregates.count, (0..structure.row_count()).map(row))
     }
 
     /// Memory held [bytes].
@@ -199,5 +217,14 @@ mod tests {
         assert_eq!(Transfer::new(p).is_coarse(), [false, false, false, false]);
         let p = CsrMatrix::from_rows(2, [vec![(0, 1.0)], vec![(1, 1.0)], vec![(1, 1.0)]]);
         assert_eq!(Transfer::new(p).is_coarse(), [true, false, false]);
+    }
+
+    #[test]
+    fn weights_of_unknowns_that_are_joined_add_up() {
+        let p = CsrMatrix::from_rows(3, [vec![(0, 1.0)], vec![(0, 0.5), (1, 0.5)], vec![(1, 0.5), (2, 0.5)]]);
+        let joined = Transfer::new(p).joined(&Aggregates { of_row: vec![0, 0, 1], count: 2 });
+        assert_eq!(joined.structure.columns, [0, 0, 0, 1]);
+        assert_eq!(joined.values, [1.0, 1.0, 0.5, 0.5]);
+        assert_eq!(joined.structure.column_count, 2);
     }
 }

@@ -27,11 +27,14 @@ impl FieldModel {
         let fine =
             Discretisation::new(mesh, (setup.family, setup.order), &weak_form, &setup.boundaries, ownership)?;
         let field = if angular_frequency == 0.0 { FieldKind::Static } else { FieldKind::Harmonic };
+        let tolerance = setup.linear_solver.tolerance;
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             hosts: fine.hosts(),
             reference: &|| fine.assemble(&weak_form, None, mesh),
-            prolongation: &|matrix| fine.prolongation(mesh, &weak_form, &setup.boundaries, matrix),
+            prolongation: &|matrix| {
+                fine.prolongation(mesh, &weak_form, &setup.boundaries, (matrix, tolerance))
+            },
         };
         let analysis = match ownership {
             None => {

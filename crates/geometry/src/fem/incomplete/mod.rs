@@ -64,24 +64,22 @@ impl<T: Number> Incomplete<T> {
     ) -> Result<Self, MeshError> {
         let failed = |cause: String| MeshError::Factorisation { unknowns: analysis.size(), cause };
         let structure = &analysis.structure;
-        let scales: Vec<T> = analysis
-            .order
-            .par_iter()
-            .map(|&old| {
-                let row = old as usize;
-                let range = structure.row(row);
-                let place = structure.columns[range.clone()].binary_search(&old).ok();
-                let diagonal = place.map_or(0.0, |k| entry(row, range.start + k).modulus());
-                if diagonal > 0.0 && diagonal.is_finite() {
-                    Ok(T::from_real(1.0 / diagonal.sqrt()))
-                } else {
-                    let expected = "expected a finite number other than zero";
-                    Err(failed(format!(
-                        "the diagonal entry of row {row} has the modulus {diagonal}, {expected}"
-                    )))
-                }
-            })
-            .collect::<Result<_, _>>()?;
+        let modulus = |&old: &u32| {
+            let range = structure.row(old as usize);
+            let place = structure.columns[range.clone()].binary_search(&old).ok();
+            place.map_or(0.0, |k| entry(old as usize, range.start + k).modulus())
+        };
+        let diagonal: Vec<f64> = analysis.order.par_iter().map(modulus).collect();
+        let is_bad = |own: &(&u32, &f64)| !(*own.1 > 0.0 && own.1.is_finite());
+        if let Some((row, diagonal)) =
+            analysis.order.iter().zip(&diagonal).filter(is_bad).min_by_key(|own| own.0)
+        {
+            let expected = "expected a finite number other than zero";
+            return Err(failed(format!(
+                "the diagonal entry of row {row} has the modulus {diagonal}, {expected}"
+            )));
+        }
+        let scales = diagonal.into_iter().map(|diagonal| T::from_real(1.0 / diagonal.sqrt())).collect();
         let zeros = |count| vec![T::default(); count];
         let (lower, inverse_pivots) = (zeros(analysis.columns.len()), zeros(analysis.size()));
         let analysis = Arc::clone(analysis);
