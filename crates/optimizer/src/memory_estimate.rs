@@ -68,7 +68,6 @@ impl Sizes {
         let tets = problem.original().topology().tets().len();
         let solvers = || problem.states().iter().filter_map(FieldModel::linear_solver);
         let harmonic = problem.states().iter().filter(|state| state.angular_frequency() != 0.0);
-        let of_harmonic = |elements| two_levels_from(FieldKind::Harmonic, elements);
         let mut sizes = Self {
             arrays: tets * element + elastic,
             matrices: 0,
@@ -77,7 +76,8 @@ impl Sizes {
             unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
             has_factor: solvers().any(|solver| is_factor(solver.method())),
             two_levels_from: harmonic
-                .map(|state| of_harmonic((state.space().family(), state.space().order())))
+                .map(|state| (state.space().family(), state.space().order()))
+                .map(|elements| two_levels_from(FieldKind::Harmonic, elements))
                 .min()
                 .unwrap_or(usize::MAX),
             two_levels_per_unknown: TWO_LEVELS_PER_UNKNOWN[usize::from(quadratic)],

@@ -58,12 +58,12 @@ impl StrongSets {
         strength: impl Fn(usize, usize) -> Option<f32> + Sync,
     ) -> Self {
         let n = structure.row_count();
+        let strength = &strength;
         let of_row = |row: usize| {
             let later = structure.row(row).filter(move |&k| structure.columns[k] as usize > row);
-            later.filter_map(|k| Some((strength(row, k)?, row as u32, structure.columns[k]))).collect()
+            later.filter_map(move |k| Some((strength(row, k)?, row as u32, structure.columns[k])))
         };
-        let mut couplings: Vec<(f32, u32, u32)> =
-            (0..n).into_par_iter().flat_map_iter(|row| -> Vec<_> { of_row(row) }).collect();
+        let mut couplings: Vec<(f32, u32, u32)> = (0..n).into_par_iter().flat_map_iter(of_row).collect();
         // Of equals the first: the order does not depend on the threads.
         couplings.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
         let (mut joined, mut sizes) = (DisjointSets::new(n), vec![1usize; n]);
