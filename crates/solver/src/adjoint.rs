@@ -28,7 +28,20 @@ use crate::surface::SurfaceTerm;
 /// # Errors
 /// As [`PreparedSystem::solve`].
 pub fn solve(system: &mut PreparedSystem, derivative: &[c64]) -> Result<FieldSolution, SolverError> {
-    let (values, report): (Vec<c64>, LinearSolverReport) = system.solve(derivative)?;
+    solve_to(system, derivative, 0.0)
+}
+
+/// As [`solve`], to a relative residual [1] that may be larger than the settings'. The derivative of the objective differs by about
+/// as much of itself.
+///
+/// # Errors
+/// As [`PreparedSystem::solve`].
+pub fn solve_to(
+    system: &mut PreparedSystem,
+    derivative: &[c64],
+    tolerance: f64,
+) -> Result<FieldSolution, SolverError> {
+    let (values, report): (Vec<c64>, LinearSolverReport) = system.solve_to(tolerance, derivative)?;
     Ok(FieldSolution::adjoint(values, report))
 }
 

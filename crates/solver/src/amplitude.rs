@@ -321,7 +321,7 @@ pub(crate) fn solve(
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: None, damping });
         let tangent = problem.tangent(&iterate.values);
-        let nearest = model.assemble_tangent(mesh, &tangent.tensors());
+        let nearest = model.with_tangents(&problem.matrix, &tangent.tensors(), mesh);
         let system = systems.prepare(nearest)?;
         let verdict = descent.after(residual);
         if verdict == Verdict::Converged {

@@ -14,6 +14,7 @@ use crate::boundary::Boundary;
 use crate::circuit::{SolidRows, Solids};
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
+use crate::element::tensor::{CurlsOfRule, TensorTerm};
 use crate::family::{self, Local, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
@@ -47,8 +48,10 @@ pub(crate) struct Discretisation {
 
 /// Elements and surface triangles bound to the pattern: what adds their matrices.
 trait Bound: std::fmt::Debug + Send + Sync {
-    /// Adds the matrices of all elements and triangles of this rank to `values`.
-    fn add(&self, of: &Discretisation, form: (&WeakForm, Option<&Tangents>), mesh: &Mesh, values: &mut [c64]);
+    /// Adds the matrices of all elements and triangles of this rank to `values`; of B–H laws they have the linear parts.
+    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]);
+    /// Adds what the tangents of B–H laws have beyond these.
+    fn add_tangents(&self, of: &Discretisation, tangents: &Tangents, mesh: &Mesh, values: &mut [c64]);
     /// `f −= K A_prescribed` of the elements and triangles that prescribed values touch.
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]);
     /// The matrix of an element times some coefficients.
@@ -70,28 +73,31 @@ impl<K, const N: usize, const F: usize> std::fmt::Debug for Groups<K, N, F> {
 }
 
 impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F> {
-    fn add(
-        &self,
-        of: &Discretisation,
-        (weak_form, tangents): (&WeakForm, Option<&Tangents>),
-        mesh: &Mesh,
-        values: &mut [c64],
-    ) {
-        let local = of.local.as_ref();
-        of.add_group(&self.tets, values, |e| {
-            let e = local.map_or(e, |local| local.elements[e.index()]);
-            weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, tangents))
+    fn add(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, values: &mut [c64]) {
+        let all = |_: ElementId| true;
+        of.add_group(&self.tets, values, all, |e| {
+            let e = of.element(e);
+            weak_form.tet(self.matrices, of.space.cell(mesh, e), e)
         });
-        of.add_group(&self.triangles, values, |t| {
-            let t = local.map_or(t.index(), |local| local.triangles[t.index()]);
+        of.add_group(&self.triangles, values, all, |t| {
+            let t = of.local.as_ref().map_or(t.index(), |local| local.triangles[t.index()]);
             weak_form.triangle(self.matrices, mesh, t)
+        });
+    }
+
+    fn add_tangents(&self, of: &Discretisation, tangents: &Tangents, mesh: &Mesh, values: &mut [c64]) {
+        let tensors = |e: ElementId| tangents.of(of.element(e));
+        of.add_group(&self.tets, values, |e| tensors(e).is_some(), |e| {
+            let CurlsOfRule { count, weights, curls } = self.matrices.flux_curls(&of.space.cell(mesh, of.element(e)));
+            let tensors = tensors(e).expect("an element with a law");
+            TensorTerm::new((0..count).map(|p| (weights[p], &tensors[p], &curls[p])))
         });
     }
 
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
         let (elements, triangles) = &of.lifted;
         for &e in elements {
-            let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, None));
+            let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
             of.subtract_lift(of.space.carriers_of(e), &matrix, load);
         }
         for &t in triangles {
@@ -108,7 +114,7 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
         e: ElementId,
         x: &Local,
     ) -> Local {
-        let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), (e, None));
+        let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
         Local::new(N, |a| {
             let mut row = [c64::default(); 4];
             for (b, x) in x.values().iter().enumerate().take(N) {
@@ -228,31 +234,38 @@ impl Discretisation {
         Some(Hosts::new(hosts))
     }
 
-    /// Assembles the matrix, or the rows of this rank, on a mesh with this topology; of linear parts alone without tangents.
-    pub(crate) fn assemble(
-        &self,
-        weak_form: &WeakForm,
-        tangents: Option<&Tangents>,
-        mesh: &Mesh,
-    ) -> CsrMatrix<c64> {
+    /// Assembles the matrix, or the rows of this rank, on a mesh with this topology; of B–H laws it has the linear parts.
+    pub(crate) fn assemble(&self, weak_form: &WeakForm, mesh: &Mesh) -> CsrMatrix<c64> {
         let mut matrix = CsrMatrix::zeros(self.pattern.structure());
-        self.groups.add(self, (weak_form, tangents), mesh, &mut matrix.values);
+        self.groups.add(self, weak_form, mesh, &mut matrix.values);
         matrix
     }
 
-    /// Assembles one group, turned into the frames of the nodes where some have their own.
+    /// Adds what the tangents of B–H laws have beyond their linear parts.
+    pub(crate) fn add_tangents(&self, tangents: &Tangents, mesh: &Mesh, matrix: &mut CsrMatrix<c64>) {
+        self.groups.add_tangents(self, tangents, mesh, &mut matrix.values);
+    }
+
+    /// An element of the mesh by its number among those of this rank.
+    #[inline]
+    fn element(&self, number: ElementId) -> ElementId {
+        self.local.as_ref().map_or(number, |local| local.elements[number.index()])
+    }
+
+    /// Assembles what takes part of one group, turned into the frames of the nodes where some have their own.
     fn add_group<const N: usize, L: LocalMatrix<c64, N, 4>>(
         &self,
         group: &BoundGroup<N>,
         values: &mut [c64],
+        takes_part: impl Fn(ElementId) -> bool + Sync,
         matrix: impl Fn(ElementId) -> L + Sync,
     ) {
         if self.unknowns.has_frames() {
-            self.pattern.assemble(group, values, |e| {
+            self.pattern.assemble_some(group, values, takes_part, |e| {
                 RotatedMatrix::new(matrix(e), group.carriers_of(e).map(|n| self.unknowns.frame(n)))
             });
         } else {
-            self.pattern.assemble(group, values, matrix);
+            self.pattern.assemble_some(group, values, takes_part, matrix);
         }
     }
 

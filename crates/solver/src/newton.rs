@@ -180,7 +180,7 @@ pub(crate) fn solve(
     loop {
         let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
         observer(NewtonProgress { steps, residual, energy: Some(iterate.energy), damping });
-        let tangent = model.assemble_tangent(mesh, &iterate.added.tangents);
+        let tangent = model.with_tangents(&problem.matrix, &iterate.added.tangents, mesh);
         let mut system = systems.prepare(tangent)?;
         let verdict = descent.after(residual);
         if verdict == Verdict::Converged {

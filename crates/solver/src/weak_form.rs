@@ -11,7 +11,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use crate::bh::BhCurve;
 use crate::boundary::Boundary;
 use crate::element::tabulated::Rule;
-use crate::element::tensor::{CurlsOfRule, TensorField, TensorTerm, WithTensor};
+use crate::element::tensor::{TensorField, TensorTerm, WithTensor};
 use crate::element::volume::Coefficients;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
@@ -19,7 +19,6 @@ use crate::family::{Cell, Matrices};
 use crate::material::Material;
 use crate::open::{OpenRegion, Shell, Stretch};
 use crate::surface::{Conductor, SurfaceTerm, Surfaces};
-use crate::tangents::Tangents;
 use crate::unknowns::Conductors;
 
 /// Coefficients of the weak form at one frequency.
@@ -166,25 +165,19 @@ impl WeakForm {
         self.surfaces.iter()
     }
 
-    /// The matrix of a tetrahedron, with the tangents of B–H laws where they are given.
+    /// The matrix of a tetrahedron.
     #[inline]
     pub(crate) fn tet<const N: usize, const F: usize>(
         &self,
         matrices: &impl Matrices<N, F>,
         cell: Cell,
-        (e, tangents): (ElementId, Option<&Tangents>),
+        e: ElementId,
     ) -> impl LocalMatrix<c64, N, 4> {
-        let term = match tangents.and_then(|tangents| tangents.of(e)) {
-            Some(tensors) => {
-                let CurlsOfRule { count, weights, curls } = matrices.flux_curls(&cell);
-                Some(TensorTerm::new((0..count).map(|p| (weights[p], &tensors[p], &curls[p]))))
-            }
-            None => self.tensors_of(e).map(|field| {
-                let curls = matrices.curls(&cell, field.rule);
-                let points = field.rule.nodes().iter().zip(&field.values).zip(&curls);
-                TensorTerm::new(points.map(|(((_, share), d), curls)| (share * cell.tet.volume, d, curls)))
-            }),
-        };
+        let term = self.tensors_of(e).map(|field| {
+            let curls = matrices.curls(&cell, field.rule);
+            let points = field.rule.nodes().iter().zip(&field.values).zip(&curls);
+            TensorTerm::new(points.map(|(((_, share), d), curls)| (share * cell.tet.volume, d, curls)))
+        });
         WithTensor { scalar: matrices.tet(cell, *self.coefficients_of(e)), term }
     }
 

@@ -50,6 +50,23 @@ impl<const C: usize> BlockPattern<C> {
         T: Scalar,
         L: LocalMatrix<T, N, C>,
     {
+        self.assemble_some(group, values, |_| true, element_matrix);
+    }
+
+    /// As [`BlockPattern::assemble`], of those elements alone that take part.
+    ///
+    /// # Panics
+    /// If `values` has another length than the pattern has entries.
+    pub fn assemble_some<T, L, const N: usize>(
+        &self,
+        group: &BoundGroup<N>,
+        values: &mut [T],
+        takes_part: impl Fn(ElementId) -> bool + Sync,
+        element_matrix: impl Fn(ElementId) -> L + Sync,
+    ) where
+        T: Scalar,
+        L: LocalMatrix<T, N, C>,
+    {
         assert_eq!(values.len(), self.structure().columns.len(), "one value an entry");
         let mut rest = values;
         let mut tasks = Vec::with_capacity(self.tasks.len());
@@ -60,7 +77,7 @@ impl<const C: usize> BlockPattern<C> {
             tasks.push(Task { carriers, elements, values, first: entries.start });
         }
         tasks.into_par_iter().for_each(|mut task| {
-            for &e in task.elements {
+            for &e in task.elements.iter().filter(|&&e| takes_part(e)) {
                 self.add_element(group, e, &element_matrix(e), &mut task);
             }
         });

@@ -63,7 +63,7 @@ impl Run<'_> {
         let clock = Instant::now();
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
-        let mut analysis = problem.analyse(moved.clone(), Derivatives::First, cache, progress)?;
+        let mut analysis = problem.analyse(moved.clone(), Derivatives::Search, cache, progress)?;
         analysis.timings.remesh += before;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");

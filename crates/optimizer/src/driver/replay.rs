@@ -68,7 +68,7 @@ impl Run<'_> {
             BestField::Computed(analysis) => *analysis,
             BestField::Replayed(mut cache) => {
                 self.observer.phase("computing the field of the best design");
-                self.problem.evaluate(&values, Derivatives::First, &mut cache, &mut NoProgress)?
+                self.problem.evaluate(&values, Derivatives::Search, &mut cache, &mut NoProgress)?
             }
         };
         Ok(Best { evaluation, values, objective, violation, analysis })

@@ -23,9 +23,23 @@ use crate::objective::{Combination, Term};
 pub enum Derivatives {
     /// Values alone.
     None,
-    /// Objective and constraints with their gradients: the adjoint problems are solved too.
+    /// Objective and constraints with their gradients, for a method of optimisation: adjoint problems are solved to
+    /// [`ADJOINTS_OF_A_SEARCH`], or to the tolerance of the linear solver where that is larger.
+    Search,
+    /// The same with adjoint problems solved as the states are, for those who hold a gradient against differences of values.
     First,
 }
+
+impl Derivatives {
+    /// Whether there are gradients.
+    fn are_wanted(self) -> bool {
+        self != Self::None
+    }
+}
+
+/// Relative residual [1] of the adjoint problems of a search. Gradients differ by about as much of themselves, far below what a mesh
+/// leaves of them; values, which methods compare to much smaller differences, come from states alone.
+pub const ADJOINTS_OF_A_SEARCH: f64 = 1e-7;
 
 /// What the states of an evaluation add up to.
 struct Sums<'a> {
@@ -77,15 +91,16 @@ impl Problem {
         cache: &mut SolverCache,
         progress: &mut dyn Progress,
     ) -> Result<Analysis, Error> {
-        let is_own_anchor = match (&self.shape, derivatives) {
-            (Some(shape), Derivatives::First) => {
+        let is_own_anchor = match (&self.shape, derivatives.are_wanted()) {
+            (Some(shape), true) => {
                 self.anchor(shape.motion().original(), &moved.mesh, cache, progress)?
             }
             _ => false,
         };
-        let mut work =
-            Work { mesh: &moved.mesh, timings: Timings::default(), report: Worst::default(), progress };
-        let shape = self.shape.as_ref().filter(|_| derivatives == Derivatives::First);
+        let adjoint_tolerance = if derivatives == Derivatives::Search { ADJOINTS_OF_A_SEARCH } else { 0.0 };
+        let (timings, report) = (Timings::default(), Worst::default());
+        let mut work = Work { mesh: &moved.mesh, adjoint_tolerance, timings, report, progress };
+        let shape = self.shape.as_ref().filter(|_| derivatives.are_wanted());
         let sums = self.sum_states(&mut work, cache, shape)?;
         let Work { mut timings, report, .. } = work;
         if is_own_anchor {

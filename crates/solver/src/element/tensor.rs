@@ -59,21 +59,43 @@ pub struct TensorTerm<const N: usize> {
 
 impl<const N: usize> TensorTerm<N> {
     /// From the volume that a point stands for [m³], the tensor and the curls there, point by point.
-    pub fn new<'a>(points: impl Iterator<Item = (f64, &'a Tensor, &'a Curls<N>)>) -> Self {
-        let mut blocks = Box::new([[[[0.0; 4]; 4]; N]; N]);
+    pub fn new<'a>(points: impl Iterator<Item = (f64, &'a Tensor, &'a Curls<N>)> + Clone) -> Self {
+        // The others add nothing: in every family a quarter of them and more.
+        let with_curl = |&(a, i): &(usize, usize)| points.clone().any(|(_, _, curls)| curls[a][i] != [0.0; 3]);
+        let functions: Vec<(usize, usize)> =
+            (0..4 * N).map(|k| (k / 4, k % 4)).filter(with_curl).collect();
+        let count = functions.len();
+        // Rows up to the diagonal.
+        let mut sums = vec![0.0; count * count];
+        let mut components = [vec![0.0; count], vec![0.0; count], vec![0.0; count]];
         for (volume, tensor, curls) in points {
-            let turned = curls.map(|carrier| carrier.map(|curl| apply(tensor, curl).map(|c| volume * c)));
-            for (row, w) in blocks.iter_mut().zip(curls) {
-                for (block, u) in row.iter_mut().zip(&turned) {
-                    for (entries, w) in block.iter_mut().zip(w) {
-                        for (entry, u) in entries.iter_mut().zip(u) {
-                            *entry += dot(*w, *u);
-                        }
-                    }
+            for (k, &(a, i)) in functions.iter().enumerate() {
+                (0..3).for_each(|d| components[d][k] = curls[a][i][d]);
+            }
+            let [x, y, z] = &components;
+            for (k, row) in sums.chunks_exact_mut(count.max(1)).enumerate() {
+                let u = apply(tensor, [x[k], y[k], z[k]]).map(|c| volume * c);
+                for (((sum, x), y), z) in row[..=k].iter_mut().zip(x).zip(y).zip(z) {
+                    *sum += dot([*x, *y, *z], u);
                 }
             }
         }
+        let mut blocks = Box::new([[[[0.0; 4]; 4]; N]; N]);
+        for (k, row) in sums.chunks_exact(count.max(1)).enumerate() {
+            let (b, j) = functions[k];
+            for (&(a, i), &sum) in functions[..=k].iter().zip(row) {
+                blocks[a][b][i][j] = sum;
+                blocks[b][a][j][i] = sum;
+            }
+        }
         Self { blocks }
+    }
+}
+
+impl<const N: usize> LocalMatrix<c64, N, 4> for TensorTerm<N> {
+    #[inline]
+    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
+        self.blocks[a][b].map(|row| row.map(c64::from))
     }
 }
 

@@ -126,6 +126,25 @@ impl PreparedSystem {
         solved
     }
 
+    /// Solves as [`PreparedSystem::solve`], to a relative residual [1] that may be larger than the settings'; on several ranks, and
+    /// where the derivative is linear over the real numbers alone, to theirs.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve`].
+    pub fn solve_to(
+        &mut self,
+        tolerance: f64,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        match (&self.field, &self.tangent) {
+            (FieldSystem::Local(system), None) => {
+                let goal = system.usual_goal().relaxed_to(tolerance);
+                self.solve_within(goal, right_side)
+            }
+            _ => self.solve(right_side),
+        }
+    }
+
     /// The same after what was done in systems before it.
     pub(crate) fn with_events(mut self, before: Vec<SolverEvent>) -> Self {
         if let FieldSystem::Local(system) = &mut self.field {

@@ -94,6 +94,15 @@ pub(crate) struct Goal {
     pub(crate) required: f64,
 }
 
+impl Goal {
+    /// The same with iterations that may end earlier.
+    pub(super) fn relaxed_to(self, tolerance: f64) -> Self {
+        let Self { tolerance: usual, required } = self;
+        // The true residual parts from that of the recurrence.
+        Self { tolerance: usual.max(tolerance), required: required.max(10.0 * tolerance) }
+    }
+}
+
 /// How one run of iterations ended.
 enum Attempt {
     /// With the true relative residual.
@@ -167,7 +176,12 @@ impl LocalSystem {
 
     /// How far to go with the solutions to come; `None` is what the settings say.
     pub(super) fn aim(&mut self, goal: Option<Goal>) {
-        self.goal = goal.unwrap_or(self.analysis.settings.goal());
+        self.goal = goal.unwrap_or(self.usual_goal());
+    }
+
+    /// How far the settings go.
+    pub(super) fn usual_goal(&self) -> Goal {
+        self.analysis.settings.goal()
     }
 
     /// Whether factors serve several designs.

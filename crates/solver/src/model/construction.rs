@@ -31,7 +31,7 @@ impl FieldModel {
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             hosts: fine.hosts(),
-            reference: &|| fine.assemble(&weak_form, None, mesh),
+            reference: &|| fine.assemble(&weak_form, mesh),
             prolongation: &|matrix| {
                 fine.prolongation(mesh, &weak_form, &setup.boundaries, (matrix, tolerance))
             },

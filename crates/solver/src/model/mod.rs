@@ -85,12 +85,19 @@ impl FieldModel {
     /// Assembles the matrix on a mesh with this model's topology: the rows of this rank, where there are several. Of B–H
     /// laws it has the linear parts.
     pub fn assemble(&self, mesh: &Mesh) -> CsrMatrix<c64> {
-        self.shared.fine.assemble(&self.weak_form, None, mesh)
+        self.shared.fine.assemble(&self.weak_form, mesh)
     }
 
-    /// As [`FieldModel::assemble`], with the tangents of B–H laws.
-    pub(crate) fn assemble_tangent(&self, mesh: &Mesh, tangents: &Tangents) -> CsrMatrix<c64> {
-        self.shared.fine.assemble(&self.weak_form, Some(tangents), mesh)
+    /// The matrix with the tangents of B–H laws, from the one with their linear parts.
+    pub(crate) fn with_tangents(
+        &self,
+        linear: &CsrMatrix<c64>,
+        tangents: &Tangents,
+        mesh: &Mesh,
+    ) -> CsrMatrix<c64> {
+        let mut matrix = linear.clone();
+        self.shared.fine.add_tangents(tangents, mesh, &mut matrix);
+        matrix
     }
 
     /// The matrix on a mesh with this model's topology, wherever it is to be.
