@@ -155,7 +155,9 @@ fn step(problem: &Problem, record: &mut Record) {
     record.state = time;
     let functional = &problem.objective().expect("it has an objective").terms[0].functional;
     let (evaluation, value) = timed(|| functional.evaluate(model, &mesh, &state).expect("it is finite"));
-    let (time, lambda) = timed(|| adjoint::solve_to(&mut system, &value.derivative, ADJOINTS_OF_A_SEARCH).expect("it converges"));
+    let (time, lambda) = timed(|| {
+        adjoint::solve_to(&mut system, &value.derivative, ADJOINTS_OF_A_SEARCH).expect("it converges")
+    });
     record.adjoint = time;
     record.iterations = [state.report().iterations, lambda.report().iterations];
     record.method = model.method_name();

@@ -2,12 +2,14 @@
 //! are kept from design to design.
 
 use fluxmorph::build::{Mode, set_up};
-use fluxmorph_optimizer::problem::{ADJOINTS_OF_A_SEARCH, Analysis, Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{
+    ADJOINTS_OF_A_SEARCH, Analysis, Derivatives, NoProgress, Problem, SolverCache,
+};
 use fluxmorph_solver::FieldModel;
 use fluxmorph_solver::linear::{LinearSolverCache, Method};
 
 use crate::problems::variables;
-use crate::support::{config, norm, relative_difference, setup};
+use crate::support::{changed, config, norm, relative_difference, repository_text, setup, setup_of};
 
 /// A meshed plate, coarse: skin layers, ψ, interfaces.
 const MESHED: (&str, &[&str]) = (
@@ -137,6 +139,28 @@ fn designs_that_share_factors_and_solutions_have_the_results_of_their_own() {
     }
     // Both happen on the way, or the test says nothing.
     assert!(kept > 0 && own > 0, "{kept} kept, {own} of their own");
+}
+
+#[test]
+fn the_part_of_a_factor_that_is_kept_changes_no_bit_of_a_result() {
+    let pole = repository_text("configs/pole.toml");
+    let along_a_curve = changed(&pole, &[("relative_permeability = 1000", "bh = \"team20_steel\"")]);
+    let problems = [
+        ("eddy currents", setup("coupled_coils.toml", &[]).problem),
+        ("statics", setup_of(&pole).problem),
+        ("Newton's method", setup_of(&along_a_curve).problem),
+    ];
+    for (name, problem) in problems {
+        let solver = problem.states()[0].linear_solver().expect("one process");
+        assert!(solver.keeps_a_part(), "{name}");
+        let mut memory = SolverCache::default();
+        for step in [0.0, 1.0] {
+            let shared = evaluated(&problem, &mut memory, step);
+            let own = evaluated(&problem, &mut SolverCache::default(), step);
+            assert_eq!(shared.objective, own.objective, "{name}, {step} mm");
+            assert_eq!(shared.gradient, own.gradient, "{name}, {step} mm");
+        }
+    }
 }
 
 #[test]

@@ -141,6 +141,7 @@ pub(super) fn field_models(
     mesh: &Mesh,
     conductors: &[Conductor],
     (coils, curves): (&[coil::Coil], &Curves),
+    moving: &[ElementId],
     share: Option<&Ownership>,
 ) -> Result<Vec<FieldModel>, Error> {
     let mut models: Vec<FieldModel> = Vec::new();
@@ -156,7 +157,7 @@ pub(super) fn field_models(
             Some(model) => model.at_load_case(mesh, &load_case)?,
             None => {
                 let sources = (conductors.to_vec(), coils.to_vec());
-                field_model(config, mesh, &load_case, (sources, curves), share)?
+                field_model(config, mesh, &load_case, (sources, curves, moving), share)?
             }
         });
     }
@@ -167,7 +168,7 @@ fn field_model(
     config: &Config,
     mesh: &Mesh,
     load_case: &LoadCase,
-    ((conductors, coils), curves): ((Vec<Conductor>, Vec<coil::Coil>), &Curves),
+    ((conductors, coils), curves, moving): ((Vec<Conductor>, Vec<coil::Coil>), &Curves, &[ElementId]),
     share: Option<&Ownership>,
 ) -> Result<FieldModel, Error> {
     let names = mesh.topology().region_names();
@@ -203,6 +204,7 @@ fn field_model(
         windings: config.coils.iter().map(winding).collect(),
         boundaries,
         open: open::region(config, mesh.topology())?,
+        moving: moving.to_vec(),
         linear_solver,
         ownership: share.map(|share| (share.clone(), distributed_settings(&config.analysis.petsc))),
         ..FieldModelSetup::default()

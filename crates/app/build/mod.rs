@@ -187,7 +187,9 @@ fn problem_on(
     // Neither needs the other: faults in both are reported together.
     let states = match coils {
         Some(coils) => {
-            sink.take(field::field_models(config, &mesh, &conductors, (&coils, &curves), share.as_ref()))?
+            let moving = body.as_ref().map_or(&[][..], shape::Body::moving);
+            let parts = (&coils[..], &curves);
+            sink.take(field::field_models(config, &mesh, &conductors, parts, moving, share.as_ref()))?
         }
         None => None,
     };

@@ -42,6 +42,11 @@ pub(super) struct Body {
 }
 
 impl Body {
+    /// Elements of which a node may move, ascending.
+    pub(super) fn moving(&self) -> &[ElementId] {
+        self.motion.moving()
+    }
+
     /// The name of the region that a positive design thickens.
     pub(super) fn thickened_region(&self, config: &Config, full_mesh: &Mesh) -> Option<String> {
         let region = thickened_region(full_mesh, &self.full_surface, config)?;

@@ -12,9 +12,9 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
 use crate::circuit::{SolidRows, Solids};
+use crate::element::tensor::{CurlsOfRule, TensorTerm};
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
-use crate::element::tensor::{CurlsOfRule, TensorTerm};
 use crate::family::{self, Local, Matrices};
 use crate::linear::aggregation;
 use crate::local_entities::LocalEntities;
@@ -87,11 +87,17 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
 
     fn add_tangents(&self, of: &Discretisation, tangents: &Tangents, mesh: &Mesh, values: &mut [c64]) {
         let tensors = |e: ElementId| tangents.of(of.element(e));
-        of.add_group(&self.tets, values, |e| tensors(e).is_some(), |e| {
-            let CurlsOfRule { count, weights, curls } = self.matrices.flux_curls(&of.space.cell(mesh, of.element(e)));
-            let tensors = tensors(e).expect("an element with a law");
-            TensorTerm::new((0..count).map(|p| (weights[p], &tensors[p], &curls[p])))
-        });
+        of.add_group(
+            &self.tets,
+            values,
+            |e| tensors(e).is_some(),
+            |e| {
+                let CurlsOfRule { count, weights, curls } =
+                    self.matrices.flux_curls(&of.space.cell(mesh, of.element(e)));
+                let tensors = tensors(e).expect("an element with a law");
+                TensorTerm::new((0..count).map(|p| (weights[p], &tensors[p], &curls[p])))
+            },
+        );
     }
 
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]) {
@@ -232,6 +238,16 @@ impl Discretisation {
             }
         }
         Some(Hosts::new(hosts))
+    }
+
+    /// Which rows change while some elements move, and with the state, by equation; `None` where none moves.
+    pub(crate) fn changes(&self, moving: &[ElementId], weak_form: &WeakForm) -> Option<Vec<bool>> {
+        let mut changes = vec![false; self.unknowns.dofs.count()];
+        for &e in moving.iter().chain(weak_form.elements_with_a_law()) {
+            let equations = |&carrier| (0..4).filter_map(move |c| self.unknowns.dofs.equation(carrier, c));
+            self.space.carriers_of(e).iter().flat_map(equations).for_each(|row| changes[row] = true);
+        }
+        (!moving.is_empty()).then_some(changes)
     }
 
     /// Assembles the matrix, or the rows of this rank, on a mesh with this topology; of B–H laws it has the linear parts.

@@ -9,7 +9,7 @@
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::{NewtonFailure, SolverError};
-use crate::linear::{FieldSystem, LinearSolverCache, Method, PreparedSystem, SolverEvent};
+use crate::linear::{FieldSystem, LinearSolverCache, PreparedSystem, SolverEvent};
 use crate::model::FieldModel;
 
 /// Steps after which there is no hope: five to fifteen are usual.
@@ -79,15 +79,14 @@ pub(crate) struct StepSystems<'a> {
 }
 
 impl<'a> StepSystems<'a> {
-    /// Those of a state of a model, which begin with a method; `None` is the first choice.
-    pub(crate) fn new(model: &'a FieldModel, method: Option<Method>) -> Self {
-        Self { model, cache: Self::first(model, method), events: Vec::new() }
+    /// Those of a state of a model, which begin with the method of a cache.
+    pub(crate) fn new(model: &'a FieldModel, cache: &LinearSolverCache) -> Self {
+        Self { model, cache: Self::first(model, cache.without_results()), events: Vec::new() }
     }
 
     /// What the first of them begins with. In statics a factor serves the tangents after its own as long as it pays; for phasors
     /// it is applied many times a step, and every tangent has its own.
-    fn first(model: &FieldModel, method: Option<Method>) -> LinearSolverCache {
-        let cache = LinearSolverCache::with_method(method);
+    fn first(model: &FieldModel, cache: LinearSolverCache) -> LinearSolverCache {
         if model.angular_frequency() > 0.0 { cache } else { cache.within_a_state() }
     }
 
@@ -121,7 +120,7 @@ impl<'a> StepSystems<'a> {
         let cause =
             format!("Newton's method stays at the relative residual {residual:.1e} after {steps} steps");
         self.events.push(SolverEvent::FellBack { from, to, cause });
-        self.cache = Self::first(self.model, Some(to));
+        self.cache = Self::first(self.model, LinearSolverCache::with_method(Some(to)));
         true
     }
 }
@@ -134,6 +133,7 @@ mod tests {
     use fluxmorph_geometry::{Mesh, RegionId};
 
     use super::*;
+    use crate::linear::Method;
     use crate::{FieldModelSetup, Material};
 
     fn verdicts(residuals: &[f64]) -> Vec<Verdict> {
@@ -169,7 +169,8 @@ mod tests {
             flux_density: 1.0,
             failure,
         };
-        let mut systems = StepSystems::new(&model, Some(Method::RealFactorSingle));
+        let mut systems =
+            StepSystems::new(&model, &LinearSolverCache::with_method(Some(Method::RealFactorSingle)));
         assert!(!systems.escalate(&failed(NewtonFailure::Law)));
         for method in [Method::RealFactor, Method::Direct] {
             assert!(systems.escalate(&failed(NewtonFailure::Rounding)));

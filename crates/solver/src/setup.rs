@@ -47,6 +47,9 @@ pub struct FieldModelSetup {
     pub boundaries: Vec<(String, Boundary)>,
     /// The region that stands for open space, if one does.
     pub open: Option<OpenRegion>,
+    /// Elements of which a node moves from one mesh to the next, ascending; empty where that is not known. Nothing but the order of
+    /// elimination depends on it.
+    pub moving: Vec<ElementId>,
     /// Linear solver.
     pub linear_solver: LinearSolverSettings,
     /// The ranks over which the problem is distributed, and how they solve; `None` for one process.
@@ -70,6 +73,7 @@ impl Default for FieldModelSetup {
             windings: Vec::new(),
             boundaries: Vec::new(),
             open: None,
+            moving: Vec::new(),
             linear_solver: LinearSolverSettings::default(),
             ownership: None,
         }

@@ -27,7 +27,7 @@ impl FieldModel {
     }
 
     /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
-    /// adjoint. Of `cache` only the method that worked last takes part; Newton's method begins with `start`, the unknowns of a
+    /// adjoint. Of `cache` the method that worked last takes part, and what is kept of factors; Newton's method begins with `start`, the unknowns of a
     /// similar state, and where there is none with the field of the linear parts. Where its residual stays for rounding a more
     /// robust method of the linear solver follows.
     ///
@@ -44,7 +44,7 @@ impl FieldModel {
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
         let solve = if self.angular_frequency() > 0.0 { amplitude::solve } else { newton::solve };
-        let (mut systems, mut start) = (StepSystems::new(self, cache.method()), start);
+        let (mut systems, mut start) = (StepSystems::new(self, cache), start);
         loop {
             match solve(self, mesh, (&mut systems, start), observer) {
                 Err(error) if systems.escalate(&error) => {}

@@ -9,6 +9,7 @@
 use fluxmorph_petsc::metis;
 
 use super::csr::CsrStructure;
+use super::kept_first::{Changes, kept_first};
 use super::ordering::inverse_permutation;
 
 /// The hosts of every unknown.
@@ -83,12 +84,25 @@ impl Hosts {
 }
 
 /// Nested dissection of the hosts, each counting as many as it hosts, lifted to the unknowns; not postordered,
-/// `forward[new] = old`. `None` where METIS refuses.
-pub fn lifted_dissection(matrix: &CsrStructure, hosts: &Hosts) -> Option<Vec<u32>> {
+/// `forward[new] = old`. With `changes` hosts of unknowns that do not change come first. `None` where METIS refuses, or
+/// there is no such order.
+pub fn lifted_dissection(
+    matrix: &CsrStructure,
+    hosts: &Hosts,
+    changes: Option<Changes<'_>>,
+) -> Option<Vec<u32>> {
     let unknowns = hosts.unknowns();
     let graph = hosts.graph(matrix, &unknowns);
-    let weights = (0..hosts.count).map(|host| unknowns.row(host).len() as i32).collect();
-    let order = metis::nested_dissection(&graph.row_starts, &graph.columns, Some(weights))?;
+    let weights: Vec<i32> = (0..hosts.count).map(|host| unknowns.row(host).len() as i32).collect();
+    let order = match changes {
+        None => metis::nested_dissection(&graph.row_starts, &graph.columns, Some(weights))?,
+        Some(changes) => {
+            let of_host =
+                |host| unknowns.columns[unknowns.row(host)].iter().any(|&u| changes.rows[u as usize]);
+            let rows: Vec<bool> = (0..hosts.count).map(of_host).collect();
+            kept_first(&graph, Some(&weights), Changes { rows: &rows, ..changes })?
+        }
+    };
     let position = inverse_permutation(&order);
     let eliminated_with = |&unknown: &u32| {
         let [first, second] = hosts.of[unknown as usize].map(|host| position[host as usize]);
@@ -130,7 +144,7 @@ mod tests {
     #[test]
     fn a_lifted_order_is_a_permutation_without_more_fill_than_the_matrix_graph_gives() {
         let (matrix, hosts) = chain(400);
-        let lifted = lifted_dissection(&matrix, &hosts).expect("METIS orders a chain");
+        let lifted = lifted_dissection(&matrix, &hosts, None).expect("METIS orders a chain");
         let mut sorted = lifted.clone();
         sorted.sort_unstable();
         assert!(sorted.into_iter().eq(0..801));

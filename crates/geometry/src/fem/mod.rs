@@ -2,7 +2,7 @@
 //!
 //! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
 //! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`], and
-//! [`lifted_ordering`] of functions on edges), the sparse Cholesky factor ([`cholesky`]), the factor of complex symmetric
+//! [`lifted_ordering`] of functions on edges, `kept_first` where part of a factor is kept), the sparse Cholesky factor ([`cholesky`]), the factor of complex symmetric
 //! systems ([`ldlt`]), the one without fill ([`incomplete`]), what factors take beside themselves ([`workspace`]) and, for
 //! elastic systems too large for a factor, conjugate gradients
 //! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here:
@@ -16,6 +16,7 @@ pub mod conjugate_gradients;
 pub mod csr;
 pub mod dofs;
 pub mod incomplete;
+mod kept_first;
 pub mod ldlt;
 pub mod lifted_ordering;
 pub mod ordering;
@@ -31,7 +32,8 @@ pub use conjugate_gradients::{IterationReport, IterationStatus, conjugate_gradie
 pub use csr::CsrMatrix;
 pub use dofs::DofMap;
 pub use incomplete::{Incomplete, IncompleteAnalysis};
-pub use ldlt::{FactorScalar, Ldlt, LdltAnalysis};
+pub use kept_first::Changes;
+pub use ldlt::{FactorScalar, KeptPanels, Ldlt, LdltAnalysis};
 pub use lifted_ordering::{Hosts, lifted_dissection};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
 pub use scalar::{Scalar, advance, axpy, c32, c64, dot, norm, scale_add};

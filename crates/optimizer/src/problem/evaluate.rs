@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent};
+use fluxmorph_solver::linear::{LinearSolverCache, PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
@@ -92,9 +92,7 @@ impl Problem {
         progress: &mut dyn Progress,
     ) -> Result<Analysis, Error> {
         let is_own_anchor = match (&self.shape, derivatives.are_wanted()) {
-            (Some(shape), true) => {
-                self.anchor(shape.motion().original(), &moved.mesh, cache, progress)?
-            }
+            (Some(shape), true) => self.anchor(shape.motion().original(), &moved.mesh, cache, progress)?,
             _ => false,
         };
         let adjoint_tolerance = if derivatives == Derivatives::Search { ADJOINTS_OF_A_SEARCH } else { 0.0 };
@@ -250,8 +248,8 @@ impl Problem {
         let (system, state) = match shared {
             None if model.is_linear() => solve_linear(model, cache.of_matrix(matrix), work)?,
             None => {
-                let method = cache.of_matrix(matrix).method();
-                solve_nonlinear(model, (method, cache.start(index)), work)?
+                let linear = std::mem::take(cache.of_matrix(matrix));
+                solve_nonlinear(model, (&linear, cache.start(index)), work)?
             }
             Some((system, other)) => {
                 let mut clock = Stopwatch::start();
@@ -408,13 +406,12 @@ fn solve_right_side(
 /// Solves a state with B–H laws; its factors count as part of the state.
 fn solve_nonlinear(
     model: &FieldModel,
-    (method, start): (Option<Method>, Option<&[c64]>),
+    begin: (&LinearSolverCache, Option<&[c64]>),
     work: &mut Work<'_>,
 ) -> Result<(PreparedSystem, FieldSolution), Error> {
     let mut clock = Stopwatch::start();
     work.progress.stage(Stage::State);
     let progress = &mut *work.progress;
-    let begin = (&LinearSolverCache::with_method(method), start);
     let solved = model.solve_nonlinear(work.mesh, begin, &mut |newton| progress.newton(newton));
     let (state, system) = solved.map_err(finite::of_field("the state", model))?;
     work.timings.state += clock.lap();

@@ -61,9 +61,9 @@ impl<const N: usize> TensorTerm<N> {
     /// From the volume that a point stands for [m³], the tensor and the curls there, point by point.
     pub fn new<'a>(points: impl Iterator<Item = (f64, &'a Tensor, &'a Curls<N>)> + Clone) -> Self {
         // The others add nothing: in every family a quarter of them and more.
-        let with_curl = |&(a, i): &(usize, usize)| points.clone().any(|(_, _, curls)| curls[a][i] != [0.0; 3]);
-        let functions: Vec<(usize, usize)> =
-            (0..4 * N).map(|k| (k / 4, k % 4)).filter(with_curl).collect();
+        let with_curl =
+            |&(a, i): &(usize, usize)| points.clone().any(|(_, _, curls)| curls[a][i] != [0.0; 3]);
+        let functions: Vec<(usize, usize)> = (0..4 * N).map(|k| (k / 4, k % 4)).filter(with_curl).collect();
         let count = functions.len();
         // Rows up to the diagonal.
         let mut sums = vec![0.0; count * count];

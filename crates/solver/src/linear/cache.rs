@@ -6,6 +6,7 @@ use fluxmorph_geometry::fem::c64;
 
 use super::analysis::SystemAnalysis;
 use super::cost::Ledger;
+use super::factor::KeptPart;
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 
@@ -15,6 +16,8 @@ use super::preconditioner::Preconditioner;
 #[derive(Debug, Default)]
 pub struct LinearSolverCache {
     pub(super) preconditioner: Option<CachedPreconditioner>,
+    /// What a factor begins with whatever the settings say: its bits do not depend on it.
+    pub(super) kept: Option<KeptPart>,
     /// The method that worked last, where it is not the first choice.
     pub(super) method: Option<Method>,
     /// The solutions of the last design, in the order in which they were asked for.
@@ -37,6 +40,11 @@ impl LinearSolverCache {
         Self { method, ..Self::default() }
     }
 
+    /// A cache of what has no part in the results: the method to begin with, and what is kept of factors.
+    pub(crate) fn without_results(&self) -> Self {
+        Self { method: self.method, kept: self.kept.clone(), ..Self::default() }
+    }
+
     /// The same between the steps of one state.
     pub(crate) fn within_a_state(self) -> Self {
         Self { is_within_a_state: true, ..self }
@@ -45,7 +53,7 @@ impl LinearSolverCache {
     /// What is left of it when the state is found: what the settings keep between designs.
     pub(super) fn between_designs(self, reuse: Reuse) -> Self {
         match reuse {
-            Reuse::Never => Self::with_method(self.method),
+            Reuse::Never => self.without_results(),
             Reuse::WhileItPays => Self { is_within_a_state: false, ..self },
         }
     }
@@ -57,12 +65,11 @@ impl LinearSolverCache {
 
     /// What may serve the same design at another frequency: the preconditioner, as far as the patterns are the same.
     pub fn without_initial_guess(&self) -> Self {
-        let Self { preconditioner, method, is_within_a_state, .. } = self;
+        let Self { preconditioner, is_within_a_state, .. } = self;
         Self {
             preconditioner: preconditioner.clone(),
-            method: *method,
-            solutions: Vec::new(),
             is_within_a_state: *is_within_a_state,
+            ..self.without_results()
         }
     }
 }

@@ -1,13 +1,15 @@
 //! A factor as a preconditioner: symmetric diagonal scaling, and the conversion of residuals to the factor's numbers.
 //!
-//! The scaled matrix `S K S` has diagonal entries of modulus one, so that single precision has room at both ends. A complex
+//! The scaled matrix `S K S` has diagonal entries of modulus about one, so that single precision has room at both ends; `S` are
+//! powers of two, which round nothing. A complex
 //! factor takes a residual as one column, a real one (of `Re K + Im K`) its real and imaginary parts as two.
 
+use std::any::Any;
 use std::sync::Arc;
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::{
-    CsrMatrix, FactorScalar, Incomplete, IncompleteAnalysis, Ldlt, LdltAnalysis, c32, c64, norm,
+    CsrMatrix, FactorScalar, Incomplete, IncompleteAnalysis, KeptPanels, Ldlt, LdltAnalysis, c32, c64, norm,
 };
 use rayon::prelude::*;
 
@@ -18,6 +20,20 @@ pub(super) trait Precondition: std::fmt::Debug + Send + Sync {
 
     /// Bytes held.
     fn bytes(&self) -> usize;
+
+    /// What the factor of another matrix of the pattern may begin with.
+    fn kept(&self) -> Option<KeptPart> {
+        None
+    }
+}
+
+/// The part of a factor that stays as it is while parts of the matrix change: a [`Kept`] of some number type.
+pub(super) type KeptPart = Arc<dyn Any + Send + Sync>;
+
+/// Panels of a factor, and the scales with which its matrix was multiplied.
+struct Kept<T> {
+    scale: Vec<f64>,
+    panels: KeptPanels<T>,
 }
 
 /// How a complex system is represented in the numbers of a factor.
@@ -91,15 +107,31 @@ pub(super) struct Scaled<T> {
 }
 
 impl<T: Representation> Scaled<T> {
-    /// The complete factor.
-    pub(super) fn complete(analysis: &Arc<LdltAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
-        let scale = scaling(matrix)?;
-        let factor = Ldlt::new(analysis, |row, k| scaled_entry(matrix, &scale, row, k))?;
+    /// The complete factor, with what is kept of another one.
+    pub(super) fn complete(
+        analysis: &Arc<LdltAnalysis>,
+        matrix: &CsrMatrix<c64>,
+        kept: Option<&KeptPart>,
+    ) -> Result<Self, MeshError> {
+        let kept = kept.and_then(|kept| kept.downcast_ref::<Kept<T>>());
+        let mut scale = scaling(matrix)?;
+        if let Some(kept) = kept.filter(|kept| kept.scale.len() == scale.len()) {
+            // Powers of two round nothing: the solutions have the same bits with any of them.
+            let is_near = |own: f64, other: f64| (1.0 / NEAR..=NEAR).contains(&(own / other));
+            for (own, &other) in scale.iter_mut().zip(&kept.scale) {
+                *own = if is_near(*own, other) { other } else { *own };
+            }
+        }
+        let entry = |row, k| scaled_entry(matrix, &scale, row, k);
+        let factor = Ldlt::new_keeping(analysis, entry, kept.map(|kept| &kept.panels))?;
         let largest = scale.iter().fold(0.0_f64, |largest, s| largest.max(*s));
         let shift = if largest > 0.0 { (-largest.log2().floor()).exp2() } else { 1.0 };
         Ok(Self { scale, shift, factor })
     }
 }
+
+/// How far the scale of a row may be from its own, so that the rows that are coupled with it stay as they were.
+const NEAR: f64 = 256.0;
 
 impl<T: Representation> Precondition for Scaled<T> {
     fn apply(&self, r: &[c64], z: &mut [c64]) {
@@ -112,6 +144,11 @@ impl<T: Representation> Precondition for Scaled<T> {
 
     fn bytes(&self) -> usize {
         self.factor.bytes() + size_of_val(self.scale.as_slice())
+    }
+
+    fn kept(&self) -> Option<KeptPart> {
+        let panels = self.factor.kept()?;
+        Some(Arc::new(Kept { scale: self.scale.clone(), panels }))
     }
 }
 
@@ -169,7 +206,7 @@ pub(super) fn double(x: c32) -> c64 {
     c64::new(f64::from(x.re), f64::from(x.im))
 }
 
-/// `1/√(Re k_ii + Im k_ii)`.
+/// The powers of two next to `1/√(Re k_ii + Im k_ii)`.
 ///
 /// # Errors
 /// [`MeshError::Factorisation`] where that is not positive.
@@ -182,7 +219,11 @@ pub(super) fn scaling(matrix: &CsrMatrix<c64>) -> Result<Vec<f64>, MeshError> {
     let of = |row: usize| {
         let diagonal = matrix.entry(row, row).unwrap_or_default();
         let sum = diagonal.re + diagonal.im;
-        if sum > 0.0 && sum.is_finite() { Ok(1.0 / sum.sqrt()) } else { Err(failed(row, sum)) }
+        if sum > 0.0 && sum.is_finite() {
+            Ok((-0.5 * sum.log2()).round().exp2())
+        } else {
+            Err(failed(row, sum))
+        }
     };
     (0..n).map(of).collect()
 }

@@ -5,7 +5,7 @@ use fluxmorph_geometry::fem::{CsrMatrix, c32, c64};
 
 use super::analysis::SystemAnalysis;
 use super::cost::Costs;
-use super::factor::{Precondition, Scaled, Unscaled};
+use super::factor::{KeptPart, Precondition, Scaled, Unscaled};
 use super::method::Method;
 use super::two_level::TwoLevel;
 
@@ -29,7 +29,7 @@ enum Action {
 const DIAGONAL_FACTOR: f64 = 1.05;
 
 impl Preconditioner {
-    /// Factors a matrix by a method.
+    /// Factors a matrix by a method, with what is kept of another one.
     ///
     /// # Errors
     /// [`MeshError::Factorisation`] when a pivot vanishes or the memory does not suffice.
@@ -37,13 +37,14 @@ impl Preconditioner {
         analysis: &SystemAnalysis,
         matrix: &CsrMatrix<c64>,
         method: Method,
+        kept: Option<&KeptPart>,
     ) -> Result<Self, MeshError> {
         let action = match method {
             Method::TwoLevel => {
                 let levels = analysis.two_level().ok_or_else(|| missing(matrix, method))?;
                 Action::TwoLevel(Box::new(TwoLevel::new(levels, matrix)?))
             }
-            _ => Action::Factor(factor(analysis, matrix, method)?),
+            _ => Action::Factor(factor(analysis, matrix, method, kept)?),
         };
         Ok(Self { method, costs: analysis.costs(method)?, action })
     }
@@ -63,6 +64,14 @@ impl Preconditioner {
         }
     }
 
+    /// What the factor of another matrix may begin with.
+    pub(super) fn kept(&self) -> Option<KeptPart> {
+        match &self.action {
+            Action::Factor(factor) => factor.kept(),
+            Action::TwoLevel(_) => None,
+        }
+    }
+
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         match &self.action {
@@ -77,12 +86,13 @@ fn factor(
     analysis: &SystemAnalysis,
     fine: &CsrMatrix<c64>,
     method: Method,
+    kept: Option<&KeptPart>,
 ) -> Result<Box<dyn Precondition>, MeshError> {
     Ok(match method {
-        Method::Direct => Box::new(Scaled::<c64>::complete(&analysis.complete()?, fine)?),
-        Method::DirectSingle => Box::new(Scaled::<c32>::complete(&analysis.complete()?, fine)?),
-        Method::RealFactor => Box::new(Scaled::<f64>::complete(&analysis.complete()?, fine)?),
-        Method::RealFactorSingle => Box::new(Scaled::<f32>::complete(&analysis.complete()?, fine)?),
+        Method::Direct => Box::new(Scaled::<c64>::complete(&analysis.complete()?, fine, kept)?),
+        Method::DirectSingle => Box::new(Scaled::<c32>::complete(&analysis.complete()?, fine, kept)?),
+        Method::RealFactor => Box::new(Scaled::<f64>::complete(&analysis.complete()?, fine, kept)?),
+        Method::RealFactorSingle => Box::new(Scaled::<f32>::complete(&analysis.complete()?, fine, kept)?),
         Method::Incomplete | Method::TwoLevel => {
             let parts = analysis.incomplete().ok_or_else(|| missing(fine, method))?;
             Box::new(Unscaled::new(parts, fine, DIAGONAL_FACTOR)?)

@@ -20,6 +20,7 @@ use super::analysis::SystemAnalysis;
 use super::cache::{CachedPreconditioner, LinearSolverCache};
 use super::cocg;
 use super::cost::Ledger;
+use super::factor::KeptPart;
 use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 use super::range::checked_norm;
@@ -73,6 +74,8 @@ pub struct LocalSystem {
     matrix: CsrMatrix<c64>,
     /// None while another is made (two at a time would take twice the memory), and where none could be.
     preconditioner: Option<Arc<Preconditioner>>,
+    /// What factors of other matrices left for one of this.
+    kept: Option<KeptPart>,
     origin: Origin,
     ledger: Ledger,
     /// Iterations and solutions with this preconditioner alone.
@@ -121,7 +124,7 @@ impl LocalSystem {
         matrix: CsrMatrix<c64>,
         cache: &mut LinearSolverCache,
     ) -> Result<Self, SolverError> {
-        let LinearSolverCache { preconditioner: cached, method, solutions: before, is_within_a_state } =
+        let LinearSolverCache { preconditioner: cached, kept, method, solutions: before, is_within_a_state } =
             std::mem::take(cache);
         let reuse = is_within_a_state || analysis.settings.reuse == Reuse::WhileItPays;
         let pays = |cached: &CachedPreconditioner| {
@@ -135,7 +138,7 @@ impl LocalSystem {
             }
             None => {
                 let first = method.unwrap_or(analysis.method());
-                let (own, ledger) = factor(analysis, &matrix, first, &mut events)?;
+                let (own, ledger) = factor(analysis, (&matrix, kept.as_ref()), first, &mut events)?;
                 (own, Origin::Own, ledger)
             }
         };
@@ -143,6 +146,7 @@ impl LocalSystem {
             analysis: Arc::clone(analysis),
             matrix,
             preconditioner: Some(preconditioner),
+            kept,
             origin,
             ledger,
             served: (0, 0),
@@ -198,8 +202,9 @@ impl LocalSystem {
     pub fn into_cache(mut self) -> LinearSolverCache {
         let method = self.preconditioner.as_ref().map(|p| p.method).filter(|&m| m != self.analysis.method());
         let is_within_a_state = self.is_within_a_state;
+        let kept = self.preconditioner.as_ref().and_then(|own| own.kept()).or(self.kept.take());
         if self.reuse() == Reuse::Never && !is_within_a_state {
-            return LinearSolverCache::with_method(method);
+            return LinearSolverCache { kept, ..LinearSolverCache::with_method(method) };
         }
         let (iterations, solutions) = self.served;
         self.ledger.enter(iterations, solutions);
@@ -209,9 +214,9 @@ impl LocalSystem {
             ledger: self.ledger,
         };
         // The others are made for one matrix, and cheap beside their iterations.
-        let kept = self.preconditioner.filter(|preconditioner| preconditioner.method.is_complete());
-        let (preconditioner, solutions) = (kept.map(cached), self.solutions);
-        LinearSolverCache { preconditioner, method, solutions, is_within_a_state }
+        let complete = self.preconditioner.filter(|preconditioner| preconditioner.method.is_complete());
+        let (preconditioner, solutions) = (complete.map(cached), self.solutions);
+        LinearSolverCache { preconditioner, kept, method, solutions, is_within_a_state }
     }
 
     /// Solves `K x = b`.
@@ -344,7 +349,8 @@ impl LocalSystem {
     /// Takes a factor of this matrix.
     fn refresh(&mut self, method: Method) -> Result<(), SolverError> {
         self.preconditioner = None;
-        let (own, ledger) = factor(&self.analysis, &self.matrix, method, &mut self.events)?;
+        let of = (&self.matrix, self.kept.as_ref());
+        let (own, ledger) = factor(&self.analysis, of, method, &mut self.events)?;
         self.preconditioner = Some(own);
         self.ledger = ledger;
         self.served = (0, 0);
@@ -381,13 +387,13 @@ impl LocalSystem {
 /// The preconditioner of a method, or of the first more robust one that can be made.
 fn factor(
     analysis: &SystemAnalysis,
-    matrix: &CsrMatrix<c64>,
+    (matrix, kept): (&CsrMatrix<c64>, Option<&KeptPart>),
     method: Method,
     events: &mut Vec<SolverEvent>,
 ) -> Result<(Arc<Preconditioner>, Ledger), SolverError> {
     let mut method = method;
     loop {
-        match Preconditioner::new(analysis, matrix, method) {
+        match Preconditioner::new(analysis, matrix, method, kept) {
             Ok(own) => {
                 let ledger = Ledger::new(own.costs, analysis.typical_iterations(method));
                 return Ok((Arc::new(own), ledger));

@@ -155,7 +155,7 @@ impl TwoLevel {
     /// [`MeshError::Factorisation`] when a factorisation fails.
     pub(super) fn new(analysis: &Arc<TwoLevelAnalysis>, matrix: &CsrMatrix<c64>) -> Result<Self, MeshError> {
         let coarse = analysis.transfer.coarse_matrix(&analysis.structure, matrix);
-        let coarse = Scaled::complete(&analysis.coarse, &coarse)?;
+        let coarse = Scaled::complete(&analysis.coarse, &coarse, None)?;
         let smoother = match &analysis.smoother {
             SmootherAnalysis::Incomplete(incomplete) => {
                 Smoother::Incomplete(Unscaled::new(incomplete, matrix, DIAGONAL_FACTOR)?)

@@ -31,6 +31,7 @@ impl FieldModel {
         let pattern = SystemPattern {
             structure: fine.pattern.structure(),
             hosts: fine.hosts(),
+            changes: fine.changes(&setup.moving, &weak_form),
             reference: &|| fine.assemble(&weak_form, mesh),
             prolongation: &|matrix| {
                 fine.prolongation(mesh, &weak_form, &setup.boundaries, (matrix, tolerance))

@@ -23,6 +23,8 @@ pub struct LdltAnalysis {
     pub(super) inverse: Vec<u32>,
     pub(super) panels: Panels,
     pub(super) tasks: Branch,
+    /// Whether a panel is the same for every matrix, and so are those that change it; empty where none is.
+    pub(super) kept: Vec<bool>,
 }
 
 impl LdltAnalysis {
@@ -33,6 +35,31 @@ impl LdltAnalysis {
     /// [`MeshError::Factorisation`] when the order is not a permutation of the rows, or the factor does not fit the index
     /// type or the memory.
     pub fn new(structure: &Arc<CsrStructure>, order: Option<Vec<u32>>) -> Result<Arc<Self>, MeshError> {
+        Ok(Arc::new(Self::analysed(structure, order)?))
+    }
+
+    /// The same for matrices in which only some rows change from one to the next: panels of the others are kept
+    /// ([`Ldlt::new_keeping`](super::Ldlt::new_keeping)).
+    ///
+    /// # Errors
+    /// As [`LdltAnalysis::new`].
+    pub fn keeping(
+        structure: &Arc<CsrStructure>,
+        order: Option<Vec<u32>>,
+        changes: &[bool],
+    ) -> Result<Arc<Self>, MeshError> {
+        let mut analysis = Self::analysed(structure, order)?;
+        let mut kept = vec![false; analysis.panels.len()];
+        for (p, panel) in analysis.panels.iter().enumerate() {
+            let own = &analysis.order[panel.start..panel.start + panel.width];
+            kept[p] = own.iter().all(|&old| !changes[old as usize])
+                && analysis.panels.updates(p).iter().all(|update| kept[update.source as usize]);
+        }
+        analysis.kept = kept;
+        Ok(Arc::new(analysis))
+    }
+
+    fn analysed(structure: &Arc<CsrStructure>, order: Option<Vec<u32>>) -> Result<Self, MeshError> {
         let n = structure.row_count();
         let failed = |cause: String| MeshError::Factorisation { unknowns: n, cause };
         let order = match order {
@@ -66,7 +93,8 @@ impl LdltAnalysis {
                 .map_err(|e| failed(e.to_string()))?;
         let panels = Panels::new(&symbolic);
         let tasks = schedule::cut(&panels);
-        Ok(Arc::new(Self { structure: Arc::clone(structure), order, inverse, panels, tasks }))
+        let structure = Arc::clone(structure);
+        Ok(Self { structure, order, inverse, panels, tasks, kept: Vec::new() })
     }
 
     /// Number of unknowns.
@@ -82,6 +110,16 @@ impl LdltAnalysis {
     /// Multiply-adds of a numeric factorisation.
     pub fn multiplications(&self) -> f64 {
         (0..self.panels.len()).map(|p| self.panels.work(p)).sum()
+    }
+
+    /// Those of one that finds what is kept.
+    pub fn changing_multiplications(&self) -> f64 {
+        (0..self.panels.len()).filter(|&p| !self.is_kept(p)).map(|p| self.panels.work(p)).sum()
+    }
+
+    /// Whether a panel is the same for every matrix.
+    pub(super) fn is_kept(&self, p: usize) -> bool {
+        self.kept.get(p).is_some_and(|&kept| kept)
     }
 }
 

@@ -6,18 +6,22 @@ use std::sync::Arc;
 use num_complex::Complex;
 
 use super::analysis::LdltAnalysis;
-use super::factor::{self, Entry, Ldlt};
+use super::factor::{self, Entry, KeptPanels, Ldlt};
 use super::scalar::PanelScalar;
 use super::solve;
 use crate::error::MeshError;
 
 /// A number that a matrix can be factored in: `f32`, `f64`, and complex numbers of these.
 pub trait FactorScalar: PanelScalar {
-    /// What [`Ldlt::new`] does.
+    /// What [`Ldlt::new_keeping`] does.
     ///
     /// # Errors
     /// Those of [`Ldlt::new`].
-    fn factor(analysis: &Arc<LdltAnalysis>, entry: &Entry<'_, Self>) -> Result<Ldlt<Self>, MeshError>;
+    fn factor(
+        analysis: &Arc<LdltAnalysis>,
+        entry: &Entry<'_, Self>,
+        kept: Option<&KeptPanels<Self>>,
+    ) -> Result<Ldlt<Self>, MeshError>;
 
     /// What [`Ldlt::solve_in_place`] does.
     ///
@@ -30,8 +34,12 @@ macro_rules! compiled {
     ($($scalar:ty),*) => {$(
         impl FactorScalar for $scalar {
             #[inline(never)]
-            fn factor(analysis: &Arc<LdltAnalysis>, entry: &Entry<'_, Self>) -> Result<Ldlt<Self>, MeshError> {
-                factor::factor(analysis, entry)
+            fn factor(
+                analysis: &Arc<LdltAnalysis>,
+                entry: &Entry<'_, Self>,
+                kept: Option<&KeptPanels<Self>>,
+            ) -> Result<Ldlt<Self>, MeshError> {
+                factor::factor(analysis, entry, kept)
             }
 
             #[inline(never)]
@@ -46,7 +54,7 @@ compiled!(f32, f64, Complex<f32>, Complex<f64>);
 
 impl<T: FactorScalar> Ldlt<T> {
     /// Factors a matrix whose pattern was analysed. `entry(row, k)` is the value of the stored entry `k` of the structure,
-    /// which lies in `row`; it is called once or twice for every entry, from any thread.
+    /// which lies in `row`; it is called up to three times for every entry, from any thread.
     ///
     /// # Errors
     /// [`MeshError::Factorisation`] when a pivot is zero or not finite, or the factor does not fit the memory.
@@ -54,7 +62,20 @@ impl<T: FactorScalar> Ldlt<T> {
         analysis: &Arc<LdltAnalysis>,
         entry: impl Fn(usize, usize) -> T + Sync,
     ) -> Result<Self, MeshError> {
-        T::factor(analysis, &entry)
+        T::factor(analysis, &entry, None)
+    }
+
+    /// The same with panels that another factor of this analysis left, wherever the matrix is as it was in all that they come from:
+    /// the bits are those of [`Ldlt::new`].
+    ///
+    /// # Errors
+    /// As [`Ldlt::new`].
+    pub fn new_keeping(
+        analysis: &Arc<LdltAnalysis>,
+        entry: impl Fn(usize, usize) -> T + Sync,
+        kept: Option<&KeptPanels<T>>,
+    ) -> Result<Self, MeshError> {
+        T::factor(analysis, &entry, kept)
     }
 
     /// Solves `A X = B` in place; `columns` holds the right sides one after the other.

@@ -29,10 +29,7 @@ pub type Entry<'a, T> = dyn Fn(usize, usize) -> T + Sync + 'a;
 #[derive(Debug)]
 pub struct Ldlt<T> {
     pub(super) analysis: Arc<LdltAnalysis>,
-    /// The rectangle of every panel, column-major.
-    pub(super) panels: Vec<Vec<T>>,
-    /// `1 / D`.
-    pub(super) inverse_pivots: Vec<T>,
+    pub(super) panels: Vec<Arc<FactoredPanel<T>>>,
 }
 
 impl<T> Ldlt<T> {
@@ -43,16 +40,37 @@ impl<T> Ldlt<T> {
 
     /// Memory of the factor [bytes], without the analysis.
     pub fn bytes(&self) -> usize {
-        let entries: usize = self.panels.iter().map(Vec::capacity).sum();
-        (entries + self.inverse_pivots.capacity()) * size_of::<T>()
-            + self.panels.capacity() * size_of::<Vec<T>>()
+        let of_panel = |panel: &Arc<FactoredPanel<T>>| {
+            let FactoredPanel { entries, pivots, inverse_pivots, assembled } = &**panel;
+            entries.capacity() + pivots.capacity() + inverse_pivots.capacity() + assembled.capacity()
+        };
+        let numbers: usize = self.panels.iter().map(of_panel).sum();
+        numbers * size_of::<T>()
+            + self.panels.len() * (size_of::<Arc<FactoredPanel<T>>>() + size_of::<FactoredPanel<T>>())
     }
+
+    /// What the factor of another matrix may begin with: the panels that the analysis says are kept, if it has some.
+    pub fn kept(&self) -> Option<KeptPanels<T>> {
+        let of =
+            |(p, panel): (usize, &Arc<FactoredPanel<T>>)| self.analysis.is_kept(p).then(|| Arc::clone(panel));
+        let panels: Vec<_> = self.panels.iter().enumerate().map(of).collect();
+        let analysis = Arc::clone(&self.analysis);
+        panels.iter().any(Option::is_some).then_some(KeptPanels { analysis, panels })
+    }
+}
+
+/// Panels of a factor that others of the same analysis may have, too.
+#[derive(Debug)]
+pub struct KeptPanels<T> {
+    analysis: Arc<LdltAnalysis>,
+    pub(super) panels: Vec<Option<Arc<FactoredPanel<T>>>>,
 }
 
 /// The work of [`Ldlt::new`].
 pub(super) fn factor<T: PanelScalar>(
     analysis: &Arc<LdltAnalysis>,
     entry: &Entry<'_, T>,
+    kept: Option<&KeptPanels<T>>,
 ) -> Result<Ldlt<T>, MeshError> {
     let count = analysis.panels.len();
     workspace::check(analysis.factor_entries() * size_of::<T>())
@@ -60,26 +78,35 @@ pub(super) fn factor<T: PanelScalar>(
     let factorisation = Factorisation {
         analysis,
         entry,
+        kept: kept.filter(|kept| Arc::ptr_eq(&kept.analysis, analysis)),
         panels: (0..count).map(|_| OnceLock::new()).collect(),
         workspaces: Mutex::new(Vec::new()),
     };
     factorisation.branch(&analysis.tasks)?;
-    let mut panels = Vec::with_capacity(count);
-    let mut inverse_pivots = Vec::with_capacity(analysis.size());
-    for panel in factorisation.panels {
-        let panel = panel.into_inner().expect("every panel belongs to a task");
-        inverse_pivots.extend(panel.inverse_pivots);
-        panels.push(panel.entries);
-    }
-    Ok(Ldlt { analysis: Arc::clone(analysis), panels, inverse_pivots })
+    let finished =
+        |panel: OnceLock<Finished<T>>| panel.into_inner().expect("every panel belongs to a task").panel;
+    let panels = factorisation.panels.into_iter().map(finished).collect();
+    Ok(Ldlt { analysis: Arc::clone(analysis), panels })
 }
 
 /// A finished panel.
-struct FactoredPanel<T> {
-    entries: Vec<T>,
+#[derive(Debug)]
+pub(super) struct FactoredPanel<T> {
+    /// The rectangle, column-major.
+    pub(super) entries: Vec<T>,
     /// `D` once more: on the diagonal of the entries every pivot is a cache line of its own.
     pivots: Vec<T>,
-    inverse_pivots: Vec<T>,
+    /// `1 / D`.
+    pub(super) inverse_pivots: Vec<T>,
+    /// What the matrix has in its columns on and below the diagonal, where the panel may be kept.
+    assembled: Vec<T>,
+}
+
+/// A panel of this factor.
+struct Finished<T> {
+    panel: Arc<FactoredPanel<T>>,
+    /// Whether it was found, and not computed.
+    is_found: bool,
 }
 
 /// Scratch memory of one thread.
@@ -101,7 +128,8 @@ struct TileScratch<T: PanelScalar> {
 struct Factorisation<'a, T: PanelScalar> {
     analysis: &'a LdltAnalysis,
     entry: &'a Entry<'a, T>,
-    panels: Vec<OnceLock<FactoredPanel<T>>>,
+    kept: Option<&'a KeptPanels<T>>,
+    panels: Vec<OnceLock<Finished<T>>>,
     workspaces: Mutex<Vec<Workspace<T>>>,
 }
 
@@ -158,7 +186,33 @@ impl<T: PanelScalar> Factorisation<'_, T> {
         MeshError::Factorisation { unknowns: self.analysis.size(), cause }
     }
 
+    /// The panel as another factor has it: where the matrix is the same there, and in all that changes it.
+    fn found(&self, p: usize) -> Option<Arc<FactoredPanel<T>>> {
+        let before = self.kept?.panels[p].as_ref()?;
+        let is_found = |source: usize| self.panels[source].get().is_some_and(|source| source.is_found);
+        let is_same = self.analysis.panels.updates(p).iter().all(|update| is_found(update.source as usize))
+            && self.entries_of_matrix(p).map(|(_, _, value)| value).eq(before.assembled.iter().copied());
+        is_same.then(|| Arc::clone(before))
+    }
+
     fn panel(&self, p: usize, tiles: Tiles, workspace: &mut Workspace<T>) -> Result<(), MeshError> {
+        let found = self.found(p);
+        let is_found = found.is_some();
+        let panel = match found {
+            Some(found) => found,
+            None => Arc::new(self.factored(p, tiles, workspace)?),
+        };
+        let finished = self.panels[p].set(Finished { panel, is_found });
+        assert!(finished.is_ok(), "a panel belongs to one task");
+        Ok(())
+    }
+
+    fn factored(
+        &self,
+        p: usize,
+        tiles: Tiles,
+        workspace: &mut Workspace<T>,
+    ) -> Result<FactoredPanel<T>, MeshError> {
         let panel = self.analysis.panels.get(p);
         let rows = self.analysis.panels.rows(p);
         let (height, width) = (panel.height(), panel.width);
@@ -211,24 +265,33 @@ impl<T: PanelScalar> Factorisation<'_, T> {
             }
             _ => tiles_of(below, width).into_iter().for_each(|(_, tile)| divide(tile, packing)),
         }
-        let finished = self.panels[p].set(FactoredPanel { entries, pivots, inverse_pivots });
-        assert!(finished.is_ok(), "a panel belongs to one task");
-        Ok(())
+        let assembled = if self.analysis.is_kept(p) {
+            self.entries_of_matrix(p).map(|(_, _, value)| value).collect()
+        } else {
+            Vec::new()
+        };
+        Ok(FactoredPanel { entries, pivots, inverse_pivots, assembled })
     }
 
-    /// Adds the entries of the matrix on and below the diagonal.
-    fn assemble(&self, p: usize, position: &[u32], entries: &mut [T]) {
+    /// The entries of the matrix in a panel's columns on and below the diagonal: column in the panel, row, value.
+    fn entries_of_matrix(&self, p: usize) -> impl Iterator<Item = (usize, usize, T)> {
         let LdltAnalysis { structure, order, inverse, panels, .. } = self.analysis;
         let panel = panels.get(p);
-        for (j, values) in entries.chunks_exact_mut(panel.height()).enumerate() {
+        (0..panel.width).flat_map(move |j| {
             let column = panel.start + j;
             let old = order[column] as usize;
-            for k in structure.row(old) {
+            structure.row(old).filter_map(move |k| {
                 let row = inverse[structure.columns[k] as usize] as usize;
-                if row >= column {
-                    values[position[row] as usize] += (self.entry)(old, k);
-                }
-            }
+                (row >= column).then(|| (j, row, (self.entry)(old, k)))
+            })
+        })
+    }
+
+    /// Adds them.
+    fn assemble(&self, p: usize, position: &[u32], entries: &mut [T]) {
+        let height = self.analysis.panels.get(p).height();
+        for (j, row, value) in self.entries_of_matrix(p) {
+            entries[j * height + position[row] as usize] += value;
         }
     }
 
@@ -272,8 +335,9 @@ impl<T: PanelScalar> Factorisation<'_, T> {
         let source = update.source as usize;
         let panel = self.analysis.panels.get(source);
         let source_rows = self.analysis.panels.rows(source);
-        let FactoredPanel { entries, pivots, .. } =
+        let Finished { panel: finished, .. } =
             self.panels[source].get().expect("descendants are factored first");
+        let FactoredPanel { entries, pivots, .. } = &**finished;
         let block = MatRef::from_column_major_slice(entries, panel.height(), panel.width);
 
         let (from, to) = (update.first as usize, update.last as usize);

@@ -31,5 +31,5 @@ mod tests;
 
 pub use analysis::LdltAnalysis;
 pub use compiled::FactorScalar;
-pub use factor::{Entry, Ldlt};
+pub use factor::{Entry, KeptPanels, Ldlt};
 pub use scalar::PanelScalar;

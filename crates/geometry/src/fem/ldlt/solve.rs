@@ -34,7 +34,8 @@ pub(super) fn solve_in_place<T: PanelScalar>(factor: &Ldlt<T>, columns: &mut [T]
     x.extend(order.iter().flat_map(|&old| columns.iter().skip(old as usize).step_by(n)).copied());
     let sweep = Sweep { factor, count, workspaces: Mutex::new(Vec::new()) };
     sweep.forward_branch(&factor.analysis.tasks, &mut x);
-    for (x, &inverse) in x.chunks_exact_mut(count).zip(&factor.inverse_pivots) {
+    let inverse_pivots = factor.panels.iter().flat_map(|panel| &panel.inverse_pivots);
+    for (x, &inverse) in x.chunks_exact_mut(count).zip(inverse_pivots) {
         x.iter_mut().for_each(|x| *x *= inverse);
     }
     sweep.backward_branch(&factor.analysis.tasks, &mut x, &[]);
@@ -229,7 +230,7 @@ impl<T: PanelScalar> Sweep<'_, T> {
         workspace: &mut Workspace<T>,
     ) {
         let panel = self.panel(p);
-        let entries = self.factor.panels[p].as_slice();
+        let entries = self.factor.panels[p].entries.as_slice();
         let (width, height, count) = (panel.width, panel.height(), self.count);
         let columns = &mut x[(panel.start - own.start) * count..][..width * count];
         let Workspace { outside, sides } = workspace;
@@ -273,7 +274,7 @@ impl<T: PanelScalar> Sweep<'_, T> {
         workspace: &mut Workspace<T>,
     ) {
         let panel = self.panel(p);
-        let entries = self.factor.panels[p].as_slice();
+        let entries = self.factor.panels[p].entries.as_slice();
         let (width, height, count) = (panel.width, panel.height(), self.count);
         let Workspace { outside, sides } = workspace;
         sides.clear();

@@ -9,6 +9,7 @@ use super::{FactorScalar, Ldlt, LdltAnalysis};
 use crate::determinism::same_on_any_threads;
 use crate::error::MeshError;
 use crate::fem::csr::{CsrMatrix, CsrStructure};
+use crate::fem::kept_first::Changes;
 use crate::fem::ordering;
 
 /// The seven-point pattern on an `m³` grid, `components` unknowns a node that do not know of each other.
@@ -225,7 +226,7 @@ fn the_factor_times_its_plain_transpose_is_the_matrix() {
     let mut pivots = vec![Complex64::default(); n];
     for (p, entries) in factor.panels.iter().enumerate() {
         let (panel, rows) = (analysis.panels.get(p), analysis.panels.rows(p));
-        for (j, values) in entries.chunks_exact(panel.height()).enumerate() {
+        for (j, values) in entries.entries.chunks_exact(panel.height()).enumerate() {
             let column = panel.start + j;
             pivots[column] = values[j];
             lower[column][column] = Complex64::ONE;
@@ -259,7 +260,7 @@ fn the_bits_do_not_depend_on_the_threads() {
         let (one, _) = x.split_at_mut(analysis.size());
         factor.solve_in_place(one);
         let bits = |z: &Complex64| [z.re.to_bits(), z.im.to_bits()];
-        let factor_bits: Vec<_> = factor.panels.iter().flatten().map(bits).collect();
+        let factor_bits: Vec<_> = factor.panels.iter().flat_map(|panel| &panel.entries).map(bits).collect();
         (factor_bits, x.iter().map(bits).collect::<Vec<_>>())
     });
 }
@@ -325,5 +326,81 @@ fn the_factor_is_counted_in_entries_bytes_and_multiplications() {
         Complex32::new(if k == 101 * row { 200.0 } else { 1.0 }, 1.0)
     });
     let bytes = factor.expect("diagonally dominant").bytes();
-    assert!((80_800..81_000).contains(&bytes), "{bytes}");
+    // The pivots twice more, and one panel.
+    assert!((81_600..82_000).contains(&bytes), "{bytes}");
+}
+
+/// Rows of a grid of three components whose first coordinate is at least seven change.
+fn changing(structure: &CsrStructure) -> Vec<bool> {
+    (0..structure.row_count()).map(|row| row / (3 * 11 * 11) >= 7).collect()
+}
+
+/// The model matrix with other diagonal entries in some rows.
+fn with_other_rows<T: Entry>(
+    structure: &CsrStructure,
+    changed: impl Fn(usize) -> bool,
+    row: usize,
+    k: usize,
+) -> T {
+    let own = structure.columns[k] as usize == row;
+    let more = if own && changed(row) { 0.37 } else { 0.0 };
+    value::<T>(structure, row, k) + T::from_complex(Complex64::new(more, 0.0))
+}
+
+fn keeping<T: Entry>() {
+    let structure = grid(11, 3);
+    let changes = changing(&structure);
+    let order = ordering::dissection_kept_first(&structure, Changes { rows: &changes, most_of_rims: 1e7 });
+    let analysis = LdltAnalysis::keeping(&structure, order, &changes).expect("a symmetric pattern");
+    let (all, changing) = (analysis.multiplications(), analysis.changing_multiplications());
+    assert!(0.0 < changing && changing < 0.8 * all, "{changing:e} of {all:e}");
+    let before = factor::<T>(&analysis);
+    let kept = before.kept().expect("some panels");
+    let found_of = |changed: &(dyn Fn(usize) -> bool + Sync)| {
+        let entry = |row, k| with_other_rows(&structure, changed, row, k);
+        let own = Ldlt::<T>::new(&analysis, entry).expect("no pivot is zero");
+        let found = Ldlt::new_keeping(&analysis, entry, Some(&kept)).expect("no pivot is zero");
+        for (p, (own, found)) in own.panels.iter().zip(&found.panels).enumerate() {
+            assert_eq!(own.entries, found.entries, "panel {p}");
+            assert_eq!(own.inverse_pivots, found.inverse_pivots, "panel {p}");
+        }
+        found.panels.iter().zip(&before.panels).filter(|(a, b)| Arc::ptr_eq(a, b)).count()
+    };
+    let of_analysis = (0..before.panels.len()).filter(|&p| analysis.is_kept(p)).count();
+    assert_eq!(found_of(&|row| changes[row]), of_analysis);
+    // A row among those that were to stay takes all that come from it, and no more.
+    let some = found_of(&|row| row == 40 || changes[row]);
+    assert!(0 < some && some < of_analysis, "{some} of {of_analysis}");
+    assert_eq!(found_of(&|_| true), 0);
+}
+
+#[test]
+fn a_factor_that_is_kept_in_part_has_the_bits_of_its_own() {
+    keeping::<f32>();
+    keeping::<f64>();
+    keeping::<Complex32>();
+    keeping::<Complex64>();
+}
+
+#[test]
+fn panels_of_another_analysis_are_not_taken() {
+    let structure = grid(11, 3);
+    let changes = changing(&structure);
+    let make = || {
+        let order =
+            ordering::dissection_kept_first(&structure, Changes { rows: &changes, most_of_rims: 1e7 });
+        LdltAnalysis::keeping(&structure, order, &changes).expect("a symmetric pattern")
+    };
+    let (one, other) = (make(), make());
+    let kept = factor::<f64>(&one).kept().expect("some panels");
+    let factor = Ldlt::new_keeping(&other, |row, k| value::<f64>(&structure, row, k), Some(&kept));
+    let panels = factor.expect("no pivot is zero").panels;
+    assert!(
+        panels
+            .iter()
+            .zip(&kept.panels)
+            .all(|(own, kept)| { kept.as_ref().is_none_or(|kept| !Arc::ptr_eq(own, kept)) })
+    );
+    // Without rows that stay there is nothing to keep.
+    assert!(self::factor::<f64>(&analysis(&structure)).kept().is_none());
 }
