@@ -9,7 +9,7 @@ use fluxmorph::config::Config;
 use fluxmorph::files::{fields, peak_memory_bytes};
 use fluxmorph::show::Silent;
 use fluxmorph_optimizer::driver::{self, Unrecorded};
-use fluxmorph_optimizer::problem::{ADJOINTS_OF_A_SEARCH, Derivatives, NoProgress, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, Problem, SEARCH_ADJOINT_TOLERANCE, SolverCache};
 use fluxmorph_solver::adjoint;
 use serde::{Deserialize, Serialize};
 
@@ -156,7 +156,7 @@ fn step(problem: &Problem, record: &mut Record) {
     let functional = &problem.objective().expect("it has an objective").terms[0].functional;
     let (evaluation, value) = timed(|| functional.evaluate(model, &mesh, &state).expect("it is finite"));
     let (time, lambda) = timed(|| {
-        adjoint::solve_to(&mut system, &value.derivative, ADJOINTS_OF_A_SEARCH).expect("it converges")
+        adjoint::solve_to(&mut system, &value.derivative, SEARCH_ADJOINT_TOLERANCE).expect("it converges")
     });
     record.adjoint = time;
     record.iterations = [state.report().iterations, lambda.report().iterations];

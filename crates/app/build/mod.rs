@@ -187,7 +187,9 @@ fn problem_on(
     // Neither needs the other: faults in both are reported together.
     let states = match coils {
         Some(coils) => {
-            let moving = body.as_ref().map_or(&[][..], shape::Body::moving);
+            // Where one design is analysed, an order for many is not worth its price.
+            let moving =
+                body.as_ref().filter(|_| mode != Mode::Analysis).map_or(&[][..], shape::Body::moving);
             let parts = (&coils[..], &curves);
             sink.take(field::field_models(config, &mesh, &conductors, parts, moving, share.as_ref()))?
         }

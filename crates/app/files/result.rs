@@ -335,7 +335,7 @@ pub struct LinearSolverResult {
     /// The method that each state's solutions begin with.
     #[serde(default)]
     pub methods: Vec<String>,
-    /// Largest relative residual of any accepted solution.
+    /// Largest relative residual of the states, and of adjoint problems but for those of a search.
     pub worst_residual: f64,
     /// Iterations for the design of this result: states and adjoints.
     #[serde(default)]

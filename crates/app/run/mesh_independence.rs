@@ -212,7 +212,7 @@ impl MeshIndependence<'_> {
     fn compute_on(&self, fresh: &FreshMesh, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         let config = fresh_configuration(self.config);
         let mesh = (fresh.mesh.build(&config, self.source)?, None);
-        let setup = set_up_on(mesh, &config, self.source, Mode::Optimisation)?;
+        let setup = set_up_on(mesh, &config, self.source, Mode::Analysis)?;
         // What the factor of this very mesh takes is known now.
         if let Some(shortage) = memory_limit::shortage_of(&setup.problem) {
             return Ok(Outcome::TooLarge(shortage));

@@ -213,7 +213,7 @@ impl Session<'_> {
             accuracy: None,
             initial,
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
-            linear_solver: linear_solver(problem, optimised.worst_residual, best.analysis.linear_iterations),
+            linear_solver: linear_solver(problem, &best.analysis, optimised.worst_residual),
             ..self.result(
                 optimised.stop_reason,
                 &best.analysis,

@@ -13,6 +13,7 @@ use fluxmorph_optimizer::problem::{
 };
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
+use fluxmorph_solver::linear::Method;
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery, saturation};
 
@@ -83,7 +84,7 @@ impl Session<'_> {
             coupling: coupling(&inductance_h),
             inductance_h,
             multipoles,
-            linear_solver: linear_solver(problem, analysis.worst_residual, analysis.linear_iterations),
+            linear_solver: linear_solver(problem, analysis, analysis.worst_residual),
             timings_s: self.timings_result(timings),
             warnings,
             peak_memory_bytes: peak_memory_bytes(),
@@ -254,11 +255,11 @@ fn all_terminals(problem: &Problem, analysis: &Analysis) -> Result<Vec<Terminals
     let (models, mesh) = (problem.states(), &analysis.mesh);
     let mut responded: Vec<FieldSolution> = Vec::new();
     let mut all = Vec::new();
-    for (model, solution) in models.iter().zip(&analysis.solutions) {
+    for ((model, solution), &method) in models.iter().zip(&analysis.solutions).zip(&analysis.methods) {
         let mut state = solution.clone();
         match (0..responded.len()).find(|&k| model.shares_matrix_with(&models[k])) {
             Some(k) => state = state.with_responses_of(&responded[k]),
-            None => model.respond_to_all(mesh, &mut state)?,
+            None => model.respond_to_all(mesh, method, &mut state)?,
         }
         all.push(circuit::terminals(model, mesh, &state)?);
         responded.push(state);
@@ -363,8 +364,15 @@ pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Boun
     problem.constraints().iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
 }
 
-/// How the linear systems were solved.
-pub(super) fn linear_solver(problem: &Problem, worst_residual: f64, iterations: usize) -> LinearSolverResult {
-    let methods = problem.states().iter().map(|model| model.method_name());
-    LinearSolverResult { methods: methods.collect(), worst_residual, iterations }
+/// How the linear systems of an analysis were solved.
+pub(super) fn linear_solver(
+    problem: &Problem,
+    analysis: &Analysis,
+    worst_residual: f64,
+) -> LinearSolverResult {
+    let name = |(model, method): (&FieldModel, &Option<Method>)| {
+        method.map_or_else(|| model.method_name(), |method| method.name().to_owned())
+    };
+    let methods = problem.states().iter().zip(&analysis.methods).map(name).collect();
+    LinearSolverResult { methods, worst_residual, iterations: analysis.linear_iterations }
 }

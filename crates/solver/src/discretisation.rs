@@ -242,12 +242,15 @@ impl Discretisation {
 
     /// Which rows change while some elements move, and with the state, by equation; `None` where none moves.
     pub(crate) fn changes(&self, moving: &[ElementId], weak_form: &WeakForm) -> Option<Vec<bool>> {
+        if moving.is_empty() {
+            return None;
+        }
         let mut changes = vec![false; self.unknowns.dofs.count()];
         for &e in moving.iter().chain(weak_form.elements_with_a_law()) {
             let equations = |&carrier| (0..4).filter_map(move |c| self.unknowns.dofs.equation(carrier, c));
             self.space.carriers_of(e).iter().flat_map(equations).for_each(|row| changes[row] = true);
         }
-        (!moving.is_empty()).then_some(changes)
+        Some(changes)
     }
 
     /// Assembles the matrix, or the rows of this rank, on a mesh with this topology; of B–H laws it has the linear parts.
@@ -277,11 +280,11 @@ impl Discretisation {
         matrix: impl Fn(ElementId) -> L + Sync,
     ) {
         if self.unknowns.has_frames() {
-            self.pattern.assemble_some(group, values, takes_part, |e| {
+            self.pattern.assemble_where(group, values, takes_part, |e| {
                 RotatedMatrix::new(matrix(e), group.carriers_of(e).map(|n| self.unknowns.frame(n)))
             });
         } else {
-            self.pattern.assemble_some(group, values, takes_part, matrix);
+            self.pattern.assemble_where(group, values, takes_part, matrix);
         }
     }
 

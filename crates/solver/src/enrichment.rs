@@ -194,7 +194,7 @@ impl Corrected {
             axpy(c64::from(-1.0), &added.residual, &mut residual);
             residual
         };
-        let from = (&LinearSolverCache::default(), Some(field));
+        let from = (&mut LinearSolverCache::default(), Some(field));
         let (state, system) = model.solve_nonlinear(mesh, from, &mut |_| {})?;
         Ok(Self {
             system,

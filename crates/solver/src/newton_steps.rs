@@ -79,9 +79,10 @@ pub(crate) struct StepSystems<'a> {
 }
 
 impl<'a> StepSystems<'a> {
-    /// Those of a state of a model, which begin with the method of a cache.
-    pub(crate) fn new(model: &'a FieldModel, cache: &LinearSolverCache) -> Self {
-        Self { model, cache: Self::first(model, cache.without_results()), events: Vec::new() }
+    /// Those of a state of a model, which begin with the method of a cache and what it keeps of factors.
+    pub(crate) fn new(model: &'a FieldModel, cache: &mut LinearSolverCache) -> Self {
+        let cache = std::mem::take(cache).method_and_kept();
+        Self { model, cache: Self::first(model, cache), events: Vec::new() }
     }
 
     /// What the first of them begins with. In statics a factor serves the tangents after its own as long as it pays; for phasors
@@ -170,7 +171,7 @@ mod tests {
             failure,
         };
         let mut systems =
-            StepSystems::new(&model, &LinearSolverCache::with_method(Some(Method::RealFactorSingle)));
+            StepSystems::new(&model, &mut LinearSolverCache::with_method(Some(Method::RealFactorSingle)));
         assert!(!systems.escalate(&failed(NewtonFailure::Law)));
         for method in [Method::RealFactor, Method::Direct] {
             assert!(systems.escalate(&failed(NewtonFailure::Rounding)));

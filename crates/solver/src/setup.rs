@@ -47,8 +47,8 @@ pub struct FieldModelSetup {
     pub boundaries: Vec<(String, Boundary)>,
     /// The region that stands for open space, if one does.
     pub open: Option<OpenRegion>,
-    /// Elements of which a node moves from one mesh to the next, ascending; empty where that is not known. Nothing but the order of
-    /// elimination depends on it.
+    /// Elements of the mesh of which a node moves from one to the next of several meshes, ascending; empty where there is one mesh, or
+    /// that is not known. Order and method of the factors may depend on it, results within the linear solver's tolerance.
     pub moving: Vec<ElementId>,
     /// Linear solver.
     pub linear_solver: LinearSolverSettings,

@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use crate::amplitude;
 use crate::circuit::Excitation;
 use crate::error::SolverError;
-use crate::linear::{LinearSolverCache, PreparedSystem};
+use crate::linear::{LinearSolverCache, Method, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver};
 use crate::newton_steps::StepSystems;
@@ -19,7 +19,7 @@ impl FieldModel {
     /// [`SolverError`] when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         if !self.is_linear() {
-            return self.solve_nonlinear(mesh, (&LinearSolverCache::default(), None), &mut |_| {});
+            return self.solve_nonlinear(mesh, (&mut LinearSolverCache::default(), None), &mut |_| {});
         }
         let mut system = self.prepare(self.assembled(mesh))?;
         let state = self.solve_prepared(&mut system, &self.load(mesh))?;
@@ -39,7 +39,7 @@ impl FieldModel {
     pub fn solve_nonlinear(
         &self,
         mesh: &Mesh,
-        (cache, start): (&LinearSolverCache, Option<&[c64]>),
+        (cache, start): (&mut LinearSolverCache, Option<&[c64]>),
         observer: &mut NewtonObserver<'_>,
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
@@ -69,17 +69,24 @@ impl FieldModel {
         Ok(FieldSolution::state(values, report).with_currents(currents))
     }
 
-    /// Solves for 1 A in every winding whose response the state does not hold yet, where all is linear.
+    /// Solves for 1 A in every winding whose response the state does not hold yet, where all is linear; beginning with a method, or
+    /// with the first choice.
     ///
     /// # Errors
     /// As [`FieldModel::prepare`] and [`PreparedSystem::solve_field`].
-    pub fn respond_to_all(&self, mesh: &Mesh, state: &mut FieldSolution) -> Result<(), SolverError> {
+    pub fn respond_to_all(
+        &self,
+        mesh: &Mesh,
+        method: Option<Method>,
+        state: &mut FieldSolution,
+    ) -> Result<(), SolverError> {
         let missing: Vec<usize> =
             (0..self.windings().count()).filter(|&k| state.response(k).is_none()).collect();
         if missing.is_empty() || !self.is_linear() {
             return Ok(());
         }
-        let mut system = self.prepare(self.assembled(mesh))?;
+        let cache = &mut LinearSolverCache::with_method(method);
+        let mut system = self.prepare_with(self.assembled(mesh), cache)?;
         missing.into_iter().try_for_each(|winding| self.respond(&mut system, winding, state))
     }
 

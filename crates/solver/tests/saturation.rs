@@ -92,7 +92,7 @@ fn newton_converges_to_the_same_field_whatever_the_linear_part() {
             let model = FieldModel::new(&mesh, setup(elements, iron, Some(law()))).expect("a sound problem");
             let mut progress: Vec<NewtonProgress> = Vec::new();
             let observer = &mut |step| progress.push(step);
-            let solved = model.solve_nonlinear(&mesh, (&LinearSolverCache::default(), None), observer);
+            let solved = model.solve_nonlinear(&mesh, (&mut LinearSolverCache::default(), None), observer);
             (solved.expect("it converges").0.flux_densities(&model, &mesh), progress)
         };
         let (field, progress) = solved(2000.0);
@@ -192,7 +192,7 @@ fn derivatives_match(frequency: f64, iron_material: Material, families: &[(Eleme
             topology.elements().filter(|&e| start.vertices(e).iter().all(|x| x[2] < 0.0501)).collect();
         let mut progress: Vec<String> = Vec::new();
         let observer = &mut |p: NewtonProgress| progress.push(format!("{:.1e}/{}", p.residual, p.damping));
-        let begin = (&LinearSolverCache::default(), None);
+        let begin = (&mut LinearSolverCache::default(), None);
         let (state, mut system) = model.solve_nonlinear(&start, begin, observer).expect("it converges");
         println!("{elements:?}, {frequency} Hz: {progress:?}");
         let velocity: Vec<Point> = {
@@ -258,7 +258,7 @@ fn the_phasor_of_iron_that_does_not_conduct_is_the_static_field_of_its_amplitude
             let model = FieldModel::new(&mesh, setup).expect("a sound problem");
             let mut progress: Vec<NewtonProgress> = Vec::new();
             let observer = &mut |step| progress.push(step);
-            let solved = model.solve_nonlinear(&mesh, (&LinearSolverCache::default(), None), observer);
+            let solved = model.solve_nonlinear(&mesh, (&mut LinearSolverCache::default(), None), observer);
             let residuals: Vec<String> =
                 progress.iter().map(|p| format!("{:.1e}/{}", p.residual, p.damping)).collect();
             println!("{elements:?}, {frequency} Hz: {residuals:?}");

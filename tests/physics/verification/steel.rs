@@ -28,10 +28,10 @@ pub(super) fn solved(name: &str, overrides: &[&str]) -> Solved {
     let steps = &mut |p: NewtonProgress| {
         println!("  {name}, step {}: residual {:.1e}, length {}", p.steps, p.residual, p.damping);
     };
-    let cache = LinearSolverCache::default();
+    let mut cache = LinearSolverCache::default();
     let solution = match model.is_linear() {
         true => model.solve(&mesh).expect("it converges").0,
-        false => model.solve_nonlinear(&mesh, (&cache, None), steps).expect("it converges").0,
+        false => model.solve_nonlinear(&mesh, (&mut cache, None), steps).expect("it converges").0,
     };
     Solved { model, mesh, solution }
 }

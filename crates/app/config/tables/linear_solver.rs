@@ -52,8 +52,9 @@ table! {
     pub struct LinearSolver: Default {
         /// Where the ladder of methods begins.
         method: SolverMethod = WORD => SolverMethod::Automatic;
-        /// Largest relative residual of a solution. The default is a hundred times below the 1e-9 that every solution is
-        /// audited against, so that the gradient is limited by the mesh and not by the solver.
+        /// Largest relative residual of a solution. The default is a hundred times below the 1e-9 that every state is
+        /// audited against, so that values are limited by the mesh and not by the solver. Adjoint problems of a search go
+        /// to 1e-7.
         tolerance: f64 = number(TOLERANCES) => 1e-11;
         /// Largest factor of a matrix that the program takes by itself, in GiB; where none fits, it takes the incomplete one. A
         /// laptop with 8 GiB holds the default beside the rest.

@@ -50,14 +50,14 @@ impl<const C: usize> BlockPattern<C> {
         T: Scalar,
         L: LocalMatrix<T, N, C>,
     {
-        self.assemble_some(group, values, |_| true, element_matrix);
+        self.assemble_where(group, values, |_| true, element_matrix);
     }
 
     /// As [`BlockPattern::assemble`], of those elements alone that take part.
     ///
     /// # Panics
     /// If `values` has another length than the pattern has entries.
-    pub fn assemble_some<T, L, const N: usize>(
+    pub fn assemble_where<T, L, const N: usize>(
         &self,
         group: &BoundGroup<N>,
         values: &mut [T],

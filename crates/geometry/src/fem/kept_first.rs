@@ -9,6 +9,9 @@ use fluxmorph_petsc::metis;
 
 use super::csr::CsrStructure;
 
+/// Edges within rims above which there is no order: METIS holds them all, in some 20 bytes each.
+const MAX_RIM_EDGES: usize = 20_000_000;
+
 /// Which rows of a matrix change from one to the next, and when that is worth an order of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct Changes<'a> {
@@ -16,15 +19,15 @@ pub struct Changes<'a> {
     pub rows: &'a [bool],
     /// Multiply-adds that the factors of the rims alone, dense as they are, may take: a bound of what the second part costs, known
     /// before there is an order.
-    pub most_of_rims: f64,
+    pub max_rim_multiplications: f64,
 }
 
 /// The order `forward[new] = old` of the vertices of a graph, each counting by its weight or all the same; `None` where METIS
 /// refuses, where all vertices are of one part, and where the rims are too large.
-pub(super) fn kept_first(
+pub fn kept_first(
     graph: &CsrStructure,
     weights: Option<&[i32]>,
-    Changes { rows: changes, most_of_rims }: Changes<'_>,
+    Changes { rows: changes, max_rim_multiplications }: Changes<'_>,
 ) -> Option<Vec<u32>> {
     let (changing, kept): (Vec<u32>, Vec<u32>) =
         (0..graph.row_count() as u32).partition(|&vertex| changes[vertex as usize]);
@@ -33,8 +36,9 @@ pub(super) fn kept_first(
         None => rim.len() as f64,
         Some(weights) => rim.iter().map(|&vertex| f64::from(weights[vertex as usize])).sum(),
     };
+    let edges: usize = rims.iter().map(|rim| rim.len() * rim.len()).sum();
     let of_rims: f64 = rims.iter().map(|rim| unknowns(rim).powi(3) / 6.0).sum();
-    if kept.is_empty() || changing.is_empty() || of_rims > most_of_rims {
+    if kept.is_empty() || changing.is_empty() || of_rims > max_rim_multiplications || edges > MAX_RIM_EDGES {
         return None;
     }
     let mut order = dissection_of(graph, weights, &kept, &[])?;
@@ -129,8 +133,8 @@ mod tests {
         CsrMatrix::from_rows(n * n, (0..n * n).map(row)).structure
     }
 
-    fn of(rows: &[bool], most_of_rims: f64) -> Changes<'_> {
-        Changes { rows, most_of_rims }
+    fn of(rows: &[bool], max_rim_multiplications: f64) -> Changes<'_> {
+        Changes { rows, max_rim_multiplications }
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub use conjugate_gradients::{IterationReport, IterationStatus, conjugate_gradie
 pub use csr::CsrMatrix;
 pub use dofs::DofMap;
 pub use incomplete::{Incomplete, IncompleteAnalysis};
-pub use kept_first::Changes;
+pub use kept_first::{Changes, kept_first};
 pub use ldlt::{FactorScalar, KeptPanels, Ldlt, LdltAnalysis};
 pub use lifted_ordering::{Hosts, lifted_dissection};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};

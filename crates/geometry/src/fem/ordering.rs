@@ -11,7 +11,6 @@ use fluxmorph_petsc::metis;
 
 use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
-use crate::fem::kept_first::{Changes, kept_first};
 use crate::ids::CarrierId;
 
 /// Nested dissection, postordered; a permutation, `forward[new] = old`.
@@ -23,11 +22,6 @@ pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
 /// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
     metis::nested_dissection(&structure.row_starts, &structure.columns, None)
-}
-
-/// The same with the rows first that do not change from one matrix to the next; `None` where there is no such order.
-pub fn dissection_kept_first(structure: &CsrStructure, changes: Changes<'_>) -> Option<Vec<u32>> {
-    kept_first(structure, None, changes)
 }
 
 /// Nested dissection of the *nodes*, expanded to their unknowns; not postordered, `forward[new] = old`.

@@ -36,7 +36,7 @@ pub struct Optimised {
     pub best: Best,
     /// Worst quality of the initial mesh.
     pub initial_quality: f64,
-    /// Largest relative residual of all linear solves.
+    /// Largest relative residual of all states.
     pub worst_residual: f64,
     /// Where the time went, all evaluations together.
     pub timings: Timings,

@@ -25,7 +25,7 @@ pub struct Record {
     /// The method of the linear solver that worked last, by matrix; `None` where it is the first one.
     #[serde(with = "method_names")]
     pub methods: Vec<Option<Method>>,
-    /// Largest relative residual of its linear solves.
+    /// Largest relative residual of its states.
     pub worst_residual: f64,
     /// Where its time went.
     #[serde(rename = "timings_s")]

@@ -118,7 +118,7 @@ impl Worst {
         self.residual = self.residual.max(report.residual);
     }
 
-    /// The residual counts where it is held to what that of a state is.
+    /// The residual counts where it is asked for to be that of a state.
     fn include_adjoint(&mut self, solution: &FieldSolution, tolerance: f64) {
         if tolerance > 0.0 { self.iterations += solution.report().iterations } else { self.include(solution) }
     }

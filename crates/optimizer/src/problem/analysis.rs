@@ -5,7 +5,7 @@ use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_remesh::StepToInversion;
 use fluxmorph_solver::FieldSolution;
-use fluxmorph_solver::linear::SolverEvent;
+use fluxmorph_solver::linear::{Method, SolverEvent};
 
 use crate::body::BodyForce;
 
@@ -66,8 +66,10 @@ pub struct Analysis {
     pub quality: QualityReport,
     /// Iterations of the linear solver, state and adjoint.
     pub linear_iterations: usize,
-    /// Largest true relative residual of the linear solves.
+    /// Largest true relative residual of the states, and of adjoint problems but for those of a search.
     pub worst_residual: f64,
+    /// The method of the linear solver that solved each state; `None` on several ranks.
+    pub methods: Vec<Option<Method>>,
     /// Methods of the linear solver that failed, and what took their place.
     pub solver_events: Vec<SolverEvent>,
     /// Where the time went.

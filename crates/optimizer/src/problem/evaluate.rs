@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::linear::{LinearSolverCache, PreparedSystem, SolverEvent};
+use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent};
 use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
@@ -24,7 +24,7 @@ pub enum Derivatives {
     /// Values alone.
     None,
     /// Objective and constraints with their gradients, for a method of optimisation: adjoint problems are solved to
-    /// [`ADJOINTS_OF_A_SEARCH`], or to the tolerance of the linear solver where that is larger.
+    /// [`SEARCH_ADJOINT_TOLERANCE`], or to the tolerance of the linear solver where that is larger.
     Search,
     /// The same with adjoint problems solved as the states are, for those who hold a gradient against differences of values.
     First,
@@ -37,9 +37,9 @@ impl Derivatives {
     }
 }
 
-/// Relative residual [1] of the adjoint problems of a search. Gradients differ by about as much of themselves, far below what a mesh
-/// leaves of them; values, which methods compare to much smaller differences, come from states alone.
-pub const ADJOINTS_OF_A_SEARCH: f64 = 1e-7;
+/// Relative residual [1] of the adjoint problems of a search. Gradients differ by about as much of themselves, more where terms
+/// cancel, far below what a mesh leaves of them; values, which methods compare to much smaller differences, come from states alone.
+pub const SEARCH_ADJOINT_TOLERANCE: f64 = 1e-7;
 
 /// What the states of an evaluation add up to.
 struct Sums<'a> {
@@ -50,6 +50,8 @@ struct Sums<'a> {
     /// One sum for each of these.
     constrained: Vec<AdjointAccumulator>,
     solutions: Vec<FieldSolution>,
+    /// By state.
+    methods: Vec<Option<Method>>,
     events: Vec<SolverEvent>,
 }
 
@@ -95,7 +97,8 @@ impl Problem {
             (Some(shape), true) => self.anchor(shape.motion().original(), &moved.mesh, cache, progress)?,
             _ => false,
         };
-        let adjoint_tolerance = if derivatives == Derivatives::Search { ADJOINTS_OF_A_SEARCH } else { 0.0 };
+        let adjoint_tolerance =
+            if derivatives == Derivatives::Search { SEARCH_ADJOINT_TOLERANCE } else { 0.0 };
         let (timings, report) = (Timings::default(), Worst::default());
         let mut work = Work { mesh: &moved.mesh, adjoint_tolerance, timings, report, progress };
         let shape = self.shape.as_ref().filter(|_| derivatives.are_wanted());
@@ -128,7 +131,7 @@ impl Problem {
         };
         let constraints = self.measure_constraints(&moved, shape, &sums)?;
         timings.remesh += clock.lap();
-        let Sums { mut objective, solutions, events, .. } = sums;
+        let Sums { mut objective, solutions, methods, events, .. } = sums;
         let nodal = std::mem::take(&mut objective[active].nodal);
         let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
@@ -146,6 +149,7 @@ impl Problem {
             quality,
             linear_iterations: report.iterations,
             worst_residual: report.residual,
+            methods,
             solver_events: events,
             timings,
             mesh,
@@ -175,7 +179,7 @@ impl Problem {
             if model.is_linear() {
                 return Ok(None);
             }
-            let begin = (&LinearSolverCache::default(), None);
+            let begin = (&mut LinearSolverCache::default(), None);
             let solved = model.solve_nonlinear(reference, begin, &mut |newton| progress.newton(newton));
             let (state, _) = solved.map_err(finite::of_field("the state of the undeformed mesh", model))?;
             Ok(Some(state.values().to_vec()))
@@ -207,6 +211,7 @@ impl Problem {
             constrained: fields.iter().map(|_| AdjointAccumulator::new(1, nodes)).collect(),
             fields,
             solutions: Vec::new(),
+            methods: vec![None; self.states.len()],
             events: Vec::new(),
         };
         let mut solutions: Vec<Option<FieldSolution>> = self.states.iter().map(|_| None).collect();
@@ -227,6 +232,7 @@ impl Problem {
                 earlier = Some((system, index));
             }
             let (system, _) = earlier.expect("a matrix has a state");
+            members.iter().for_each(|&index| sums.methods[index] = system.method());
             sums.events.extend_from_slice(system.events());
             cache.keep(matrix, system);
         }
@@ -248,8 +254,8 @@ impl Problem {
         let (system, state) = match shared {
             None if model.is_linear() => solve_linear(model, cache.of_matrix(matrix), work)?,
             None => {
-                let linear = std::mem::take(cache.of_matrix(matrix));
-                solve_nonlinear(model, (&linear, cache.start(index)), work)?
+                let mut linear = std::mem::take(cache.of_matrix(matrix));
+                solve_nonlinear(model, (&mut linear, cache.start(index)), work)?
             }
             Some((system, other)) => {
                 let mut clock = Stopwatch::start();
@@ -406,7 +412,7 @@ fn solve_right_side(
 /// Solves a state with B–H laws; its factors count as part of the state.
 fn solve_nonlinear(
     model: &FieldModel,
-    begin: (&LinearSolverCache, Option<&[c64]>),
+    begin: (&mut LinearSolverCache, Option<&[c64]>),
     work: &mut Work<'_>,
 ) -> Result<(PreparedSystem, FieldSolution), Error> {
     let mut clock = Stopwatch::start();

@@ -33,7 +33,7 @@ use crate::objective::WeightedSum;
 pub use analysis::{Analysis, Measured, Timings};
 pub use cut::Cut;
 pub use estimate::ErrorEstimate;
-pub use evaluate::{ADJOINTS_OF_A_SEARCH, Derivatives};
+pub use evaluate::{Derivatives, SEARCH_ADJOINT_TOLERANCE};
 pub use progress::{NoProgress, Progress, Stage};
 pub use shape::{Shape, between};
 pub use solver_cache::SolverCache;

@@ -34,6 +34,9 @@ pub type Curls<const N: usize> = [[Point; 4]; N];
 /// Most points of the rule that is exact for products of curls.
 pub const MOST_POINTS: usize = 4;
 
+/// Most functions of an element: four of each of the ten carriers of second order.
+const MOST_FUNCTIONS: usize = 40;
+
 /// Curls at the points of the rule that is exact for their products.
 #[derive(Clone, Copy, Debug)]
 pub struct CurlsOfRule<const N: usize> {
@@ -60,28 +63,31 @@ pub struct TensorTerm<const N: usize> {
 impl<const N: usize> TensorTerm<N> {
     /// From the volume that a point stands for [m³], the tensor and the curls there, point by point.
     pub fn new<'a>(points: impl Iterator<Item = (f64, &'a Tensor, &'a Curls<N>)> + Clone) -> Self {
-        // The others add nothing: in every family a quarter of them and more.
+        // A quarter of the functions and more have no curl, and add nothing: which ones depends on the family.
         let with_curl =
             |&(a, i): &(usize, usize)| points.clone().any(|(_, _, curls)| curls[a][i] != [0.0; 3]);
-        let functions: Vec<(usize, usize)> = (0..4 * N).map(|k| (k / 4, k % 4)).filter(with_curl).collect();
-        let count = functions.len();
+        let (mut functions, mut count) = ([(0, 0); MOST_FUNCTIONS], 0);
+        for function in (0..4 * N).map(|k| (k / 4, k % 4)).filter(with_curl) {
+            functions[count] = function;
+            count += 1;
+        }
+        let functions = &functions[..count];
         // Rows up to the diagonal.
-        let mut sums = vec![0.0; count * count];
-        let mut components = [vec![0.0; count], vec![0.0; count], vec![0.0; count]];
+        let mut sums = [[0.0; MOST_FUNCTIONS]; MOST_FUNCTIONS];
+        let [mut x, mut y, mut z] = [[0.0; MOST_FUNCTIONS]; 3];
         for (volume, tensor, curls) in points {
             for (k, &(a, i)) in functions.iter().enumerate() {
-                (0..3).for_each(|d| components[d][k] = curls[a][i][d]);
+                [x[k], y[k], z[k]] = curls[a][i];
             }
-            let [x, y, z] = &components;
-            for (k, row) in sums.chunks_exact_mut(count.max(1)).enumerate() {
+            for (k, row) in sums[..count].iter_mut().enumerate() {
                 let u = apply(tensor, [x[k], y[k], z[k]]).map(|c| volume * c);
-                for (((sum, x), y), z) in row[..=k].iter_mut().zip(x).zip(y).zip(z) {
+                for (((sum, x), y), z) in row[..=k].iter_mut().zip(&x).zip(&y).zip(&z) {
                     *sum += dot([*x, *y, *z], u);
                 }
             }
         }
         let mut blocks = Box::new([[[[0.0; 4]; 4]; N]; N]);
-        for (k, row) in sums.chunks_exact(count.max(1)).enumerate() {
+        for (k, row) in sums[..count].iter().enumerate() {
             let (b, j) = functions[k];
             for (&(a, i), &sum) in functions[..=k].iter().zip(row) {
                 blocks[a][b][i][j] = sum;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use fluxmorph_geometry::MeshError;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{
-    Changes, CsrMatrix, Hosts, IncompleteAnalysis, LdltAnalysis, c64, lifted_dissection, ordering,
+    Changes, CsrMatrix, Hosts, IncompleteAnalysis, LdltAnalysis, c64, kept_first, lifted_dissection, ordering,
 };
 
 use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
@@ -134,14 +134,11 @@ impl SystemAnalysis {
     /// # Errors
     /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
     pub fn preconditioner_bytes(&self, method: Method) -> Result<usize, MeshError> {
-        let entries = |bytes: usize| Ok(self.complete()?.factor_entries() * bytes);
-        match method {
-            Method::Direct => entries(16),
-            Method::DirectSingle | Method::RealFactor => entries(8),
-            Method::RealFactorSingle => entries(4),
-            Method::Incomplete => Ok(self.structure.columns.len() / 2 * SINGLE_ENTRY),
-            Method::TwoLevel => Ok(self.two_level.as_ref().map_or(0, |levels| levels.bytes())),
-        }
+        Ok(match method {
+            Method::Incomplete => self.structure.columns.len() / 2 * SINGLE_ENTRY,
+            Method::TwoLevel => self.two_level.as_ref().map_or(0, |levels| levels.bytes()),
+            _ => self.complete()?.factor_entries() * entry_bytes(method),
+        })
     }
 
     /// Whether factors serve several designs.
@@ -151,7 +148,7 @@ impl SystemAnalysis {
 
     /// Whether a part of a complete factor is kept from one matrix to the next.
     pub fn keeps_a_part(&self) -> bool {
-        self.complete().is_ok_and(|complete| complete.changing_multiplications() < complete.multiplications())
+        self.complete().is_ok_and(|own| own.changing_multiplications() < own.multiplications())
     }
 
     /// The cheapest factor that fits, and its cost.
@@ -175,13 +172,16 @@ impl SystemAnalysis {
     /// # Errors
     /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
     pub fn work_of_design(&self) -> Result<f64, MeshError> {
-        self.cost_of_design(self.method)
+        Ok(self.costs(self.method)?.of_design(self.service(self.method)))
     }
 
+    /// The same in a run, in which what is kept of a factor is made once.
     fn cost_of_design(&self, method: Method) -> Result<f64, MeshError> {
-        let service =
-            Service::typical(method, self.settings.reuse, self.typical_iterations(method), self.field);
-        Ok(self.costs(method)?.of_design(service))
+        Ok(self.costs_by(method, of_a_design)?.of_design(self.service(method)))
+    }
+
+    fn service(&self, method: Method) -> Service {
+        Service::typical(method, self.settings.reuse, self.typical_iterations(method), self.field)
     }
 
     /// Whether the preconditioner of a method stays within the settings' bytes; not where it cannot be made at all.
@@ -197,6 +197,14 @@ impl SystemAnalysis {
 
     /// Costs of a method on this pattern.
     pub(super) fn costs(&self, method: Method) -> Result<Costs, MeshError> {
+        self.costs_by(method, LdltAnalysis::multiplications)
+    }
+
+    fn costs_by(
+        &self,
+        method: Method,
+        multiplications: impl Fn(&LdltAnalysis) -> f64,
+    ) -> Result<Costs, MeshError> {
         let mut sizes = Sizes { matrix_entries: self.structure.columns.len(), ..Sizes::default() };
         match (method, &self.two_level) {
             (Method::Incomplete, _) => Ok(Costs::incomplete(&sizes)),
@@ -206,7 +214,7 @@ impl SystemAnalysis {
             _ => {
                 let complete = self.complete()?;
                 sizes.factor_entries = complete.factor_entries();
-                sizes.multiplications = complete.changing_multiplications();
+                sizes.multiplications = multiplications(&complete);
                 Ok(Costs::complete(method, &sizes))
             }
         }
@@ -238,21 +246,23 @@ impl SystemAnalysis {
         match (&self.hosts, changes) {
             (Some(hosts), _) => lifted_dissection(&self.structure, hosts, changes),
             (None, None) => ordering::dissection(&self.structure),
-            (None, Some(changes)) => ordering::dissection_kept_first(&self.structure, changes),
+            (None, Some(changes)) => kept_first(&self.structure, None, changes),
         }
     }
 
     /// The analysis of a factor that is kept in part from one matrix to the next, where that costs less.
     fn keeping(&self, usual: &LdltAnalysis) -> Option<Arc<LdltAnalysis>> {
         let rows = self.changes.as_deref()?;
-        let most_of_rims = MOST_OF_RIMS * usual.multiplications();
-        let order = self.order(Some(Changes { rows, most_of_rims }))?;
+        let max_rim_multiplications = MAX_RIM_SHARE * usual.multiplications();
+        let order = self.order(Some(Changes { rows, max_rim_multiplications }))?;
         let keeping = LdltAnalysis::keeping(&self.structure, Some(order), rows).ok()?;
-        let (all, changing) = (keeping.multiplications(), keeping.changing_multiplications());
-        let of_a_design = changing + (all - changing) / DESIGNS;
-        let is_cheaper = of_a_design <= WORTH_KEEPING * usual.multiplications();
-        let is_small = keeping.factor_entries() as f64 <= MORE_ENTRIES * usual.factor_entries() as f64;
-        (is_cheaper && is_small).then_some(keeping)
+        let is_cheaper = of_a_design(&keeping) <= WORTH_KEEPING * usual.multiplications();
+        let [more, entries] = [&*keeping, usual].map(LdltAnalysis::factor_entries);
+        let fits = |entries: usize, method| entries * entry_bytes(method) <= self.settings.factor_bytes;
+        // No method may be lost by it, nor one to fall back to.
+        let fits_as_well = Method::ALL.iter().all(|&method| fits(more, method) || !fits(entries, method));
+        let is_small = more as f64 <= MORE_ENTRIES * entries as f64;
+        (is_cheaper && is_small && fits_as_well).then_some(keeping)
     }
 
     /// Order and parts of the incomplete factor, where that is the method.
@@ -266,15 +276,31 @@ impl SystemAnalysis {
     }
 }
 
-/// Designs of a run, at least, which share what is kept.
+/// Bytes of an entry of a complete factor.
+fn entry_bytes(method: Method) -> usize {
+    match method {
+        Method::Direct => 16,
+        Method::RealFactorSingle => 4,
+        _ => 8,
+    }
+}
+
+/// Multiply-adds of a factor in a run, which makes once what is kept.
+fn of_a_design(analysis: &LdltAnalysis) -> f64 {
+    let (all, changing) = (analysis.multiplications(), analysis.changing_multiplications());
+    changing + (all - changing) / DESIGNS
+}
+
+/// Designs that a run has, about: the shipped ones have 5 to 20.
 const DESIGNS: f64 = 10.0;
 
-/// The share of the multiplications of the usual factor below which a part is kept.
+/// The share of the multiplications of the usual factor below which a part is kept: what is nearer would not earn the time back
+/// that its own analysis takes.
 const WORTH_KEEPING: f64 = 0.9;
 
 /// The share of these that the rims may take (`Changes`). In the shipped configurations parts of factors pay to a tenth, from a
 /// sixth on they do not, and to see it by an order takes as long as a factor.
-const MOST_OF_RIMS: f64 = 0.125;
+const MAX_RIM_SHARE: f64 = 0.125;
 
 /// How many times the entries a factor may have that is kept in part: every iteration reads them.
 const MORE_ENTRIES: f64 = 1.25;

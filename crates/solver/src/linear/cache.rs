@@ -40,8 +40,8 @@ impl LinearSolverCache {
         Self { method, ..Self::default() }
     }
 
-    /// A cache of what has no part in the results: the method to begin with, and what is kept of factors.
-    pub(crate) fn without_results(&self) -> Self {
+    /// A cache of the method to begin with, and of what is kept of factors, alone.
+    pub(crate) fn method_and_kept(&self) -> Self {
         Self { method: self.method, kept: self.kept.clone(), ..Self::default() }
     }
 
@@ -53,7 +53,7 @@ impl LinearSolverCache {
     /// What is left of it when the state is found: what the settings keep between designs.
     pub(super) fn between_designs(self, reuse: Reuse) -> Self {
         match reuse {
-            Reuse::Never => self.without_results(),
+            Reuse::Never => self.method_and_kept(),
             Reuse::WhileItPays => Self { is_within_a_state: false, ..self },
         }
     }
@@ -69,7 +69,7 @@ impl LinearSolverCache {
         Self {
             preconditioner: preconditioner.clone(),
             is_within_a_state: *is_within_a_state,
-            ..self.without_results()
+            ..self.method_and_kept()
         }
     }
 }

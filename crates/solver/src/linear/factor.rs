@@ -114,9 +114,10 @@ impl<T: Representation> Scaled<T> {
         kept: Option<&KeptPart>,
     ) -> Result<Self, MeshError> {
         let kept = kept.and_then(|kept| kept.downcast_ref::<Kept<T>>());
+        let kept = kept.filter(|kept| kept.panels.are_of(analysis));
         let mut scale = scaling(matrix)?;
-        if let Some(kept) = kept.filter(|kept| kept.scale.len() == scale.len()) {
-            // Powers of two round nothing: the solutions have the same bits with any of them.
+        if let Some(kept) = kept {
+            // Powers of two round nothing: solutions have the same bits with any of them, unless one leaves the range of numbers.
             let is_near = |own: f64, other: f64| (1.0 / NEAR..=NEAR).contains(&(own / other));
             for (own, &other) in scale.iter_mut().zip(&kept.scale) {
                 *own = if is_near(*own, other) { other } else { *own };
@@ -130,7 +131,8 @@ impl<T: Representation> Scaled<T> {
     }
 }
 
-/// How far the scale of a row may be from its own, so that the rows that are coupled with it stay as they were.
+/// How far the scale of a row may be from its own, so that the rows that are coupled with it stay as they were: elements at its node
+/// may shrink to a 60 000th, and single precision has 38 decades.
 const NEAR: f64 = 256.0;
 
 impl<T: Representation> Precondition for Scaled<T> {
@@ -226,4 +228,63 @@ pub(super) fn scaling(matrix: &CsrMatrix<c64>) -> Result<Vec<f64>, MeshError> {
         }
     };
     (0..n).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use fluxmorph_geometry::fem::{Changes, kept_first};
+
+    use super::*;
+
+    /// Springs between the points of a grid of `n` by `n`, those beyond half of the first axis `stiffer` times as stiff.
+    fn springs(n: usize, stiffer: f64) -> CsrMatrix<c64> {
+        let row = |v: usize| {
+            let (x, y) = (v % n, v / n);
+            let near = [
+                (y > 0, v.wrapping_sub(n)),
+                (x > 0, v.wrapping_sub(1)),
+                (x + 1 < n, v + 1),
+                (y + 1 < n, v + n),
+            ];
+            let stiffness = |other: usize| if 2 * (other % n).max(x) > n + 1 { stiffer } else { 1.0 };
+            let near: Vec<_> =
+                near.into_iter().filter(|near| near.0).map(|near| (near.1, stiffness(near.1))).collect();
+            let own = near.iter().map(|(_, k)| k).sum::<f64>() * c64::new(1.1, 0.2);
+            let mut row: Vec<_> = near.into_iter().map(|(other, k)| (other, c64::from(-k))).collect();
+            row.push((v, own));
+            row.sort_by_key(|entry| entry.0);
+            row
+        };
+        CsrMatrix::from_rows(n * n, (0..n * n).map(row))
+    }
+
+    #[test]
+    fn what_rests_is_found_though_the_rows_beside_it_have_other_scales() {
+        let n = 40;
+        let before = springs(n, 1.0);
+        let rows: Vec<bool> = (0..n * n).map(|v| 2 * (v % n) >= n).collect();
+        let changes = Changes { rows: &rows, max_rim_multiplications: 1e9 };
+        let order = kept_first(&before.structure, None, changes);
+        let analysis = LdltAnalysis::keeping(&before.structure, order, &rows).expect("a symmetric pattern");
+        let kept = Scaled::<c32>::complete(&analysis, &before, None).expect("a factor").kept();
+        let b: Vec<c64> = (0..n * n).map(|v| c64::new((v as f64).sin(), 1.0)).collect();
+        let all = Scaled::<c32>::complete(&analysis, &before, kept.as_ref())
+            .expect("a factor")
+            .factor
+            .found_panels();
+        assert!(all > 0);
+        for stiffer in [5.0, 40.0, 1e6] {
+            let after = springs(n, stiffer);
+            let own = Scaled::<c32>::complete(&analysis, &after, None).expect("a factor");
+            let found = Scaled::<c32>::complete(&analysis, &after, kept.as_ref()).expect("a factor");
+            // Beyond the bound of scales those of the rim are its own, and nothing next to it can be as it was.
+            let count = found.factor.found_panels();
+            assert_eq!(count == all, stiffer < 1e5, "{stiffer}: {count} of {all}");
+            assert_eq!(found.scale != own.scale, stiffer < 1e5, "{stiffer}");
+            let [mut x, mut y] = [vec![c64::default(); n * n], vec![c64::default(); n * n]];
+            own.apply(&b, &mut x);
+            found.apply(&b, &mut y);
+            assert_eq!(x, y, "{stiffer}");
+        }
+    }
 }

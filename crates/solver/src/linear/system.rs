@@ -74,7 +74,7 @@ pub struct LocalSystem {
     matrix: CsrMatrix<c64>,
     /// None while another is made (two at a time would take twice the memory), and where none could be.
     preconditioner: Option<Arc<Preconditioner>>,
-    /// What factors of other matrices left for one of this.
+    /// What factors of other matrices left for one of this, until there is one.
     kept: Option<KeptPart>,
     origin: Origin,
     ledger: Ledger,
@@ -102,7 +102,7 @@ impl Goal {
     pub(super) fn relaxed_to(self, tolerance: f64) -> Self {
         let Self { tolerance: usual, required } = self;
         // The true residual parts from that of the recurrence.
-        Self { tolerance: usual.max(tolerance), required: required.max(10.0 * tolerance) }
+        Self { tolerance: usual.max(tolerance), required: required.max(3.0 * tolerance) }
     }
 }
 
@@ -124,8 +124,13 @@ impl LocalSystem {
         matrix: CsrMatrix<c64>,
         cache: &mut LinearSolverCache,
     ) -> Result<Self, SolverError> {
-        let LinearSolverCache { preconditioner: cached, kept, method, solutions: before, is_within_a_state } =
-            std::mem::take(cache);
+        let LinearSolverCache {
+            preconditioner: cached,
+            mut kept,
+            method,
+            solutions: before,
+            is_within_a_state,
+        } = std::mem::take(cache);
         let reuse = is_within_a_state || analysis.settings.reuse == Reuse::WhileItPays;
         let pays = |cached: &CachedPreconditioner| {
             let may = reuse && cached.preconditioner.method.is_complete();
@@ -139,6 +144,8 @@ impl LocalSystem {
             None => {
                 let first = method.unwrap_or(analysis.method());
                 let (own, ledger) = factor(analysis, (&matrix, kept.as_ref()), first, &mut events)?;
+                // From now on its own factor has what is kept.
+                kept = None;
                 (own, Origin::Own, ledger)
             }
         };
@@ -351,6 +358,7 @@ impl LocalSystem {
         self.preconditioner = None;
         let of = (&self.matrix, self.kept.as_ref());
         let (own, ledger) = factor(&self.analysis, of, method, &mut self.events)?;
+        self.kept = None;
         self.preconditioner = Some(own);
         self.ledger = ledger;
         self.served = (0, 0);
@@ -370,6 +378,8 @@ impl LocalSystem {
         };
         let cause = format!("relative residual {residual:.1e} after {iterations} iterations");
         self.events.push(SolverEvent::FellBack { from, to, cause });
+        // Of other numbers: it would only take memory beside the next factor.
+        self.kept = None;
         self.refresh(to)
     }
 

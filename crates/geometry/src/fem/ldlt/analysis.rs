@@ -112,7 +112,7 @@ impl LdltAnalysis {
         (0..self.panels.len()).map(|p| self.panels.work(p)).sum()
     }
 
-    /// Those of one that finds what is kept.
+    /// Multiply-adds of one that takes over all panels that are kept.
     pub fn changing_multiplications(&self) -> f64 {
         (0..self.panels.len()).filter(|&p| !self.is_kept(p)).map(|p| self.panels.work(p)).sum()
     }

@@ -2,7 +2,8 @@
 //!
 //! Panel `s` with the columns `J` and rows `R ⊇ J`, from its descendants `d`:
 //! `A[R, J] − Σ_d L_d[R, :] D_d L_d[J, :]ᵀ`, in ascending order of `d`; then `L_s D_s L_sᵀ` of the square on top and
-//! `X ← X L_s⁻ᵀ D_s⁻¹` of the rows below. The rows are cut into tiles of fixed size that gather without each other.
+//! `X ← X L_s⁻ᵀ D_s⁻¹` of the rows below. The rows are cut into tiles of fixed size that gather without each other. A panel that
+//! another factor has of the same matrix entries, and of panels that it has as well, is taken over from there.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -30,12 +31,18 @@ pub type Entry<'a, T> = dyn Fn(usize, usize) -> T + Sync + 'a;
 pub struct Ldlt<T> {
     pub(super) analysis: Arc<LdltAnalysis>,
     pub(super) panels: Vec<Arc<FactoredPanel<T>>>,
+    found: usize,
 }
 
 impl<T> Ldlt<T> {
     /// Number of unknowns.
     pub fn size(&self) -> usize {
         self.analysis.size()
+    }
+
+    /// Panels that were taken over from another factor.
+    pub fn found_panels(&self) -> usize {
+        self.found
     }
 
     /// Memory of the factor [bytes], without the analysis.
@@ -66,6 +73,13 @@ pub struct KeptPanels<T> {
     pub(super) panels: Vec<Option<Arc<FactoredPanel<T>>>>,
 }
 
+impl<T> KeptPanels<T> {
+    /// Whether a factor of this analysis may have them.
+    pub fn are_of(&self, analysis: &Arc<LdltAnalysis>) -> bool {
+        Arc::ptr_eq(&self.analysis, analysis)
+    }
+}
+
 /// The work of [`Ldlt::new`].
 pub(super) fn factor<T: PanelScalar>(
     analysis: &Arc<LdltAnalysis>,
@@ -78,15 +92,19 @@ pub(super) fn factor<T: PanelScalar>(
     let factorisation = Factorisation {
         analysis,
         entry,
-        kept: kept.filter(|kept| Arc::ptr_eq(&kept.analysis, analysis)),
+        kept: kept.filter(|kept| kept.are_of(analysis)),
         panels: (0..count).map(|_| OnceLock::new()).collect(),
         workspaces: Mutex::new(Vec::new()),
     };
     factorisation.branch(&analysis.tasks)?;
-    let finished =
-        |panel: OnceLock<Finished<T>>| panel.into_inner().expect("every panel belongs to a task").panel;
-    let panels = factorisation.panels.into_iter().map(finished).collect();
-    Ok(Ldlt { analysis: Arc::clone(analysis), panels })
+    let finished = |panel: OnceLock<Finished<T>>| panel.into_inner().expect("every panel belongs to a task");
+    let mut found = 0;
+    let mut panels = Vec::with_capacity(count);
+    for Finished { panel, is_found } in factorisation.panels.into_iter().map(finished) {
+        found += usize::from(is_found);
+        panels.push(panel);
+    }
+    Ok(Ldlt { analysis: Arc::clone(analysis), panels, found })
 }
 
 /// A finished panel.

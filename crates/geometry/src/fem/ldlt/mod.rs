@@ -3,7 +3,8 @@
 //! `K + jωC` with positive semidefinite parts and a positive definite sum is complex *symmetric*, not Hermitian: its factor
 //! carries no conjugation, and needs no pivoting (docs/adr/0003). The method is left-looking and supernodal: columns with
 //! one pattern form a *panel*, a dense rectangle that gathers the updates of all panels before it and is then factored by
-//! dense kernels. Beside the factor, only one small workspace a thread is held; a multifrontal method would keep a stack of
+//! dense kernels. Beside the factor, only one small workspace a thread is held, and where
+//! panels are kept the matrix entries that they are made of; a multifrontal method would keep a stack of
 //! update matrices as large as the factor.
 //!
 //! Lives here: the number types (`scalar`) and vectors of them (`lanes`), the analysis of a pattern (`analysis`,
