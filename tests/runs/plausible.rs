@@ -114,6 +114,23 @@ fn sides_without_condition_are_listed_with_their_areas() {
 }
 
 #[test]
+fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
+    let of = |region: &str| {
+        let forces = format!("forces=[{{name=\"body\",regions=[\"{region}\"]}}]");
+        // A winding that leaves a layer of air around the tip.
+        let wide = ["coils[0].half_window=[\"95 mm\",\"95 mm\"]", "coils[0].width=\"20 mm\"", &forces];
+        let mut checked = command(&[&"check", &repository("configs/pole.toml"), &"--json"]);
+        texts(&finish(checked.args(set(&wide))).exits_with(0).json()["warnings"])
+    };
+    let air = of("observation");
+    assert!(air.contains("no force acts on the body `body`: nothing in `observation`"), "{air}");
+    let part = of("tip");
+    assert!(part.contains("`body` is joined to the iron of `iron`"), "{part}");
+    let alone = finish(&mut command(&[&"check", &repository("configs/actuator.toml"), &"--json"]));
+    assert_eq!(texts(&alone.exits_with(0).json()["warnings"]), "");
+}
+
+#[test]
 fn a_permeability_far_below_one_is_asked_about() {
     let found = check(&["materials.odd.relative_permeability=0.0025"]);
     assert!(found.contains("the material `odd` has the relative permeability 0.0025"), "{found}");

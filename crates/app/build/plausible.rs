@@ -8,7 +8,9 @@ use fluxmorph_geometry::{ElementId, Mesh, RegionId, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
-use crate::config::{Coil, CoilShape, ConductorWord, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
+use crate::config::{
+    Coil, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, RegionModel, SourceMap,
+};
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.
@@ -108,8 +110,41 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             ));
         }
     }
+    warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, body)));
     warnings.extend(unit_hint(config, mesh));
     warnings
+}
+
+/// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
+fn force_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<String> {
+    let topology = mesh.topology();
+    let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
+    let acts = |name: &String| {
+        let is_magnet = config.regions.get(name).is_some_and(|region| region.remanence.is_some());
+        let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == *name);
+        let conducts = config.alternates() && material(config, name).conductivity > 0.0;
+        is_iron(name) || is_magnet || conducts || config.coils.iter().any(is_wound)
+    };
+    let (name, regions) = (&body.name, body.regions.join("`, `"));
+    if !body.regions.iter().any(acts) {
+        return Some(format!(
+            "no force acts on the body `{name}`: nothing in `{regions}` is magnetic or carries a current, and what is computed is \
+             that on what lies beside it"
+        ));
+    }
+    let ids = |regions: &[String]| -> Vec<RegionId> {
+        regions.iter().filter(|name| is_iron(name)).filter_map(|name| topology.region(name).ok()).collect()
+    };
+    let outside = topology.region_names().iter().filter(|name| !body.regions.contains(name) && is_iron(name));
+    let joined = outside.cloned().find(|outside| {
+        let towards = ids(std::slice::from_ref(outside));
+        let own = ids(&body.regions);
+        own.iter().any(|&own| towards.iter().any(|&other| !topology.interface(own, other).is_empty()))
+    })?;
+    Some(format!(
+        "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
+         take `{joined}` into its regions, or leave air between the two"
+    ))
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.
