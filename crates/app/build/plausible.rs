@@ -132,15 +132,11 @@ fn force_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<Strin
              that on what lies beside it"
         ));
     }
-    let ids = |regions: &[String]| -> Vec<RegionId> {
-        regions.iter().filter(|name| is_iron(name)).filter_map(|name| topology.region(name).ok()).collect()
-    };
-    let outside = topology.region_names().iter().filter(|name| !body.regions.contains(name) && is_iron(name));
-    let joined = outside.cloned().find(|outside| {
-        let towards = ids(std::slice::from_ref(outside));
-        let own = ids(&body.regions);
-        own.iter().any(|&own| towards.iter().any(|&other| !topology.interface(own, other).is_empty()))
-    })?;
+    let region = |name: &&String| topology.region(name).ok().filter(|_| is_iron(name));
+    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| region(&name)).collect();
+    let touches = |other: RegionId| own.iter().any(|&own| !topology.interface(own, other).is_empty());
+    let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
+    let joined = outside.find(|name| region(name).is_some_and(touches))?;
     Some(format!(
         "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
          take `{joined}` into its regions, or leave air between the two"
