@@ -332,7 +332,7 @@ pub struct ProbeResult {
 /// The linear systems of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LinearSolverResult {
-    /// The method that each state's solutions begin with.
+    /// The method that solved each state.
     #[serde(default)]
     pub methods: Vec<String>,
     /// Largest relative residual of the states, and of adjoint problems but for those of a search.

@@ -8,6 +8,7 @@
 use fluxmorph_petsc::metis;
 
 use super::csr::CsrStructure;
+use super::strong_sets::StrongSets;
 
 /// Edges within rims above which there is no order: METIS holds them all, in some 20 bytes each.
 const MAX_RIM_EDGES: usize = 20_000_000;
@@ -48,27 +49,17 @@ pub fn kept_first(
 
 /// The changing vertices next to each connected set of others, ascending.
 fn rims(graph: &CsrStructure, changes: &[bool]) -> Vec<Vec<u32>> {
-    let mut seen = changes.to_vec();
-    let mut rims = Vec::new();
-    for first in 0..graph.row_count() as u32 {
-        if std::mem::replace(&mut seen[first as usize], true) {
-            continue;
-        }
-        let (mut rim, mut open) = (Vec::new(), vec![first]);
-        while let Some(vertex) = open.pop() {
-            for &next in &graph.columns[graph.row(vertex as usize)] {
-                if changes[next as usize] {
-                    rim.push(next);
-                } else if !std::mem::replace(&mut seen[next as usize], true) {
-                    open.push(next);
-                }
-            }
-        }
+    let stays = |vertex: u32| !changes[vertex as usize];
+    let sets = StrongSets::new(graph, |row, k| stays(row as u32) && stays(graph.columns[k]));
+    let parts = (0..sets.count()).map(|set| sets.rows(set)).filter(|part| stays(part[0]));
+    let rim = |part: &[u32]| {
+        let around = part.iter().flat_map(|&vertex| &graph.columns[graph.row(vertex as usize)]);
+        let mut rim: Vec<u32> = around.copied().filter(|&next| !stays(next)).collect();
         rim.sort_unstable();
         rim.dedup();
-        rims.push(rim);
-    }
-    rims
+        rim
+    };
+    parts.map(rim).collect()
 }
 
 /// Nested dissection of some vertices, ascending, each of the rims being coupled throughout.
@@ -87,20 +78,15 @@ fn dissection_of(
         rim.iter().for_each(|&vertex| rims_of[number[vertex as usize] as usize].push(k as u32));
     }
     let (mut row_starts, mut columns) = (vec![0u32], Vec::new());
+    let mut row: Vec<u32> = Vec::new();
     for (&old, rims_of) in vertices.iter().zip(&rims_of) {
-        let first = columns.len();
         let around = rims_of.iter().flat_map(|&k| &rims[k as usize]);
         let all = graph.columns[graph.row(old as usize)].iter().chain(around);
-        columns.extend(all.map(|&c| number[c as usize]).filter(|&c| c != u32::MAX));
-        columns[first..].sort_unstable();
-        let mut last = first;
-        for k in first + 1..columns.len() {
-            if columns[k] != columns[last] {
-                last += 1;
-                columns[last] = columns[k];
-            }
-        }
-        columns.truncate(last + 1);
+        row.clear();
+        row.extend(all.map(|&c| number[c as usize]).filter(|&c| c != u32::MAX));
+        row.sort_unstable();
+        row.dedup();
+        columns.extend_from_slice(&row);
         row_starts.push(columns.len() as u32);
     }
     let weights = weights.map(|weights| vertices.iter().map(|&old| weights[old as usize]).collect());

@@ -148,7 +148,7 @@ impl SystemAnalysis {
 
     /// Whether a part of a complete factor is kept from one matrix to the next.
     pub fn keeps_a_part(&self) -> bool {
-        self.complete().is_ok_and(|own| own.changing_multiplications() < own.multiplications())
+        self.complete().is_ok_and(|own| own.keeps_a_part())
     }
 
     /// The cheapest factor that fits, and its cost.

@@ -117,6 +117,11 @@ impl LdltAnalysis {
         (0..self.panels.len()).filter(|&p| !self.is_kept(p)).map(|p| self.panels.work(p)).sum()
     }
 
+    /// Whether some panel is the same for every matrix.
+    pub fn keeps_a_part(&self) -> bool {
+        self.kept.contains(&true)
+    }
+
     /// Whether a panel is the same for every matrix.
     pub(super) fn is_kept(&self, p: usize) -> bool {
         self.kept.get(p).is_some_and(|&kept| kept)

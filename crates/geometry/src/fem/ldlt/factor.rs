@@ -31,18 +31,12 @@ pub type Entry<'a, T> = dyn Fn(usize, usize) -> T + Sync + 'a;
 pub struct Ldlt<T> {
     pub(super) analysis: Arc<LdltAnalysis>,
     pub(super) panels: Vec<Arc<FactoredPanel<T>>>,
-    found: usize,
 }
 
 impl<T> Ldlt<T> {
     /// Number of unknowns.
     pub fn size(&self) -> usize {
         self.analysis.size()
-    }
-
-    /// Panels that were taken over from another factor.
-    pub fn found_panels(&self) -> usize {
-        self.found
     }
 
     /// Memory of the factor [bytes], without the analysis.
@@ -58,11 +52,10 @@ impl<T> Ldlt<T> {
 
     /// What the factor of another matrix may begin with: the panels that the analysis says are kept, if it has some.
     pub fn kept(&self) -> Option<KeptPanels<T>> {
-        let of =
-            |(p, panel): (usize, &Arc<FactoredPanel<T>>)| self.analysis.is_kept(p).then(|| Arc::clone(panel));
-        let panels: Vec<_> = self.panels.iter().enumerate().map(of).collect();
-        let analysis = Arc::clone(&self.analysis);
-        panels.iter().any(Option::is_some).then_some(KeptPanels { analysis, panels })
+        let analysis = &self.analysis;
+        let of = |p: usize| analysis.is_kept(p).then(|| Arc::clone(&self.panels[p]));
+        let panels = || (0..self.panels.len()).map(of).collect();
+        analysis.keeps_a_part().then(|| KeptPanels { analysis: Arc::clone(analysis), panels: panels() })
     }
 }
 
@@ -77,6 +70,14 @@ impl<T> KeptPanels<T> {
     /// Whether a factor of this analysis may have them.
     pub fn are_of(&self, analysis: &Arc<LdltAnalysis>) -> bool {
         Arc::ptr_eq(&self.analysis, analysis)
+    }
+
+    /// How many of them a factor has.
+    pub fn found_in(&self, factor: &Ldlt<T>) -> usize {
+        let is_found = |(kept, own): &(&Option<Arc<_>>, &Arc<_>)| {
+            kept.as_ref().is_some_and(|kept| Arc::ptr_eq(kept, own))
+        };
+        self.panels.iter().zip(&factor.panels).filter(is_found).count()
     }
 }
 
@@ -97,14 +98,10 @@ pub(super) fn factor<T: PanelScalar>(
         workspaces: Mutex::new(Vec::new()),
     };
     factorisation.branch(&analysis.tasks)?;
-    let finished = |panel: OnceLock<Finished<T>>| panel.into_inner().expect("every panel belongs to a task");
-    let mut found = 0;
-    let mut panels = Vec::with_capacity(count);
-    for Finished { panel, is_found } in factorisation.panels.into_iter().map(finished) {
-        found += usize::from(is_found);
-        panels.push(panel);
-    }
-    Ok(Ldlt { analysis: Arc::clone(analysis), panels, found })
+    let finished =
+        |panel: OnceLock<Finished<T>>| panel.into_inner().expect("every panel belongs to a task").panel;
+    let panels = factorisation.panels.into_iter().map(finished).collect();
+    Ok(Ldlt { analysis: Arc::clone(analysis), panels })
 }
 
 /// A finished panel.

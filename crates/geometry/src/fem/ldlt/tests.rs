@@ -364,7 +364,7 @@ fn keeping<T: Entry>() {
             assert_eq!(own.entries, found.entries, "panel {p}");
             assert_eq!(own.inverse_pivots, found.inverse_pivots, "panel {p}");
         }
-        found.found_panels()
+        kept.found_in(&found)
     };
     let of_analysis = (0..before.panels.len()).filter(|&p| analysis.is_kept(p)).count();
     assert_eq!(found_of(&|row| changes[row]), of_analysis);
