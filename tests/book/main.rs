@@ -23,21 +23,21 @@ mod runner;
 mod support;
 
 use page::Page;
-use runner::{Extent, run_page};
+use rayon::prelude::*;
+use runner::{Extent, Outcome, run_page};
 use support::repository;
 
+/// Runs the blocks of all pages, several pages at a time.
 fn run_pages(extent: Extent) {
-    let mut faults = Vec::new();
-    let mut run = 0;
-    for page in Page::all() {
-        let outcome = run_page(&page, extent);
-        run += outcome.run;
+    let pages = Page::all();
+    let outcomes: Vec<Outcome> = pages.par_iter().map(|page| run_page(page, extent)).collect();
+    for (page, outcome) in pages.iter().zip(&outcomes) {
         if outcome.run + outcome.left_out > 0 {
             println!("{}: {} commands run, {} left out", page.path, outcome.run, outcome.left_out);
         }
-        faults.extend(outcome.faults);
     }
-    println!("{run} commands run");
+    println!("{} commands run", outcomes.iter().map(|outcome| outcome.run).sum::<usize>());
+    let faults: Vec<String> = outcomes.into_iter().flat_map(|outcome| outcome.faults).collect();
     assert!(faults.is_empty(), "{} faults:\n\n{}", faults.len(), faults.join("\n\n"));
 }
 

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command as Process, Stdio};
+use std::sync::OnceLock;
 
 use tempfile::TempDir;
 
@@ -86,8 +87,14 @@ fn exists(program: &str) -> bool {
     std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
 }
 
-/// A Python with what `examples/python` needs, installed once below the target directory.
-fn python() -> Option<PathBuf> {
+/// A Python with what `examples/python` needs.
+fn python() -> Option<&'static PathBuf> {
+    static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
+    PYTHON.get_or_init(installed_python).as_ref()
+}
+
+/// It installed below the target directory, unless it is there.
+fn installed_python() -> Option<PathBuf> {
     let environment = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book-python");
     let python = environment.join("bin/python");
     let works = |command: &mut Process| command.output().is_ok_and(|output| output.status.success());

@@ -8,7 +8,7 @@ use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use fluxmorph::run::finer::{Cut, FinerProblem};
 use fluxmorph_geometry::Mesh;
-use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
+use fluxmorph_optimizer::problem::{Derivatives, EnrichedModels, NoProgress, SolverCache};
 use fluxmorph_solver::enrichment::Effort;
 
 use crate::support::device::{BLOCK, SATURATED, written};
@@ -51,7 +51,8 @@ impl Device {
         let moved = problem.moved(&initial).map_err(|e| said(&e))?;
         let (cache, mut none) = (&mut SolverCache::default(), NoProgress);
         let analysis = problem.analyse(moved, Derivatives::None, cache, &mut none).map_err(|e| said(&e))?;
-        let estimate = problem.estimate_error(&analysis, Effort::Any).map_err(|e| said(&e))?;
+        let models = &mut EnrichedModels::new(Effort::Any);
+        let estimate = problem.estimate_error(&analysis, models).map_err(|e| said(&e))?;
         let value = analysis.objective.expect("an objective");
         Ok((value, estimate.objective, [setup.full_mesh.clone(), analysis.mesh]))
     }

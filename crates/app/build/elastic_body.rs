@@ -172,17 +172,18 @@ pub(super) fn motion_law(
     Err(source.error(vec![fault]).into())
 }
 
-/// Keys of `[remesh]` that only the linear law knows.
-const LINEAR_ONLY: [&str; 2] = ["poisson", "motion"];
-
-/// What is said where keys are written that the law has no use for.
+/// What is said where the law has no use for keys of `[remesh]` that only the linear one knows; their defaults say nothing.
 pub(super) fn unused_keys(source: &SourceMap, remesh: &Remesh, law: MotionLaw) -> Option<String> {
     let name = match law {
         MotionLaw::Linear => return None,
         MotionLaw::Rails(_) => config::MotionLaw::Rails.name(),
         MotionLaw::Hyperelastic => config::MotionLaw::Hyperelastic.name(),
     };
-    let own = LINEAR_ONLY.iter().map(|key| format!("remesh.{key}"));
+    let own = [
+        ("remesh.poisson", remesh.poisson != config::DEFAULT_POISSON),
+        ("remesh.motion", remesh.motion != config::Motion::Free),
+    ];
+    let own = own.into_iter().filter(|(_, says_something)| *says_something).map(|(path, _)| path.to_owned());
     let of_parts = (0..remesh.subregions.len()).map(|i| format!("remesh.subregions[{i}].poisson"));
     let written: Vec<String> = own.chain(of_parts).filter(|path| source.is_written(path)).collect();
     (!written.is_empty()).then(|| {

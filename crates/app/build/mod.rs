@@ -121,13 +121,17 @@ pub fn set_up_watched(
         config.optimisation(source)?;
     }
     progress.stage(Stage::Mesh);
-    mesh::build(config, source)
+    let mut setup = mesh::build(config, source)
         .and_then(|built| problem_on(built, config, source, mode, group, progress))
-        .map_err(|error| locate_error::attribute_error(error, config, source))
+        .map_err(|error| locate_error::attribute_error(error, config, source))?;
+    let at_bounds =
+        skin::bound_warnings(config, &setup.audits, &setup.problem, setup.designed_body.as_deref());
+    setup.warnings.extend(at_bounds);
+    Ok(setup)
 }
 
 /// Sets up the problem of a configuration on a mesh that is not its own, but has its regions and surfaces; with the design
-/// surface where that comes from a coarser mesh.
+/// surface where that comes from a coarser mesh. What its bounds allow has been warned of.
 pub(crate) fn set_up_on(
     mesh: (Mesh, Option<DesignSurface>),
     config: &Config,
@@ -223,7 +227,6 @@ fn problem_on(
     let bodies = functional::bodies(config, &mesh, &states)?;
     let problem =
         Problem::new(mesh, states, objective, constraints, shape).shared_out(share).with_bodies(bodies);
-    warnings.extend(skin::bound_warnings(config, &audits, &problem, designed_body.as_deref()));
     let tables = curves.into_files();
     Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body, tables })
 }

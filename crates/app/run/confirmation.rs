@@ -8,11 +8,10 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
-use fluxmorph_remesh::Moved;
+use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate};
 
 use super::Session;
-use super::estimate::{estimate, left_out};
+use super::estimate::Estimator;
 use super::facets::described;
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
@@ -34,41 +33,35 @@ pub struct ShapeMeshes {
 }
 
 impl Session<'_> {
-    /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
-    pub(super) fn estimate_error(
-        &self,
-        analysis: &Analysis,
-        observer: &mut dyn Observer,
-    ) -> Option<ErrorEstimate> {
-        estimate((self.config, self.source), &self.setup, analysis, observer)
+    /// Estimates the errors of analyses of this run's problem.
+    pub(super) fn estimator(&self) -> Estimator<'_> {
+        Estimator::new((self.config, self.source), &self.setup)
     }
 
-    /// The estimated errors at the initial and the best design of a run; `at_best` where that is known.
+    /// Whether errors are estimated when the search of a run is over.
+    pub(super) fn is_estimated(&self, stop_reason: StopReason) -> bool {
+        let is_wanted =
+            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
+        is_wanted && !self.is_cut_short(stop_reason)
+    }
+
+    /// The estimated errors at the initial and the best design of a run, of which the last is `at_best` where that is known.
     pub(super) fn estimate_errors(
         &self,
-        initial: Moved,
+        initial: Option<&Analysis>,
         (best, stop_reason): (&Best, StopReason),
         at_best: Option<ErrorEstimate>,
         observer: &mut dyn Observer,
     ) -> Option<[ErrorEstimate; 2]> {
-        let is_wanted =
-            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
-        if self.is_cut_short(stop_reason) || !is_wanted {
+        if !self.is_estimated(stop_reason) {
             return None;
         }
-        let best = &best.analysis;
-        let at_best = at_best.or_else(|| self.estimate_error(best, observer))?;
+        let (initial, best, mut estimator) = (initial?, &best.analysis, self.estimator());
+        let at_best = at_best.or_else(|| estimator.estimate(best, observer))?;
         if best.mesh.points() == initial.mesh.points() {
             return Some([at_best.clone(), at_best]);
         }
-        let problem = &self.setup.problem;
-        let cache = &mut SolverCache::default();
-        // It was solved when the search began: what fails now costs the estimate, not the run.
-        let first = match problem.analyse(initial, Derivatives::None, cache, &mut NoProgress) {
-            Ok(first) => first,
-            Err(error) => return left_out(error, observer),
-        };
-        Some([self.estimate_error(&first, observer)?, at_best])
+        Some([estimator.estimate(initial, observer)?, at_best])
     }
 }
 

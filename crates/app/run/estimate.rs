@@ -7,7 +7,7 @@
 
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::memory_estimate::Sizes;
-use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Problem, SolverCache};
 use fluxmorph_solver::SolverError;
 use fluxmorph_solver::enrichment::Effort;
 
@@ -50,37 +50,70 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
     })
 }
 
-/// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
-pub(crate) fn estimate(
-    (config, source): (&Config, &SourceMap),
-    setup: &Setup,
-    analysis: &Analysis,
-    observer: &mut dyn Observer,
-) -> Option<ErrorEstimate> {
-    let problem = &setup.problem;
-    let is_second_order = config.analysis.order == ElementOrder::Quadratic;
-    if let Some(shortage) = memory_limit::shortage(memory(config, problem)?) {
-        observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
-        return None;
+/// Estimates the errors of analyses of one problem; what does not depend on the design is set up once.
+pub(crate) struct Estimator<'a> {
+    config: &'a Config,
+    source: &'a SourceMap,
+    setup: &'a Setup,
+    effort: Effort,
+    /// Of first order: the models of second order.
+    models: EnrichedModels,
+    /// Of second order: the problem on halved edges, once it was asked for.
+    finer: Option<FinerProblem>,
+}
+
+impl<'a> Estimator<'a> {
+    /// That of a configuration and what was set up of it.
+    pub(crate) fn new((config, source): (&'a Config, &'a SourceMap), setup: &'a Setup) -> Self {
+        let effort = if is_asked_for(config) { Effort::Any } else { Effort::Affordable };
+        Self { config, source, setup, effort, models: EnrichedModels::new(effort), finer: None }
     }
-    observer.phase("estimating the error of the mesh");
-    let effort = if is_asked_for(config) { Effort::Any } else { Effort::Affordable };
-    let estimated = if is_second_order {
-        on_halved_edges((config, source), setup, analysis)
-    } else {
-        problem.estimate_error(analysis, effort).map_err(Error::from)
-    };
-    match estimated {
-        Ok(estimate) => Some(estimate),
-        Err(Error::Optimizer(OptimizerError::Solver(SolverError::NotConverged { .. })))
-            if effort == Effort::Affordable =>
-        {
-            left_out(
-                "that would take iterations worth more than three evaluations; accuracy.estimate = true has the time",
-                observer,
-            )
+
+    /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
+    pub(crate) fn estimate(
+        &mut self,
+        analysis: &Analysis,
+        observer: &mut dyn Observer,
+    ) -> Option<ErrorEstimate> {
+        let problem = &self.setup.problem;
+        if let Some(shortage) = memory_limit::shortage(memory(self.config, problem)?) {
+            observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
+            return None;
         }
-        Err(error) => left_out(error, observer),
+        observer.phase("estimating the error of the mesh");
+        let estimated = if self.config.analysis.order == ElementOrder::Quadratic {
+            self.on_halved_edges(analysis)
+        } else {
+            problem.estimate_error(analysis, &mut self.models).map_err(Error::from)
+        };
+        match estimated {
+            Ok(estimate) => Some(estimate),
+            Err(Error::Optimizer(OptimizerError::Solver(SolverError::NotConverged { .. })))
+                if self.effort == Effort::Affordable =>
+            {
+                left_out(
+                    "that would take iterations worth more than three evaluations; accuracy.estimate = true has the time",
+                    observer,
+                )
+            }
+            Err(error) => left_out(error, observer),
+        }
+    }
+
+    /// Of second order, without the places where the error is made.
+    fn on_halved_edges(&mut self, analysis: &Analysis) -> Result<ErrorEstimate, Error> {
+        let finer = match self.finer.take() {
+            Some(finer) => finer,
+            None => FinerProblem::new(self.config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?,
+        };
+        let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
+        let [fine, coarse] = [&found, analysis].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
+        Ok(ErrorEstimate {
+            objective: OF_HALVED_EDGES * (fine - coarse),
+            constraints: Vec::new(),
+            by_element: Vec::new(),
+            iterations: found.linear_iterations,
+        })
     }
 }
 
@@ -88,21 +121,4 @@ pub(crate) fn estimate(
 pub(super) fn left_out<T>(reason: impl std::fmt::Display, observer: &mut dyn Observer) -> Option<T> {
     observer.notice(&format!("the error of the mesh is not estimated: {reason}"));
     None
-}
-
-/// Of second order, without the places where the error is made.
-fn on_halved_edges(
-    (config, source): (&Config, &SourceMap),
-    setup: &Setup,
-    analysis: &Analysis,
-) -> Result<ErrorEstimate, Error> {
-    let finer = FinerProblem::new(config, source, &setup.full_mesh, Cut::Halvings(1))?;
-    let found = finer.analyse(&analysis.mesh, &mut SolverCache::default())?;
-    let [fine, coarse] = [&found, analysis].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
-    Ok(ErrorEstimate {
-        objective: OF_HALVED_EDGES * (fine - coarse),
-        constraints: Vec::new(),
-        by_element: Vec::new(),
-        iterations: found.linear_iterations,
-    })
 }

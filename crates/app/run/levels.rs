@@ -170,7 +170,7 @@ impl Session<'_> {
             let problem = &self.setup.problem;
             let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
             let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
-            let Some(estimate) = self.estimate_error(&analysis, observer) else {
+            let Some(estimate) = self.estimator().estimate(&analysis, observer) else {
                 observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
                 return Ok(());
             };
@@ -205,7 +205,7 @@ impl Session<'_> {
             return Ok((true, None));
         }
         let analysis = &optimised.best.analysis;
-        let Some(estimate) = self.estimate_error(analysis, observer) else { return Ok((false, None)) };
+        let Some(estimate) = self.estimator().estimate(analysis, observer) else { return Ok((false, None)) };
         let scale = optimised.initial.abs().max(optimised.best.objective.abs());
         let of_best = (analysis, &estimate, scale);
         let is_refined = self.refine(levels, optimised.evaluations, of_best, observer)?;

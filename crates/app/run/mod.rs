@@ -195,7 +195,9 @@ impl Session<'_> {
         let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
-        let initial = self.initial_states(first.clone(), optimised.stop_reason, observer)?;
+        let reason = optimised.stop_reason;
+        let first = self.initial_analysis(first, (best, reason), observer)?;
+        let initial = self.initial_states(first.as_ref(), reason, observer)?;
         let problem = &self.setup.problem;
         let mut result = RunResult {
             evaluations: optimised.evaluations,
@@ -215,7 +217,7 @@ impl Session<'_> {
             constraints: constraints(problem, &best.analysis, &optimised.bounds),
             linear_solver: linear_solver(problem, &best.analysis, optimised.worst_residual),
             ..self.result(
-                optimised.stop_reason,
+                reason,
                 &best.analysis,
                 Some(&best.values),
                 optimised.initial_quality,
@@ -224,14 +226,14 @@ impl Session<'_> {
             )?
         };
         self.keep_search(&mut result, observer)?;
-        let errors = self.estimate_errors(first, (best, optimised.stop_reason), at_best, observer);
+        let errors = self.estimate_errors(first.as_ref(), (best, reason), at_best, observer);
         if let Some([_, at_best]) = &errors {
             recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved };
-        drop(optimised);
+        drop((optimised, first));
         // The ranks' part of the problem goes with it.
         drop(recorder);
         self.confirm(result, (&shapes, &meshes), (errors, refinements.as_ref()), observer)

@@ -83,7 +83,7 @@ impl Session<'_> {
             observer.notice(&event.to_string());
         }
         let bounds = problem.bounds(p, analysis)?;
-        let estimate = self.estimate_error(analysis, observer);
+        let estimate = self.estimator().estimate(analysis, observer);
         if config.output.fields != FieldsKept::Nothing {
             let error = estimate.as_ref().map(|estimate| estimate.by_element.as_slice());
             let error = error.filter(|by_element| !by_element.is_empty());

@@ -16,7 +16,7 @@ pub fn millimetres([x, y, z]: [f64; 3]) -> String {
 #[allow(missing_docs, reason = "the message of a variant says what its fields are")]
 pub enum MeshError {
     /// A node has a coordinate that is not a number or not finite.
-    #[error("node {node} lies at {point:?}: every coordinate must be finite")]
+    #[error("node {node} lies at {point:?} m: every coordinate must be finite")]
     NotFinite {
         node: NodeId,
         /// Its coordinates [m].
@@ -24,8 +24,9 @@ pub enum MeshError {
     },
     /// A tetrahedron has no or negative volume.
     #[error(
-        "element {element} at {centroid:?} m has the volume {volume:e} m³: it is flat or inverted, and must be \
-         positive"
+        "element {element} at {} has the volume {:.3e} mm³: it is flat or inverted, and must be positive",
+        millimetres(*centroid),
+        volume * 1e9
     )]
     Inverted {
         element: ElementId,

@@ -8,7 +8,7 @@ use crate::build::{Mode, set_up};
 use crate::config::{Accuracy, Config, SourceMap};
 use crate::error::Error;
 use crate::files::relative_bar;
-use crate::run::estimate::estimate;
+use crate::run::estimate::Estimator;
 use crate::show::Observer;
 
 /// An objective with its error bar.
@@ -59,7 +59,7 @@ pub(super) fn of_initial_design(
     let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
     let analysis = setup.problem.analyse(moved, Derivatives::None, cache, stages)?;
     let mut listening = Listening { observer, notices: Vec::new() };
-    let estimated = estimate((&config, source), &setup, &analysis, &mut listening);
+    let estimated = Estimator::new((&config, source), &setup).estimate(&analysis, &mut listening);
     let mut notices = listening.notices;
     if analysis.objective.is_none() {
         notices.push("there is no [objective] whose error could be estimated".to_owned());

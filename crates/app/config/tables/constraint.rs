@@ -42,7 +42,7 @@ table! {
     /// ```
     pub struct Constraint {
         /// What the constraint is called in the results, a column of the history: letters, digits, `_` and `-`; each name once.
-        /// Default: its kind and region, such as `loss_plate`.
+        /// Default: its kind and region, with its frequency and load where it has them, such as `loss_plate_60Hz`.
         name: String = COLUMN, else String::new();
         /// What is kept within what.
         #[serde(flatten)]
@@ -225,14 +225,18 @@ impl Constraint {
         if !self.name.is_empty() {
             return;
         }
-        let of = match &self.limit {
+        let mut words = vec![kind.name().to_owned()];
+        match &self.limit {
             Limit::Field { functional, .. } => {
-                functional.coils.as_ref().map(|coils| coils.join("_")).or_else(|| functional.region.clone())
+                let of_coils = functional.coils.as_ref().map(|coils| coils.join("_"));
+                words.extend(of_coils.or_else(|| functional.region.clone()));
+                words.extend(functional.frequency.map(|frequency| format!("{frequency}Hz")));
+                words.extend(functional.load.clone());
             }
-            Limit::Body { region, .. } => Some(region.clone()),
-            Limit::Thickness { .. } => None,
-        };
-        self.name = Column::of(&of.map_or(kind.name().to_owned(), |of| format!("{}_{of}", kind.name())));
+            Limit::Body { region, .. } => words.push(region.clone()),
+            Limit::Thickness { .. } => {}
+        }
+        self.name = Column::of(&words.join("_"));
     }
 }
 

@@ -59,4 +59,4 @@ pub use open::Open;
 pub use optimizer::{Algorithm, MOST_EVALUATIONS, Optimizer};
 pub use output::{FieldsKept, Output};
 pub use petsc::{Petsc, PetscKrylov, PetscSolver, PetscSubSolver};
-pub use remesh::{Motion, MotionLaw, Remesh, RemeshExtent, StiffnessLaw, Subregion};
+pub use remesh::{DEFAULT_POISSON, Motion, MotionLaw, Remesh, RemeshExtent, StiffnessLaw, Subregion};

@@ -12,6 +12,9 @@ use crate::config::value::range::Range;
 /// Poisson's ratio of a stable body.
 pub(super) const POISSON: Range = Range::open(-1.0, 0.5);
 
+/// The paper's.
+pub const DEFAULT_POISSON: f64 = 0.3;
+
 table! {
     /// The fictitious elastic body that carries the motion of the design into the mesh (Eq. 3). Either `region` or `box` says
     /// which part of the mesh moves.
@@ -31,7 +34,7 @@ table! {
         /// `"hyperelastic"` where they do not, `"linear"` where a `force` acts; for `[morph]` `"linear"`.
         law: Option<MotionLaw> = WORD;
         /// Poisson's ratio of the body, with the law `"linear"`. The default is the paper's.
-        poisson: f64 = number(POISSON) => 0.3;
+        poisson: f64 = number(POISSON) => DEFAULT_POISSON;
         /// Young's modulus of the body, before `stiffness` weights it. Without forces its unit cancels.
         young: f64 = number(POSITIVE) => 1.0;
         /// Fictitious force on every node that is free to move, in units of `young` times square metres.

@@ -21,7 +21,7 @@ pub enum Situation {
     Hole,
 }
 
-/// Outer faces without condition that follow each other smoothly.
+/// Outer faces without condition that follow each other smoothly, or make the wall of one hole.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenPatch {
     /// Where it lies.
@@ -56,8 +56,11 @@ pub fn open_patches(hull: &Hull<'_>, has_condition: &[bool]) -> Vec<OpenPatch> {
     for ridge in hull.ridges() {
         let turn = turn(hull, &ridge);
         let open = ridge.faces.map(|face| !has_condition[face]);
+        // The wall of a hole is one, whatever its edges.
+        let is_hole = ridge.faces.iter().all(|&face| situations[face] == Situation::Hole);
         match (turn.abs() < SMOOTH, open) {
             (true, [true, true]) => sides.join(ridge.faces),
+            (false, [true, true]) if is_hole => sides.join(ridge.faces),
             (true, [false, false]) => {}
             (true, _) => raise(&mut situations, &ridge, Situation::BesideCondition),
             (false, _) if turn < 0.0 => raise(&mut situations, &ridge, Situation::Inward),

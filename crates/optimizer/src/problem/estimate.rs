@@ -2,8 +2,8 @@
 //!
 //! What one state contributes, and the equations, are in [`fluxmorph_solver::enrichment`].
 
-use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
 use fluxmorph_solver::{FieldModel, FunctionalValue};
 
@@ -22,6 +22,31 @@ pub struct ErrorEstimate {
     pub by_element: Vec<f64>,
     /// Iterations of all corrections.
     pub iterations: usize,
+}
+
+/// The models of one order more that estimates at several designs share: those of the undeformed mesh, as a problem's own are.
+#[derive(Debug)]
+pub struct EnrichedModels {
+    effort: Effort,
+    /// One in statics, one above 0 Hz: the others share what is large of these.
+    known: [Option<FieldModel>; 2],
+}
+
+impl EnrichedModels {
+    /// None yet, for estimates with so much effort.
+    pub fn new(effort: Effort) -> Self {
+        Self { effort, known: [None, None] }
+    }
+
+    /// That of a state of a problem with this undeformed mesh.
+    fn of_state(&mut self, coarse: &FieldModel, original: &Mesh) -> Result<FieldModel, Error> {
+        let known = &mut self.known[usize::from(coarse.angular_frequency() > 0.0)];
+        let model = match known {
+            Some(model) => model.at_load_case(original, &coarse.load_case())?,
+            None => coarse.enriched(original, self.effort)?,
+        };
+        Ok(known.insert(model).clone())
+    }
 }
 
 /// Share of the error that is left of a marked element's after its edges are halved: a quarter with first order, whose
@@ -55,28 +80,25 @@ impl ErrorEstimate {
 }
 
 impl Problem {
-    /// The errors of an analysed design's values, with so much effort.
+    /// The errors of an analysed design's values; `models` are those of this problem, as far as they are made.
     ///
     /// # Errors
     /// [`fluxmorph_solver::SolverError::Parameter`] for second order and for several ranks; what a linear solver fails with.
-    pub fn estimate_error(&self, analysis: &Analysis, effort: Effort) -> Result<ErrorEstimate, Error> {
+    pub fn estimate_error(
+        &self,
+        analysis: &Analysis,
+        models: &mut EnrichedModels,
+    ) -> Result<ErrorEstimate, Error> {
         let mut estimate = ErrorEstimate {
             objective: 0.0,
             constraints: self.field_constraints().map(|(k, _)| (k, 0.0)).collect(),
             by_element: vec![0.0; analysis.mesh.topology().tets().len()],
             iterations: 0,
         };
-        // One in statics, one above 0 Hz: the others share what is large of these.
-        let mut known: [Option<FieldModel>; 2] = [None, None];
         let mut before: Option<Enrichment> = None;
         for index in self.matrices().concat() {
             let coarse = &self.states()[index];
-            let known = &mut known[usize::from(coarse.angular_frequency() > 0.0)];
-            let fine = match known {
-                Some(model) => model.at_load_case(&analysis.mesh, &coarse.load_case())?,
-                None => coarse.enriched(&analysis.mesh, effort)?,
-            };
-            *known = Some(fine.clone());
+            let fine = models.of_state(coarse, self.original())?;
             // Of one frequency the factor too.
             let shared = before.take().filter(|before| before.model().shares_matrix_with(&fine));
             let solution = &analysis.solutions[index];

@@ -6,7 +6,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_remesh::Moved;
-use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent};
+use fluxmorph_solver::linear::{LinearSolverCache, Method, PreparedSystem, SolverEvent, SystemAnalysis};
 use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
@@ -280,6 +280,20 @@ impl Problem {
             }
         }
         matrices
+    }
+
+    /// A cache that begins with the methods that an analysis of this problem ended with, where the first choice had failed.
+    pub fn cache_after(&self, analysis: &Analysis) -> SolverCache {
+        let of_matrix = |members: &Vec<usize>| {
+            let first_choice = self.states[members[0]].linear_solver().map(SystemAnalysis::method);
+            let method = analysis.methods[members[0]];
+            method.filter(|_| method != first_choice)
+        };
+        let methods: Vec<_> = self.matrices().iter().map(of_matrix).collect();
+        match methods.iter().all(Option::is_none) {
+            true => SolverCache::default(),
+            false => SolverCache::with_methods(&methods),
+        }
     }
 
     /// Counted work of the fields of a design with their adjoints [ns]: multiplications and bytes, no clock. 0 on several ranks.

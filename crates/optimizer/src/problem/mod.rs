@@ -32,7 +32,7 @@ use crate::objective::WeightedSum;
 
 pub use analysis::{Analysis, Measured, Timings};
 pub use cut::Cut;
-pub use estimate::ErrorEstimate;
+pub use estimate::{EnrichedModels, ErrorEstimate};
 pub use evaluate::{Derivatives, SEARCH_ADJOINT_TOLERANCE};
 pub use progress::{NoProgress, Progress, Stage};
 pub use shape::{Shape, between};

@@ -94,7 +94,7 @@ impl SystemAnalysis {
     /// The cheapest method that fits; without a factor or two levels, the incomplete factor.
     fn cheapest(&mut self, pattern: &SystemPattern<'_>) -> Result<Method, SolverError> {
         let unknowns = pattern.structure.row_count();
-        let is_large = unknowns >= factors_up_to(self.elements);
+        let is_large = unknowns >= factors_up_to(self.field, self.elements);
         let mut factor = if is_large { None } else { self.cheapest_factor()? };
         if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.field, self.elements)) {
             return Ok(method);
@@ -317,11 +317,13 @@ fn two_levels(
 
 /// Unknowns from which a factor is not looked at where two levels fit: its symbolic part alone takes seconds, and its memory is
 /// twice that of two levels and more.
-const fn factors_up_to(elements: (ElementFamily, Order)) -> usize {
-    match elements {
-        (_, Order::Linear) => 200_000,
-        (ElementFamily::Nodal, Order::Quadratic) => 400_000,
-        (ElementFamily::Edge, Order::Quadratic) => usize::MAX,
+const fn factors_up_to(field: FieldKind, elements: (ElementFamily, Order)) -> usize {
+    match (field, elements) {
+        // Two levels are as cheap behind an impedance surface, and cost a third with a meshed plate.
+        (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) => 100_000,
+        (_, (_, Order::Linear)) => 200_000,
+        (_, (ElementFamily::Nodal, Order::Quadratic)) => 400_000,
+        (_, (ElementFamily::Edge, Order::Quadratic)) => usize::MAX,
     }
 }
 

@@ -3,6 +3,8 @@
 use std::borrow::Cow;
 use std::fmt;
 
+use crate::error::millimetres;
+
 /// Where in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Place {
@@ -178,7 +180,9 @@ pub enum MshFault {
     NotFinite { value: f64 },
     /// A tetrahedron has no volume.
     #[error(
-        "the tetrahedron at {centroid:?} m is flat: its volume of {volume:e} m³ is nothing but rounding; repair the mesh"
+        "the tetrahedron at {} is flat: its volume of {:.3e} mm³ is nothing but rounding; repair the mesh",
+        millimetres(*centroid),
+        volume * 1e9
     )]
     Flat {
         /// Its signed volume [m³].
@@ -204,9 +208,9 @@ pub enum MshFault {
     Overlap { face: [u64; 3] },
     /// Two tetrahedra lie on the same side of a common face.
     #[error(
-        "it lies on the same side of a common face as element {other}, in `{}` and `{}`, at {centroid:?} m: the mesh is folded, \
+        "it lies on the same side of a common face as element {other}, in `{}` and `{}`, at {}: the mesh is folded, \
          as where a node was moved through a face, extruded layers cross, or a volume was meshed twice; mesh the geometry again",
-        regions[0], regions[1]
+        regions[0], regions[1], millimetres(*centroid)
     )]
     Folded {
         other: u64,
