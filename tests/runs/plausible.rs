@@ -131,6 +131,34 @@ fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
 }
 
 #[test]
+fn a_current_along_a_wall_that_mirrors_it_reversed_is_asked_about() {
+    let with = |walls: &str| {
+        let walls = format!("boundaries.flux_parallel={walls}");
+        let mut checked = command(&[&"check", &repository("configs/busbar.toml"), &"--json"]);
+        texts(&finish(checked.args(set(&[&walls]))).exits_with(0).json()["warnings"])
+    };
+    // The current crosses its terminals; y_min cuts the bar in two halves of its length.
+    assert_eq!(with("[\"z_min\", \"z_max\", \"x_min\", \"x_max\", \"y_max\"]"), "");
+    let cut = with("[\"z_min\", \"z_max\", \"x_min\", \"x_max\", \"y_min\", \"y_max\"]");
+    assert!(cut.contains("the current of the coil `bar` runs along `y_min`"), "{cut}");
+}
+
+#[test]
+fn the_resolved_configuration_of_a_run_is_not_warned_of() {
+    let home = folder();
+    let out = home.path().join("out");
+    let out_text = out.to_str().expect("UTF-8");
+    finish(command(&[&"solve", &quick()]).args(["--out", out_text])).exits_with(0);
+    let checked = |more: &[&str]| {
+        let mut checked = command(&[&"check", &out.join("resolved.toml"), &"--json"]);
+        texts(&finish(checked.args(set(more))).exits_with(0).json()["warnings"])
+    };
+    // It has every default, which says nothing; another number does.
+    assert!(!checked(&[]).contains("no effect"), "{}", checked(&[]));
+    assert!(checked(&["remesh.poisson=0.2"]).contains("remesh.poisson has no effect"));
+}
+
+#[test]
 fn a_permeability_far_below_one_is_asked_about() {
     let found = check(&["materials.odd.relative_permeability=0.0025"]);
     assert!(found.contains("the material `odd` has the relative permeability 0.0025"), "{found}");

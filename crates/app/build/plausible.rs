@@ -2,14 +2,18 @@
 //!
 //! What cannot be meant is refused at its key; what is rarely meant is a warning.
 
+use std::collections::HashSet;
+
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, norm, sub};
-use fluxmorph_geometry::{ElementId, Mesh, RegionId, millimetres};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
 use crate::config::{
-    Coil, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, RegionModel, SourceMap,
+    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, RegionModel,
+    SourceMap,
 };
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -110,9 +114,31 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             ));
         }
     }
+    warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, body)));
     warnings.extend(unit_hint(config, mesh));
     warnings
+}
+
+/// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.
+fn image_warning(config: &Config, topology: &Topology, coil: &Coil) -> Option<String> {
+    let CoilShape::Region(own) = &coil.shape else { return None };
+    let faces = |name: &String| -> Vec<[NodeId; 3]> {
+        topology.surface(name).into_iter().flatten().map(|&nodes| face_key(nodes)).collect()
+    };
+    let crossed: HashSet<[NodeId; 3]> = match &own.path {
+        CoilPath::Terminals { terminals } => terminals.iter().flat_map(faces).collect(),
+        CoilPath::Closed { .. } => HashSet::new(),
+    };
+    let outer = topology.outer_faces(topology.region(&own.region).ok()?);
+    let along: HashSet<[NodeId; 3]> = outer.into_iter().map(face_key).collect();
+    let is_along = |face: &[NodeId; 3]| along.contains(face) && !crossed.contains(face);
+    let wall = config.boundaries.flux_parallel.iter().find(|name| faces(name).iter().any(is_along))?;
+    Some(format!(
+        "the current of the coil `{}` runs along `{wall}`, and behind a surface of flux_parallel its mirror image is the opposite \
+         one; where a plane of symmetry cuts a coil along its current the condition is flux_normal",
+        coil.name
+    ))
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
