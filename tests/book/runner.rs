@@ -88,12 +88,12 @@ fn exists(program: &str) -> bool {
 }
 
 /// A Python with what `examples/python` needs.
-fn python() -> Option<&'static PathBuf> {
+fn python() -> Option<&'static Path> {
     static PYTHON: OnceLock<Option<PathBuf>> = OnceLock::new();
-    PYTHON.get_or_init(installed_python).as_ref()
+    PYTHON.get_or_init(installed_python).as_deref()
 }
 
-/// It installed below the target directory, unless it is there.
+/// Installs it below the target directory, unless it is there already.
 fn installed_python() -> Option<PathBuf> {
     let environment = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book-python");
     let python = environment.join("bin/python");

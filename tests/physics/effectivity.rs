@@ -128,6 +128,25 @@ fn devices() -> Vec<(&'static str, Device)> {
     all
 }
 
+/// A resumed run may make an estimate anew that an unbroken one made beside others.
+#[test]
+fn an_estimate_has_the_bits_of_one_alone_whatever_was_estimated_with_its_models_before() {
+    let problem = crate::support::setup("shield_two_frequencies.toml", &[]).problem;
+    let analysed = |height: f64| {
+        let p = vec![height; problem.shape().expect("a design").initial().len()];
+        let moved = problem.moved(&p).expect("a sound mesh");
+        let cache = &mut SolverCache::default();
+        problem.analyse(moved, Derivatives::None, cache, &mut NoProgress).expect("a field")
+    };
+    let models = &mut EnrichedModels::new(Effort::Any);
+    for height in [0.0, 3e-3, 0.0] {
+        let analysis = analysed(height);
+        let shared = problem.estimate_error(&analysis, models).expect("an estimate");
+        let alone = problem.estimate_error(&analysis, &mut EnrichedModels::new(Effort::Any));
+        assert_eq!(shared, alone.expect("an estimate"));
+    }
+}
+
 #[test]
 #[ignore = "second order on halved edges of ten devices, minutes"]
 fn estimates_are_half_to_twice_the_error_where_the_mesh_shows_the_device() {

@@ -70,6 +70,16 @@ fn every_method_gives_the_same_objective_and_gradient_with_eddy_currents() {
 }
 
 #[test]
+fn an_analysis_after_another_begins_with_the_method_that_worked() {
+    let problem = setup("shield_two_frequencies.toml", &[]).problem;
+    let mut analysis = evaluated(&problem, &mut SolverCache::default(), 1.0);
+    // The first choice has worked: nothing to begin with.
+    assert_eq!(problem.cache_after(&analysis).methods(), []);
+    analysis.methods[1] = Some(Method::RealFactor);
+    assert_eq!(problem.cache_after(&analysis).methods(), [None, Some(Method::RealFactor)]);
+}
+
+#[test]
 fn every_method_gives_the_same_objective_and_gradient_with_an_impedance_surface() {
     every_method_agrees(("shield_quick.toml", &[]), &[], &FACTORS);
 }

@@ -137,7 +137,7 @@ fn a_current_along_a_wall_that_mirrors_it_reversed_is_asked_about() {
         let mut checked = command(&[&"check", &repository("configs/busbar.toml"), &"--json"]);
         texts(&finish(checked.args(set(&[&walls]))).exits_with(0).json()["warnings"])
     };
-    // The current crosses its terminals; y_min cuts the bar in two halves of its length.
+    // The current crosses its terminals; y_min, the middle of its height, cuts the bar along it.
     assert_eq!(with("[\"z_min\", \"z_max\", \"x_min\", \"x_max\", \"y_max\"]"), "");
     let cut = with("[\"z_min\", \"z_max\", \"x_min\", \"x_max\", \"y_min\", \"y_max\"]");
     assert!(cut.contains("the current of the coil `bar` runs along `y_min`"), "{cut}");
@@ -155,7 +155,8 @@ fn the_resolved_configuration_of_a_run_is_not_warned_of() {
     };
     // It has every default, which says nothing; another number does.
     assert!(!checked(&[]).contains("no effect"), "{}", checked(&[]));
-    assert!(checked(&["remesh.poisson=0.2"]).contains("remesh.poisson has no effect"));
+    let others = checked(&["remesh.poisson=0.2", "remesh.motion=along_design"]);
+    assert!(others.contains("remesh.poisson, remesh.motion have no effect"), "{others}");
 }
 
 #[test]

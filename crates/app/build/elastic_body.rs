@@ -172,7 +172,7 @@ pub(super) fn motion_law(
     Err(source.error(vec![fault]).into())
 }
 
-/// What is said where the law has no use for keys of `[remesh]` that only the linear one knows; their defaults say nothing.
+/// What is said of keys of `[remesh]` that only the linear law knows, beside another law; not where they stand at their defaults.
 pub(super) fn unused_keys(source: &SourceMap, remesh: &Remesh, law: MotionLaw) -> Option<String> {
     let name = match law {
         MotionLaw::Linear => return None,
@@ -183,7 +183,7 @@ pub(super) fn unused_keys(source: &SourceMap, remesh: &Remesh, law: MotionLaw) -
         ("remesh.poisson", remesh.poisson != config::DEFAULT_POISSON),
         ("remesh.motion", remesh.motion != config::Motion::Free),
     ];
-    let own = own.into_iter().filter(|(_, says_something)| *says_something).map(|(path, _)| path.to_owned());
+    let own = own.into_iter().filter(|(_, is_other)| *is_other).map(|(path, _)| path.to_owned());
     let of_parts = (0..remesh.subregions.len()).map(|i| format!("remesh.subregions[{i}].poisson"));
     let written: Vec<String> = own.chain(of_parts).filter(|path| source.is_written(path)).collect();
     (!written.is_empty()).then(|| {

@@ -135,8 +135,8 @@ fn image_warning(config: &Config, topology: &Topology, coil: &Coil) -> Option<St
     let is_along = |face: &[NodeId; 3]| along.contains(face) && !crossed.contains(face);
     let wall = config.boundaries.flux_parallel.iter().find(|name| faces(name).iter().any(is_along))?;
     Some(format!(
-        "the current of the coil `{}` runs along `{wall}`, and behind a surface of flux_parallel its mirror image is the opposite \
-         one; where a plane of symmetry cuts a coil along its current the condition is flux_normal",
+        "the current of the coil `{}` runs along `{wall}`, a surface of flux_parallel, which mirrors it reversed; a plane of symmetry \
+         along the current is flux_normal",
         coil.name
     ))
 }

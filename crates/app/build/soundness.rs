@@ -60,7 +60,7 @@ pub(super) fn outside(config: &Config, source: &SourceMap, mesh: &Mesh) -> Resul
         |patch: &OpenPatch| patch.faces.iter().all(|&f| named.contains(&face_key(hull.faces()[f].nodes)));
     let (mut outside, mut faults) = (Outside::default(), parts_fault(source, mesh));
     for patch in patches {
-        let text = patch_text(mesh.topology(), &patch);
+        let text = patch_text(&hull, &patch);
         match patch.situation {
             Situation::Side => outside.open.push(patch),
             Situation::Inward | Situation::BesideCondition if is_named(&patch) => {
@@ -196,8 +196,10 @@ fn parts_fault(source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
 }
 
 /// What a patch is, where and how large.
-fn patch_text(topology: &Topology, patch: &OpenPatch) -> String {
-    let region = &topology.region_names()[patch.region.index()];
+fn patch_text(hull: &Hull<'_>, patch: &OpenPatch) -> String {
+    let region_at = |&face: &usize| hull.mesh().topology().region_name_at(hull.faces()[face].inside);
+    let regions: BTreeSet<&str> = patch.faces.iter().map(region_at).collect();
+    let regions = regions.into_iter().collect::<Vec<_>>().join("`, `");
     let what = match patch.situation {
         Situation::Side => "an outer side",
         Situation::Inward => "a wall that stands into the mesh",
@@ -205,7 +207,7 @@ fn patch_text(topology: &Topology, patch: &OpenPatch) -> String {
         Situation::Hole => "the wall of a hole",
     };
     format!(
-        "{what} has no condition in [boundaries]: {} faces of `{region}`, {:.4} cm², at {}",
+        "{what} has no condition in [boundaries]: {} faces of `{regions}`, {:.4} cm², at {}",
         patch.faces.len(),
         patch.area * 1e4,
         millimetres(patch.place)

@@ -8,10 +8,11 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, Problem};
+use fluxmorph_remesh::Moved;
 
 use super::Session;
-use super::estimate::Estimator;
+use super::estimate::{Estimator, left_out};
 use super::facets::described;
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
@@ -32,36 +33,63 @@ pub struct ShapeMeshes {
     pub solved: [Mesh; 2],
 }
 
-impl Session<'_> {
-    /// Estimates the errors of analyses of this run's problem.
-    pub(super) fn estimator(&self) -> Estimator<'_> {
-        Estimator::new((self.config, self.source), &self.setup)
+/// The initial design when the search is over.
+pub(super) enum InitialField {
+    /// Its mesh.
+    Moved(Box<Moved>),
+    /// Its field, once that was asked for.
+    Solved(Box<Analysis>),
+}
+
+impl InitialField {
+    fn mesh(&self) -> &Mesh {
+        match self {
+            Self::Moved(moved) => &moved.mesh,
+            Self::Solved(analysis) => &analysis.mesh,
+        }
     }
 
-    /// Whether errors are estimated when the search of a run is over.
-    pub(super) fn is_estimated(&self, stop_reason: StopReason) -> bool {
-        let is_wanted =
-            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
-        is_wanted && !self.is_cut_short(stop_reason)
+    /// The field, by the methods of the linear solver that worked for the best design.
+    pub(super) fn analysis(self, problem: &Problem, best: &Analysis) -> Result<Box<Analysis>, Error> {
+        match self {
+            Self::Moved(moved) => {
+                let cache = &mut problem.cache_after(best);
+                Ok(Box::new(problem.analyse(*moved, Derivatives::None, cache, &mut NoProgress)?))
+            }
+            Self::Solved(analysis) => Ok(analysis),
+        }
+    }
+}
+
+impl Session<'_> {
+    /// What estimates the errors of this run's analyses.
+    pub(super) fn estimator(&self) -> Estimator<'_> {
+        Estimator::new((self.config, self.source), &self.setup)
     }
 
     /// The estimated errors at the initial and the best design of a run, of which the last is `at_best` where that is known.
     pub(super) fn estimate_errors(
         &self,
-        initial: Option<&Analysis>,
+        initial: InitialField,
         (best, stop_reason): (&Best, StopReason),
         at_best: Option<ErrorEstimate>,
         observer: &mut dyn Observer,
     ) -> Option<[ErrorEstimate; 2]> {
-        if !self.is_estimated(stop_reason) {
+        let is_wanted =
+            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
+        if self.is_cut_short(stop_reason) || !is_wanted {
             return None;
         }
-        let (initial, best, mut estimator) = (initial?, &best.analysis, self.estimator());
+        let (best, mut estimator) = (&best.analysis, self.estimator());
         let at_best = at_best.or_else(|| estimator.estimate(best, observer))?;
-        if best.mesh.points() == initial.mesh.points() {
+        if best.mesh.points() == initial.mesh().points() {
             return Some([at_best.clone(), at_best]);
         }
-        Some([estimator.estimate(initial, observer)?, at_best])
+        match initial.analysis(&self.setup.problem, best) {
+            Ok(initial) => Some([estimator.estimate(&initial, observer)?, at_best]),
+            // It was solved when the search began: what fails now costs the estimate, not the run.
+            Err(error) => left_out(error, observer),
+        }
     }
 }
 

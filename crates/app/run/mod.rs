@@ -196,8 +196,7 @@ impl Session<'_> {
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let reason = optimised.stop_reason;
-        let first = self.initial_analysis(first, (best, reason), observer)?;
-        let initial = self.initial_states(first.as_ref(), reason, observer)?;
+        let (initial, first) = self.initial_states(first, (best, reason), observer)?;
         let problem = &self.setup.problem;
         let mut result = RunResult {
             evaluations: optimised.evaluations,
@@ -226,14 +225,14 @@ impl Session<'_> {
             )?
         };
         self.keep_search(&mut result, observer)?;
-        let errors = self.estimate_errors(first.as_ref(), (best, reason), at_best, observer);
+        let errors = self.estimate_errors(first, (best, reason), at_best, observer);
         if let Some([_, at_best]) = &errors {
             recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved };
-        drop((optimised, first));
+        drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
         self.confirm(result, (&shapes, &meshes), (errors, refinements.as_ref()), observer)

@@ -9,7 +9,7 @@ use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, Measured, NoProgress, Problem, Shape, Timings};
+use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Shape, Timings};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::linear::Method;
@@ -17,7 +17,7 @@ use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery, saturation};
 
 use super::Session;
-use super::estimate::left_out;
+use super::confirmation::InitialField;
 use super::reservations::reservations;
 use crate::build::multipole;
 use crate::config;
@@ -151,53 +151,28 @@ impl Session<'_> {
         )
     }
 
-    /// The field of the initial design when the search is over; `None` where nothing of it is asked for.
-    ///
-    /// # Errors
-    /// What it fails with, where the result has to have it; an estimate of the error is then left out.
-    pub(super) fn initial_analysis(
+    /// Losses, probes and expansions of the initial design in every state, with its field; nothing where a run was interrupted, or
+    /// has none.
+    pub(super) fn initial_states(
         &self,
         initial: Moved,
         (best, stop_reason): (&Best, StopReason),
         observer: &mut dyn RunObserver,
-    ) -> Result<Option<Analysis>, Error> {
-        let has_states = self.has_initial_states(stop_reason);
-        if !has_states && !self.is_estimated(stop_reason) {
-            return Ok(None);
+    ) -> Result<(Vec<StateResult>, InitialField), Error> {
+        let initial = InitialField::Moved(Box::new(initial));
+        let config = self.config;
+        let has_some =
+            !(config.probes.is_empty() && self.setup.audits.is_empty() && config.multipoles.is_empty());
+        if stop_reason == StopReason::Interrupted || !has_some {
+            return Ok((Vec::new(), initial));
         }
         let problem = &self.setup.problem;
-        let cache = &mut problem.cache_after(&best.analysis);
-        match problem.analyse(initial, Derivatives::None, cache, &mut NoProgress) {
-            Ok(analysis) => Ok(Some(analysis)),
-            Err(error) if has_states => Err(error.into()),
-            Err(error) => Ok(left_out(error, observer)),
+        let analysis = initial.analysis(problem, &best.analysis)?;
+        let mut states = self.state_results(&analysis, observer);
+        for ((state, model), solution) in states.iter_mut().zip(problem.states()).zip(&analysis.solutions) {
+            state.multipoles = self.multipoles(model, &analysis, solution)?;
         }
-    }
-
-    /// Whether the result has something of the initial design.
-    fn has_initial_states(&self, stop_reason: StopReason) -> bool {
-        let config = self.config;
-        let has_none =
-            config.probes.is_empty() && self.setup.audits.is_empty() && config.multipoles.is_empty();
-        stop_reason != StopReason::Interrupted && !has_none
-    }
-
-    /// Losses, probes and expansions of the initial design in every state; nothing where a run was interrupted, or has none.
-    pub(super) fn initial_states(
-        &self,
-        initial: Option<&Analysis>,
-        stop_reason: StopReason,
-        observer: &mut dyn RunObserver,
-    ) -> Result<Vec<StateResult>, Error> {
-        let Some(analysis) = initial.filter(|_| self.has_initial_states(stop_reason)) else {
-            return Ok(Vec::new());
-        };
-        let mut states = self.state_results(analysis, observer);
-        let models = self.setup.problem.states();
-        for ((state, model), solution) in states.iter_mut().zip(models).zip(&analysis.solutions) {
-            state.multipoles = self.multipoles(model, analysis, solution)?;
-        }
-        Ok(states)
+        Ok((states, InitialField::Solved(analysis)))
     }
 
     /// Losses and probes of a design in every state.

@@ -32,8 +32,9 @@ pub enum RemeshError {
     Parameter { subregion: String, parameter: &'static str, value: f64, expected: &'static str },
     /// A design node is no node of the remesh region.
     #[error(
-        "design node {node} at {point:?} m is not in the remesh region: enlarge the region so that it holds the \
-         elements around every design node"
+        "design node {node} at {} is not in the remesh region: enlarge the region so that it holds the elements around every \
+         design node",
+        millimetres(*point)
     )]
     DesignNodeOutside {
         node: NodeId,
@@ -54,8 +55,9 @@ pub enum RemeshError {
     },
     /// A sliding surface has a triangle whose normal is not along an axis.
     #[error(
-        "the surface `{surface}` cannot slide: its triangle at {centroid:?} m has the normal {normal:?}, and only \
-         faces normal to x, y or z may slide; list it as fixed or free"
+        "the surface `{surface}` cannot slide: its triangle at {} has the normal ({:.3}, {:.3}, {:.3}), and only faces normal \
+         to x, y or z may slide; list it as fixed or free",
+        millimetres(*centroid), normal[0], normal[1], normal[2]
     )]
     SlideNormal {
         surface: String,
@@ -65,8 +67,9 @@ pub enum RemeshError {
     },
     /// A part of the remesh region can move as a rigid body.
     #[error(
-        "the connected part of the remesh region around {point:?} m can move as a rigid body: fix, or let slide, \
-         enough of its boundary"
+        "the connected part of the remesh region around {} can move as a rigid body: fix, or let slide, enough of its \
+         boundary",
+        millimetres(*point)
     )]
     Unrestrained {
         /// A node of the part [m].

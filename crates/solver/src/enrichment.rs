@@ -106,7 +106,7 @@ pub struct WeightedResidual {
 }
 
 impl FieldModel {
-    /// The same problem in second order, to be solved roughly and with so much effort.
+    /// The same problem in second order on the undeformed mesh, to be solved roughly and with so much effort.
     ///
     /// # Errors
     /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks, for a B–H curve with a

@@ -179,7 +179,8 @@ pub enum SolverError {
     },
     /// A probe lies outside the mesh.
     #[error(
-        "point {point:?} m of the probe `{probe}` lies outside the mesh, whose box is {lower:?} to {upper:?} m"
+        "the point {} of the probe `{probe}` lies outside the mesh, whose box is {} to {}",
+        millimetres(*point), millimetres(*lower), millimetres(*upper)
     )]
     ProbeOutside {
         probe: String,

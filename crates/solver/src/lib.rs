@@ -58,7 +58,7 @@ pub use elements::{ElementFamily, Order};
 pub use error::{NewtonFailure, NonConvergence, SolverError};
 pub use functional::{Functional, FunctionalValue, RigidMotion};
 pub use linear::{LinearSolver, LinearSolverReport};
-pub use load_case::{Drive, LoadCase};
+pub use load_case::{Drive, LoadCase, frequency_label};
 pub use material::Material;
 pub use model::FieldModel;
 pub use open::OpenRegion;

@@ -61,6 +61,16 @@ impl LoadCase {
     }
 }
 
+/// A frequency [Hz] as a part of names, to a microhertz: `200Hz`.
+///
+/// ```
+/// # use fluxmorph_solver::frequency_label;
+/// assert_eq!(frequency_label(8.03 * 1e3), "8030Hz");
+/// ```
+pub fn frequency_label(frequency: f64) -> String {
+    format!("{}Hz", (frequency * 1e6).round() / 1e6)
+}
+
 impl FieldModel {
     /// The load case that the problem is solved for.
     pub fn load_case(&self) -> LoadCase {
@@ -70,9 +80,8 @@ impl FieldModel {
     /// The load case as a part of names: its name, else its frequency to a microhertz, `200Hz`; without what ParaView's calculator takes
     /// for an operator.
     pub fn label(&self) -> String {
-        let hertz = (self.setup().frequency * 1e6).round() / 1e6;
         let name = self.setup().load_case.clone();
-        name.unwrap_or_else(|| format!("{hertz}Hz")).replace(['-', '.'], "_")
+        name.unwrap_or_else(|| frequency_label(self.setup().frequency)).replace(['-', '.'], "_")
     }
 
     /// The same problem at another frequency [Hz].

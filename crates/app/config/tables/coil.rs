@@ -26,8 +26,8 @@ table! {
     /// 0 Hz its current follows from the field, with skin effect and proximity, and it may move with the design.
     ///
     /// On a symmetry model all numbers are those of the meshed part. A plane along the current, which halves the cross-section of
-    /// a `region`, halves its `ampere_turns`, and the `turns` of strands; a plane that the current crosses changes neither. For
-    /// either plane `voltage`, `resistance` and `series_inductance` of strands are half of the whole coil's; a solid conductor
+    /// a `region`, halves its `ampere_turns`, and the `turns` of strands; a plane that the current crosses changes neither. The
+    /// first is one of `flux_normal`, the second of `flux_parallel`. For either plane `voltage`, `resistance` and `series_inductance` of strands are half of the whole coil's; a solid conductor
     /// keeps its voltage where the plane is along the current. A `shape` keeps the ampere-turns and turns of the whole coil.
     ///
     /// ```toml

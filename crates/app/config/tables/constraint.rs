@@ -1,5 +1,6 @@
 //! `[[constraints]]`: what must stay below a bound while the objective is optimised.
 
+use fluxmorph_solver::frequency_label;
 use serde::Serialize;
 use serde_json::json;
 
@@ -230,7 +231,7 @@ impl Constraint {
             Limit::Field { functional, .. } => {
                 let of_coils = functional.coils.as_ref().map(|coils| coils.join("_"));
                 words.extend(of_coils.or_else(|| functional.region.clone()));
-                words.extend(functional.frequency.map(|frequency| format!("{frequency}Hz")));
+                words.extend(functional.frequency.map(frequency_label));
                 words.extend(functional.load.clone());
             }
             Limit::Body { region, .. } => words.push(region.clone()),

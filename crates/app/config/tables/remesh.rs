@@ -12,7 +12,7 @@ use crate::config::value::range::Range;
 /// Poisson's ratio of a stable body.
 pub(super) const POISSON: Range = Range::open(-1.0, 0.5);
 
-/// The paper's.
+/// Poisson's ratio of the body where none is written: the paper's.
 pub const DEFAULT_POISSON: f64 = 0.3;
 
 table! {

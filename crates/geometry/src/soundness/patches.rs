@@ -58,9 +58,8 @@ pub fn open_patches(hull: &Hull<'_>, has_condition: &[bool]) -> Vec<OpenPatch> {
         let open = ridge.faces.map(|face| !has_condition[face]);
         // The wall of a hole is one, whatever its edges.
         let is_hole = ridge.faces.iter().all(|&face| situations[face] == Situation::Hole);
-        match (turn.abs() < SMOOTH, open) {
+        match (turn.abs() < SMOOTH || is_hole, open) {
             (true, [true, true]) => sides.join(ridge.faces),
-            (false, [true, true]) if is_hole => sides.join(ridge.faces),
             (true, [false, false]) => {}
             (true, _) => raise(&mut situations, &ridge, Situation::BesideCondition),
             (false, _) if turn < 0.0 => raise(&mut situations, &ridge, Situation::Inward),

@@ -19,7 +19,7 @@ mod transfer;
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::tet4::{Point, dot};
-use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
 pub use grid::dominant_axis;
@@ -127,7 +127,7 @@ pub enum DesignError {
     #[error("a control grid cannot be laid across the direction: the surface has no extent along {axis}")]
     NoExtent { axis: char },
     /// A surface that bends back cannot be seen as a height over the grid.
-    #[error("a control grid cannot be laid over the surface: at {point:?} m it turns back towards {axis}")]
+    #[error("a control grid cannot be laid over the surface: at {} it turns back towards {axis}", millimetres(*point))]
     Folded {
         /// The first such node [m].
         point: Point,
@@ -135,8 +135,8 @@ pub enum DesignError {
     },
     /// A mirrored variable has no partner.
     #[error(
-        "the {what} at {point:?} m has no partner in the mirror {axis} = {at} m: the nearest lies {distance:e} m from its \
-         mirror image"
+        "the {what} at {} has no partner in the mirror {axis} = {:.3} mm: the nearest lies {:.3e} mm from its mirror image",
+        millimetres(*point), at * 1e3, distance * 1e3
     )]
     NoPartner {
         what: &'static str,

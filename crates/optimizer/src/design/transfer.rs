@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 /// How far a node may lie from a piece of the old surface, as a share of that piece's longest edge. Two triangulations of
 /// one plane meet exactly; of a sphere with cells as wide as its radius they lie an eighth of an edge apart.
@@ -17,7 +17,7 @@ const NEAR: f64 = 0.25;
 
 /// Two triangulations are not of one surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the fresh mesh's design surface has a node at {point:?} m, far from the run's")]
+#[error("the fresh mesh's design surface has a node at {}, far from the run's", millimetres(*point))]
 pub struct SurfaceMismatch {
     /// Place of the node [m].
     pub point: Point,

@@ -290,10 +290,11 @@ impl Problem {
             method.filter(|_| method != first_choice)
         };
         let methods: Vec<_> = self.matrices().iter().map(of_matrix).collect();
-        match methods.iter().all(Option::is_none) {
-            true => SolverCache::default(),
-            false => SolverCache::with_methods(&methods),
+        // Without methods a cache has what one frequency offers the next.
+        if methods.iter().all(Option::is_none) {
+            return SolverCache::default();
         }
+        SolverCache::with_methods(&methods)
     }
 
     /// Counted work of the fields of a design with their adjoints [ns]: multiplications and bytes, no clock. 0 on several ranks.

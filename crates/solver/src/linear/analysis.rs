@@ -51,7 +51,7 @@ pub struct SystemAnalysis {
 }
 
 impl SystemAnalysis {
-    /// Chooses the method for a pattern, which takes a symbolic factor.
+    /// Chooses the method for a pattern, which takes a symbolic factor where the system is not large.
     ///
     /// # Errors
     /// [`SolverError::Mesh`] when the symbolic factorisation does not fit.
@@ -94,7 +94,9 @@ impl SystemAnalysis {
     /// The cheapest method that fits; without a factor or two levels, the incomplete factor.
     fn cheapest(&mut self, pattern: &SystemPattern<'_>) -> Result<Method, SolverError> {
         let unknowns = pattern.structure.row_count();
-        let is_large = unknowns >= factors_up_to(self.field, self.elements);
+        // A factor that is kept, in part or for other designs, may be cheaper far beyond that.
+        let is_new = self.changes.is_none() && self.settings.reuse == Reuse::Never;
+        let is_large = unknowns >= factors_up_to(self.field, self.elements, is_new);
         let mut factor = if is_large { None } else { self.cheapest_factor()? };
         if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.field, self.elements)) {
             return Ok(method);
@@ -317,10 +319,10 @@ fn two_levels(
 
 /// Unknowns from which a factor is not looked at where two levels fit: its symbolic part alone takes seconds, and its memory is
 /// twice that of two levels and more.
-const fn factors_up_to(field: FieldKind, elements: (ElementFamily, Order)) -> usize {
+const fn factors_up_to(field: FieldKind, elements: (ElementFamily, Order), is_new: bool) -> usize {
     match (field, elements) {
-        // Two levels are as cheap behind an impedance surface, and cost a third with a meshed plate.
-        (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) => 100_000,
+        // Every design with a factor of its own: as cheap by two levels behind an impedance surface, for a third with a meshed plate.
+        (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) if is_new => 100_000,
         (_, (_, Order::Linear)) => 200_000,
         (_, (ElementFamily::Nodal, Order::Quadratic)) => 400_000,
         (_, (ElementFamily::Edge, Order::Quadratic)) => usize::MAX,
