@@ -107,11 +107,25 @@ impl Session<'_> {
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
-        accuracy.within_tolerance = self.config.accuracy.tolerance.zip(errors).map(|(tolerance, errors)| {
+        if let Some((tolerance, errors)) = self.config.accuracy.tolerance.zip(errors) {
             let larger = objective.initial.abs().max(objective.best.abs());
-            let is_within = |scale, error| relative_bar(error, scale).is_some_and(|bar| bar <= tolerance);
-            is_within(objective.initial, errors[0]) && is_within(larger, errors[1])
-        });
+            let scales = [("initial", objective.initial), ("best", larger)];
+            let beyond: Vec<String> = scales
+                .into_iter()
+                .zip(errors)
+                .map(|((design, scale), error)| (design, relative_bar(error, scale).unwrap_or(f64::INFINITY)))
+                .filter(|(_, bar)| *bar > tolerance)
+                .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
+                .collect();
+            accuracy.within_tolerance = Some(beyond.is_empty());
+            if !beyond.is_empty() {
+                observer.notice(&format!(
+                    "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
+                    100.0 * tolerance,
+                    beyond.join(", ")
+                ));
+            }
+        }
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         let analysis = &self.config.analysis;
         let is_first_order_edge =
@@ -144,7 +158,11 @@ impl Session<'_> {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
         let others: Vec<f64> =
             [objective.verified_ratio, corrected, cross_check].into_iter().flatten().collect();
-        accuracy.judge(objective.ratio, &others);
+        // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain.
+        let sign = self.config.objective.as_ref().map_or(1.0, |objective| objective.goal.sign());
+        if sign * objective.best < sign * objective.initial {
+            accuracy.judge(objective.ratio, &others);
+        }
         if accuracy.verdict == Some(Verdict::NotConfirmed) {
             let cure = match analysis.order {
                 ElementOrder::Linear => "refine the mesh, or take analysis.order = 2",

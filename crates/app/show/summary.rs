@@ -33,9 +33,10 @@ impl Named {
         let name = match terms {
             [term] => {
                 let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
-                format!("{goal} {}{}", term.functional.kind.name(), region.unwrap_or_default())
+                let which = objective.worst().map(|worst| format!("{worst} ")).unwrap_or_default();
+                format!("{goal} {which}{}{}", term.functional.kind.name(), region.unwrap_or_default())
             }
-            _ => format!("{goal} a sum of {} terms", terms.len()),
+            _ => format!("{goal} {} of {} terms", objective.worst().unwrap_or("a sum"), terms.len()),
         };
         let name = printable(&name).into_owned();
         let unit = objective.si_unit().filter(|unit| *unit != "1");

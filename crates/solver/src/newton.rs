@@ -16,7 +16,7 @@ use crate::error::SolverError;
 use crate::line_search::{self, Along};
 use crate::linear::{Goal, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
-use crate::newton_steps::{Descent, MOST_STEPS, REQUIRED, StepSystems, Verdict, failure};
+use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict, failure};
 use crate::nonlinear::{self, Added};
 use crate::solution::FieldSolution;
 
@@ -183,7 +183,9 @@ pub(crate) fn solve(
         let tangent = model.with_tangents(&problem.matrix, &iterate.added.tangents, mesh);
         let mut system = systems.prepare(tangent)?;
         let verdict = descent.after(residual);
-        if verdict == Verdict::Converged {
+        if verdict == Verdict::Converged
+            || verdict == Verdict::Stays && systems.is_least(residual, system.method())
+        {
             return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
         }
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
@@ -191,7 +193,7 @@ pub(crate) fn solve(
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step) } else { None };
         let Some((next, length)) = found else {
-            if residual <= REQUIRED {
+            if systems.is_least(residual, system.method()) {
                 return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
             }
             systems.keep(system.into_field());

@@ -9,7 +9,7 @@
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::{NewtonFailure, SolverError};
-use crate::linear::{FieldSystem, LinearSolverCache, PreparedSystem, SolverEvent};
+use crate::linear::{FieldSystem, LinearSolverCache, Method, PreparedSystem, SolverEvent};
 use crate::model::FieldModel;
 
 /// Steps after which there is no hope: five to fifteen are usual.
@@ -17,6 +17,9 @@ pub(crate) const MOST_STEPS: usize = 60;
 
 /// Relative residual above which a state is refused [1].
 pub(crate) const REQUIRED: f64 = 1e-10;
+
+/// The same where no method of the linear solver is left that could lower it: what a linear solution has to reach on such a mesh.
+const REQUIRED_AT_LAST: f64 = 1e-9;
 
 /// A residual that a step leaves at more than this part of itself is rounding, once it is below `REQUIRED`.
 const STAGNATION: f64 = 0.1;
@@ -110,14 +113,24 @@ impl<'a> StepSystems<'a> {
         self.events
     }
 
+    /// Whether a residual that stays is as small as there is any, where the steps were solved by this method.
+    pub(crate) fn is_least(&self, residual: f64, method: Option<Method>) -> bool {
+        residual <= REQUIRED || residual <= REQUIRED_AT_LAST && self.more_robust(method).is_none()
+    }
+
+    /// A method, or else the first choice, and the next more robust one that fits, if there is one.
+    fn more_robust(&self, method: Option<Method>) -> Option<[Method; 2]> {
+        let analysis = self.model.linear_solver()?;
+        let from = method.unwrap_or(analysis.method());
+        Some([from, analysis.more_robust(from)?])
+    }
+
     /// Goes over to a more robust method, where there is one that fits and the residual of a state stays for rounding.
     pub(crate) fn escalate(&mut self, error: &SolverError) -> bool {
         let SolverError::Newton { steps, residual, failure: NewtonFailure::Rounding, .. } = error else {
             return false;
         };
-        let Some(analysis) = self.model.linear_solver() else { return false };
-        let from = self.cache.method().unwrap_or(analysis.method());
-        let Some(to) = analysis.more_robust(from) else { return false };
+        let Some([from, to]) = self.more_robust(self.cache.method()) else { return false };
         let cause =
             format!("Newton's method stays at the relative residual {residual:.1e} after {steps} steps");
         self.events.push(SolverEvent::FellBack { from, to, cause });
@@ -173,11 +186,16 @@ mod tests {
         let mut systems =
             StepSystems::new(&model, &mut LinearSolverCache::with_method(Some(Method::RealFactorSingle)));
         assert!(!systems.escalate(&failed(NewtonFailure::Law)));
+        let single = Some(Method::RealFactorSingle);
+        assert!(systems.is_least(5e-11, single) && !systems.is_least(5e-10, single));
         for method in [Method::RealFactor, Method::Direct] {
             assert!(systems.escalate(&failed(NewtonFailure::Rounding)));
             assert_eq!(systems.cache.method(), Some(method));
         }
         assert!(!systems.escalate(&failed(NewtonFailure::Rounding)));
+        // What nothing could lower is a state where a linear solution would be one.
+        let direct = Some(Method::Direct);
+        assert!(systems.is_least(5e-10, direct) && !systems.is_least(2e-9, direct));
         let said: Vec<String> = systems.into_events().iter().map(ToString::to_string).collect();
         assert_eq!(said.len(), 2);
         assert!(said[0].contains("stays at the relative residual 1.3e-8 after 9 steps"), "{}", said[0]);

@@ -146,7 +146,10 @@ fn objective(summary: &Summary<'_>) -> String {
     };
     let terms: Vec<String> = objective.terms().iter().map(term).collect();
     let unit = summary.objective_unit.map(|unit| format!(" [{unit}]")).unwrap_or_default();
-    format!("{goal} {}{unit}", terms.join(" + "))
+    match objective.worst() {
+        None => format!("{goal} {}{unit}", terms.join(" + ")),
+        Some(worst) => format!("{goal} {worst} of {}{unit}", terms.join(", ")),
+    }
 }
 
 fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {

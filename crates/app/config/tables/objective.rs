@@ -146,6 +146,15 @@ table! {
 }
 
 impl Objective {
+    /// Which of its terms a worst case is, in words; `None` of a sum.
+    pub fn worst(&self) -> Option<&'static str> {
+        match (self.combine, self.goal) {
+            (Combination::Sum, _) => None,
+            (Combination::WorstCase, Goal::Minimise) => Some("the largest"),
+            (Combination::WorstCase, Goal::Maximise) => Some("the least"),
+        }
+    }
+
     /// The unit of its value in SI, where all its terms have the same.
     pub fn si_unit(&self) -> Option<&'static str> {
         let mut units = self.terms().iter().map(|term| term.functional.dimension().si_unit());

@@ -2,8 +2,8 @@
 
 use super::ticks::{given, number, trim_zeros};
 use crate::config::{
-    Algorithm, Combination, Compared, Config, Constraint, DesignDirection, DirectionWord, Follow, Functional,
-    Goal, Limit, ObjectiveKind, ValueBound, Weighting,
+    Algorithm, Compared, Config, Constraint, DesignDirection, DirectionWord, Follow, Functional, Goal, Limit,
+    ObjectiveKind, ValueBound, Weighting,
 };
 
 /// What is made small or large.
@@ -21,16 +21,15 @@ pub(super) fn objective(config: &Config) -> Option<String> {
             if term.weight == 1.0 { what } else { format!("{} times {what}", number(term.weight, 3)) }
         })
         .collect();
-    Some(match (objective.combine, objective.goal) {
-        (Combination::Sum, _) => format!("{goal} {}", terms.join(", plus ")),
-        (Combination::WorstCase, goal_word) => {
-            let worst = if goal_word == Goal::Minimise { "largest" } else { "least" };
+    Some(match objective.worst() {
+        None => format!("{goal} {}", terms.join(", plus ")),
+        Some(worst) => {
             let where_from = match config.load_cases().len() {
                 1 => "",
                 _ if config.loads.is_empty() => " and frequency",
                 _ => " and load",
             };
-            format!("{goal} the {worst}, by term{where_from}, of {}", terms.join(", and "))
+            format!("{goal} {worst}, by term{where_from}, of {}", terms.join(", and "))
         }
     })
 }
