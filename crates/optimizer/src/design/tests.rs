@@ -332,7 +332,7 @@ fn a_node_without_partner_is_named() {
         matches!(error, DesignError::NoPartner { axis: 'x', point, .. } if point == [0.0, 0.0, 1.0]),
         "{error}"
     );
-    assert!(error.to_string().contains("no partner in the mirror x = 0.45 m"), "{error}");
+    assert!(error.to_string().contains("no partner in the mirror x = 450.000 mm"), "{error}");
     assert!(matches!(tied(1.0, UP, 2), DesignError::Oblique { axis: 'z', .. }));
 }
 
