@@ -7,10 +7,11 @@ use std::collections::HashSet;
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
+use super::soundness::faces_of;
 use crate::config::{
     Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, RegionModel,
     SourceMap,
@@ -123,17 +124,15 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
 /// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.
 fn image_warning(config: &Config, topology: &Topology, coil: &Coil) -> Option<String> {
     let CoilShape::Region(own) = &coil.shape else { return None };
-    let faces = |name: &String| -> Vec<[NodeId; 3]> {
-        topology.surface(name).into_iter().flatten().map(|&nodes| face_key(nodes)).collect()
-    };
-    let crossed: HashSet<[NodeId; 3]> = match &own.path {
-        CoilPath::Terminals { terminals } => terminals.iter().flat_map(faces).collect(),
+    let crossed = match &own.path {
+        CoilPath::Terminals { terminals } => faces_of(topology, terminals.iter().map(String::as_str)),
         CoilPath::Closed { .. } => HashSet::new(),
     };
     let outer = topology.outer_faces(topology.region(&own.region).ok()?);
-    let along: HashSet<[NodeId; 3]> = outer.into_iter().map(face_key).collect();
-    let is_along = |face: &[NodeId; 3]| along.contains(face) && !crossed.contains(face);
-    let wall = config.boundaries.flux_parallel.iter().find(|name| faces(name).iter().any(is_along))?;
+    let mut along = outer.into_iter().map(face_key).collect::<HashSet<_>>();
+    along.retain(|face| !crossed.contains(face));
+    let walls = &config.boundaries.flux_parallel;
+    let wall = walls.iter().find(|wall| !faces_of(topology, [wall.as_str()]).is_disjoint(&along))?;
     Some(format!(
         "the current of the coil `{}` runs along `{wall}`, a surface of flux_parallel, which mirrors it reversed; a plane of symmetry \
          along the current is flux_normal",

@@ -55,7 +55,7 @@ pub(super) fn contact_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -
 pub(super) fn outside(config: &Config, source: &SourceMap, mesh: &Mesh) -> Result<Outside, Vec<Diagnostic>> {
     let hull = Hull::new(mesh);
     let patches = open_patches(&hull, &with_condition(config, &hull));
-    let named = named_faces(mesh.topology());
+    let named = faces_of(mesh.topology(), mesh.topology().surface_names());
     let is_named =
         |patch: &OpenPatch| patch.faces.iter().all(|&f| named.contains(&face_key(hull.faces()[f].nodes)));
     let (mut outside, mut faults) = (Outside::default(), parts_fault(source, mesh));
@@ -135,17 +135,17 @@ pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
 /// For every face of a hull whether [boundaries] names a surface that it belongs to.
 fn with_condition(config: &Config, hull: &Hull<'_>) -> Vec<bool> {
     let infinity = open::condition(config).map(|(name, _)| name);
-    let surfaces = config.boundaries.surfaces().chain(&infinity);
-    let faces: HashSet<[NodeId; 3]> = surfaces
-        .filter_map(|name| hull.mesh().topology().surface(name).ok())
-        .flatten()
-        .map(|nodes| face_key(*nodes))
-        .collect();
+    let surfaces = config.boundaries.surfaces().chain(&infinity).map(String::as_str);
+    let faces = faces_of(hull.mesh().topology(), surfaces);
     hull.faces().iter().map(|facet| faces.contains(&face_key(facet.nodes))).collect()
 }
 
-fn named_faces(topology: &Topology) -> HashSet<[NodeId; 3]> {
-    let surfaces = topology.surface_names().filter_map(|name| topology.surface(name).ok());
+/// The faces of surfaces; of a name that the mesh does not have none.
+pub(super) fn faces_of<'a>(
+    topology: &Topology,
+    names: impl IntoIterator<Item = &'a str>,
+) -> HashSet<[NodeId; 3]> {
+    let surfaces = names.into_iter().filter_map(|name| topology.surface(name).ok());
     surfaces.flatten().map(|nodes| face_key(*nodes)).collect()
 }
 

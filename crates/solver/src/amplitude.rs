@@ -324,9 +324,7 @@ pub(crate) fn solve(
         let nearest = model.with_tangents(&problem.matrix, &tangent.tensors(), mesh);
         let system = systems.prepare(nearest)?;
         let verdict = descent.after(residual);
-        if verdict == Verdict::Converged
-            || verdict == Verdict::Stays && systems.is_least(residual, system.method())
-        {
+        if systems.is_state(verdict, residual, system.method()) {
             let report = LinearSolverReport { iterations, residual };
             let state = FieldSolution::state(iterate.values, report).after_newton(steps);
             return Ok((state, system.with_tangent(tangent)));

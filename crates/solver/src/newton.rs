@@ -183,9 +183,7 @@ pub(crate) fn solve(
         let tangent = model.with_tangents(&problem.matrix, &iterate.added.tangents, mesh);
         let mut system = systems.prepare(tangent)?;
         let verdict = descent.after(residual);
-        if verdict == Verdict::Converged
-            || verdict == Verdict::Stays && systems.is_least(residual, system.method())
-        {
+        if systems.is_state(verdict, residual, system.method()) {
             return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
         }
         let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();

@@ -16,7 +16,7 @@ use crate::model::FieldModel;
 pub(crate) const MOST_STEPS: usize = 60;
 
 /// Relative residual above which a state is refused [1].
-pub(crate) const REQUIRED: f64 = 1e-10;
+const REQUIRED: f64 = 1e-10;
 
 /// The same where no method of the linear solver is left that could lower it: what a linear solution has to reach on such a mesh.
 const REQUIRED_AT_LAST: f64 = 1e-9;
@@ -111,6 +111,11 @@ impl<'a> StepSystems<'a> {
     /// What happened in the systems so far.
     pub(crate) fn into_events(self) -> Vec<SolverEvent> {
         self.events
+    }
+
+    /// Whether Newton's method ends with this residual in a state, where its steps are solved by this method.
+    pub(crate) fn is_state(&self, verdict: Verdict, residual: f64, method: Option<Method>) -> bool {
+        verdict == Verdict::Converged || verdict == Verdict::Stays && self.is_least(residual, method)
     }
 
     /// Whether a residual that stays is as small as there is any, where the steps were solved by this method.
