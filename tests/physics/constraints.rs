@@ -5,7 +5,7 @@ use fluxmorph::config::{Algorithm, Optimizer};
 use fluxmorph::files::{RunResult, system_disk};
 use fluxmorph::run;
 use fluxmorph::show::{Evaluation, Silent};
-use fluxmorph_optimizer::driver::{Optimised, optimise};
+use fluxmorph_optimizer::driver::{Optimised, StopReason, optimise};
 use fluxmorph_optimizer::problem::Problem;
 
 use crate::problems::{Rows, analysed, initial, objective, optimised};
@@ -93,6 +93,27 @@ fn a_limit_that_no_design_keeps_ends_with_the_least_violation() {
     let (run, rows) = with("shield_mass_limit.toml", &[("\"2.5 kg\"", "\"1 kg\"")], few);
     let least = rows.iter().map(|row| row.constraints["c_mass_plate"]).fold(f64::INFINITY, f64::min);
     assert!(least > 0.1 && run.best.violation == least, "{least} {}", run.best.violation);
+}
+
+/// Three bounds of which the objective's is the farthest away: the least violation is the free optimum.
+#[test]
+fn where_bounds_cannot_be_kept_the_worst_of_them_is_made_as_small_as_it_can_be() {
+    let (free, _) = with("shield_quick.toml", &[], |s| s);
+    let best = free.best.objective;
+    let limits = "[[constraints]]\nkind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n\
+                  upper = 1e-4\n[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 0.9\n\
+                  [[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper_ratio = 1.1\n[design]";
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq] {
+        let (run, _) = with("shield_quick.toml", &[("[design]", limits)], |s| Optimizer {
+            algorithm,
+            max_evaluations: 60,
+            ..s
+        });
+        println!("{algorithm:?}: {:.6e} for {best:.6e}, {} evaluations", measured(&run, 0), run.evaluations);
+        assert_eq!(run.stop_reason, StopReason::Infeasible);
+        // Both searches end within the same tolerance of the objective.
+        assert!((measured(&run, 0) / best - 1.0).abs() < 1e-3, "{algorithm:?}: {}", measured(&run, 0) / best);
+    }
 }
 
 #[test]

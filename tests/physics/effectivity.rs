@@ -8,7 +8,8 @@ use fluxmorph::build::{Mode, set_up};
 use fluxmorph::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
 use fluxmorph::run::finer::{Cut, FinerProblem};
 use fluxmorph_geometry::Mesh;
-use fluxmorph_optimizer::problem::{Derivatives, EnrichedModels, NoProgress, SolverCache};
+use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::problem::{Derivatives, EnrichedModels, NoProgress, Problem, SolverCache};
 use fluxmorph_solver::enrichment::Effort;
 
 use crate::support::device::{BLOCK, SATURATED, written};
@@ -145,6 +146,41 @@ fn an_estimate_has_the_bits_of_one_alone_whatever_was_estimated_with_its_models_
         let alone = problem.estimate_error(&analysis, &mut EnrichedModels::new(Effort::Any));
         assert_eq!(shared, alone.expect("an estimate"));
     }
+}
+
+/// Two terms that are equal on the mesh, of which the second has the larger error.
+#[test]
+fn the_error_of_a_worst_case_knows_the_terms_that_are_the_worst_without_theirs() {
+    let worst = "objective.combine=\"worst_case\"";
+    let mut problem = crate::support::setup("shield_two_frequencies.toml", &[worst]).problem;
+    let analysed = |problem: &Problem| {
+        let moved = problem.moved(problem.shape().expect("a design").initial()).expect("a sound mesh");
+        let cache = &mut SolverCache::default();
+        problem.analyse(moved, Derivatives::None, cache, &mut NoProgress).expect("a field")
+    };
+    let estimated = |problem: &Problem| {
+        let estimate = problem.estimate_error(&analysed(problem), &mut EnrichedModels::new(Effort::Any));
+        estimate.expect("an estimate").objective
+    };
+    let values = analysed(&problem).terms;
+    let all = problem.objective().expect("a worst case").terms.clone();
+    let terms =
+        |problem: &mut Problem, terms: &[Term]| problem.objective_mut().expect("one").terms = terms.to_vec();
+    let mut alone = [0, 1].map(|k| {
+        let equal = Term { weight: 1.0 / values[k], ..all[k].clone() };
+        terms(&mut problem, std::slice::from_ref(&equal));
+        (estimated(&problem), equal)
+    });
+    alone.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let [(less, first), (more, second)] = alone;
+    assert!(more - less > 1e-3, "errors of {less} and {more} tell the terms apart");
+    // The first is the larger one on the mesh by half of that.
+    let lead = 0.5 * (more - less);
+    let first = Term { weight: (1.0 + lead) * first.weight, ..first };
+    terms(&mut problem, &[first, second]);
+    let found = estimated(&problem);
+    println!("errors {less:.4} and {more:.4} of the terms, {found:.4} of the worst case");
+    assert!((found - (1.0 + more - (1.0 + lead))).abs() < 1e-9, "{found}");
 }
 
 #[test]

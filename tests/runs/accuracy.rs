@@ -60,7 +60,8 @@ fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
 fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let home = folder();
     let out = home.path().join("out");
-    let options = ["--max-evaluations", "2", "--set", "analysis.order=1"];
+    let limit = "constraints=[{kind='energy', upper_ratio=1.5, name='energy'}, {kind='volume', region='core', upper_ratio=1}]";
+    let options = ["--max-evaluations", "2", "--set", "analysis.order=1", "--set", limit];
     finish(&mut shipped("inductor", &options).command("run", &out)).with(
         1,
         &["checking the best shape on finer elements", "F/F0 on a fresh mesh", "is curved, and its facets"],
@@ -68,6 +69,26 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let result = read_json(&out.join("result.json"));
     assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);
     assert!(result["accuracy"]["verdict"].is_string());
+    // A constraint on the field has an error bar, and is measured on the finer elements with a bound from there.
+    let [coarse, finer] = ["/constraints/0", "/objective/verification/constraints/0"].map(|key| {
+        let own = result.pointer(key).unwrap_or_else(|| panic!("{key} in {result}"));
+        assert_eq!(own["name"], "energy");
+        [number(own, "/value"), number(own, "/bound")]
+    });
+    println!("energy {coarse:?}, on finer elements {finer:?}");
+    assert!((0..2).all(|k| coarse[k] != finer[k] && (finer[k] / coarse[k] - 1.0).abs() < 0.1));
+    assert!(result["constraints"][0]["error_estimate"].is_number());
+    assert!(result["constraints"][1]["error_estimate"].is_null(), "a volume has none");
+    let on_finer = result["objective"]["verification"]["constraints"].as_array();
+    assert_eq!(on_finer.map(Vec::len), Some(1), "the volume is that of the run's mesh");
+    // The best design on halved edges, its bound from the initial one there.
+    let (halved, best) = (home.path().join("halved"), out.join("result.json"));
+    let no_estimate = "accuracy.estimate=false";
+    fluxmorph(&[&"solve", &best, &"--refine", &"1", &"--set", &no_estimate, &"--out", &halved]).completed();
+    let halved = read_json(&halved.join("result.json"));
+    let of_halved = ["/constraints/0/value", "/constraints/0/bound"].map(|key| number(&halved, key));
+    assert!((0..2).all(|k| (of_halved[k] / finer[k] - 1.0).abs() < 0.1), "{of_halved:?}");
+    assert!((of_halved[1] / of_halved[0] - finer[1] / finer[0]).abs() < 0.01 * finer[1] / finer[0]);
     // A round core and a round coil, of which no refinement of the mesh knows.
     let facets = &result["accuracy"]["facets"];
     println!("{facets}");

@@ -329,13 +329,13 @@ pub(super) fn fixed_elements(
         .collect()
 }
 
-/// The constraints of a configuration on its states and its shape.
+/// The constraints of a configuration on its states and its shape; without one those on the field alone.
 pub(super) fn constraints(
     config: &Config,
     source: &SourceMap,
     [full_mesh, mesh]: [&Mesh; 2],
     states: &[FieldModel],
-    shape: &Shape,
+    shape: Option<&Shape>,
 ) -> Result<Vec<Constraint>, Error> {
     let mut constraints = Vec::new();
     for (k, written) in config.constraints.iter().enumerate() {
@@ -347,6 +347,7 @@ pub(super) fn constraints(
                 let term = term(config, functional, mesh, states)?;
                 add(written.name.clone(), Quantity::Field(Box::new(term)), limit(*bound));
             }
+            Written::Body { .. } if shape.is_none() => {}
             Written::Body { kind, region, bound } => {
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);
                 let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
@@ -359,6 +360,7 @@ pub(super) fn constraints(
                 add(written.name.clone(), Quantity::Volume(body), limit(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
+                let Some(shape) = shape else { continue };
                 use geometric::ThicknessLimit::{Maximum, Minimum};
                 let bounds = [
                     minimum.map(|bound| ("minimum", bound, Minimum(bound), Limit::AtLeast(bound))),

@@ -210,19 +210,19 @@ fn problem_on(
     }
     let objective = functional::objective(config, &mesh, &states)?;
     let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
-    let (shape, constraints) = match (&design, body) {
+    let shape = match (&design, body) {
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);
             let observed = functional::fixed_elements(config, &mesh, &states)?;
-            let shape = shape::shape(inputs, config, body, &states, &observed)?;
-            let constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, &shape)?;
-            (Some(shape), constraints)
+            Some(shape::shape(inputs, config, body, &states, &observed)?)
         }
-        _ => (None, Vec::new()),
+        _ => None,
     };
     progress.stage(Stage::Other);
-    if shape.is_none() && !config.constraints.is_empty() {
-        warnings.push("[[constraints]] have no meaning without [design]: they are left out".to_owned());
+    let constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, shape.as_ref())?;
+    if shape.is_none() && constraints.len() < config.constraints.len() {
+        warnings
+            .push("[[constraints]] on a body have no meaning without [design]: they are left out".to_owned());
     }
     let bodies = functional::bodies(config, &mesh, &states)?;
     let problem =

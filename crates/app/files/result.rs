@@ -232,6 +232,10 @@ pub struct ConstraintResult {
     pub bound: f64,
     /// Whether the value keeps within the bound.
     pub satisfied: bool,
+    /// Estimated error of the value, with sign, less that of a bound which is a share of the initial value, in SI; `None` where there
+    /// is no estimate, and for quantities of the shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub error_estimate: Option<f64>,
 }
 
 /// A nonlinear solution, and how far it goes into the curves.
@@ -420,6 +424,7 @@ pub(crate) mod tests {
                 value: 1e-3,
                 bound: 1e-3,
                 satisfied: true,
+                error_estimate: None,
             }],
             design: Some(DesignResult {
                 values_m: vec![0.02],

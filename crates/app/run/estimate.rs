@@ -6,8 +6,9 @@
 //! eight times the elements, so that it has to be asked for.
 
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::{Constraint, Quantity};
 use fluxmorph_optimizer::memory_estimate::Sizes;
-use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Problem, SolverCache};
+use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Measured, Problem, SolverCache};
 use fluxmorph_solver::SolverError;
 use fluxmorph_solver::enrichment::Effort;
 
@@ -108,9 +109,14 @@ impl<'a> Estimator<'a> {
         };
         let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
         let [fine, coarse] = [&found, analysis].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
+        let of_field = |(_, own): &(usize, &Constraint)| matches!(own.quantity, Quantity::Field(_));
+        let constrained = self.setup.problem.constraints().iter().enumerate().filter(of_field);
+        let error = |((k, _), fine): ((usize, &Constraint), &Measured)| {
+            (k, OF_HALVED_EDGES * (fine.value - analysis.constraints[k].value))
+        };
         Ok(ErrorEstimate {
             objective: OF_HALVED_EDGES * (fine - coarse),
-            constraints: Vec::new(),
+            constraints: constrained.zip(&found.constraints).map(error).collect(),
             by_element: Vec::new(),
             iterations: found.linear_iterations,
         })

@@ -14,7 +14,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, S
 use fluxmorph_remesh::{Moved, StepToInversion};
 
 use crate::build::{Mode, Setup, memory_limit, remaining_nodes, set_up_on, with_cells_written_down};
-use crate::config::{Config, SourceMap};
+use crate::config::{Config, Limit, SourceMap};
 use crate::error::Error;
 
 /// A mesh that was cut, with the configuration of the field alone.
@@ -115,21 +115,21 @@ impl FinerProblem {
         Ok(problem.analyse(self.moved(shape)?, Derivatives::None, cache, &mut NoProgress)?)
     }
 
-    /// The objective at two shapes; `None` where a signal comes first.
-    pub fn values(
+    /// The analyses of two shapes; `None` where a signal comes first.
+    pub fn analyses(
         &self,
-        shapes: &[Mesh; 2],
+        [first, second]: &[Mesh; 2],
         interrupted: &dyn Fn() -> bool,
-    ) -> Result<Option<[f64; 2]>, Error> {
-        let mut cache = SolverCache::default();
-        let mut values = [f64::NAN; 2];
-        for (value, shape) in values.iter_mut().zip(shapes) {
-            if interrupted() {
-                return Ok(None);
-            }
-            *value = self.analyse(shape, &mut cache)?.objective.unwrap_or(f64::NAN);
+    ) -> Result<Option<[Analysis; 2]>, Error> {
+        let cache = &mut SolverCache::default();
+        if interrupted() {
+            return Ok(None);
         }
-        Ok(Some(values))
+        let first = self.analyse(first, cache)?;
+        if interrupted() {
+            return Ok(None);
+        }
+        Ok(Some([first, self.analyse(second, cache)?]))
     }
 }
 
@@ -159,9 +159,10 @@ impl Cut {
     }
 }
 
-/// A configuration without what moves, and without constraints, which mean nothing then.
+/// A configuration without what moves, and without constraints on that.
 fn field_alone(config: &Config) -> Config {
-    let alone = Config { design: None, remesh: None, morph: None, constraints: Vec::new(), ..config.clone() };
+    let mut alone = Config { design: None, remesh: None, morph: None, ..config.clone() };
+    alone.constraints.retain(|constraint| matches!(constraint.limit, Limit::Field { .. }));
     looked_at_once(alone)
 }
 

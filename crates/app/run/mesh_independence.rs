@@ -15,7 +15,6 @@
 
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::constraint::Bound;
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
@@ -25,7 +24,7 @@ use super::finer::{Cut, FinerMesh, FinerProblem, looked_at_once};
 use super::shape_pair::ShapePair;
 use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
-use crate::config::{Config, Constraint, Limit, SourceMap};
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{ObjectiveResult, Verification};
 use crate::show::Observer;
@@ -141,16 +140,10 @@ impl MeshIndependence<'_> {
         };
         match outcome {
             Ok(Outcome::Found(verification)) => {
-                let is_of_a_field = |constraint: &Constraint| matches!(constraint.limit, Limit::Field { .. });
-                if verification.constraints.is_empty() && self.config.constraints.iter().any(is_of_a_field) {
-                    observer.notice(
-                        "on the finer elements the objective alone is looked at: a constraint on the field may be violated there",
-                    );
-                }
                 for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
                     let (name, share) = (&constraint.name, constraint.value / constraint.bound - 1.0);
                     observer.warning(&format!(
-                        "on the fresh mesh the best shape violates the constraint `{name}`: {:+.2} % from its bound",
+                        "on the finer mesh the best shape violates the constraint `{name}`: {:+.2} % from its bound",
                         100.0 * share
                     ));
                 }
@@ -187,10 +180,10 @@ impl MeshIndependence<'_> {
         if let Some(shortage) = memory_limit::shortage_of(&finer.setup.problem) {
             return Ok(Outcome::TooLarge(shortage));
         }
-        let tets = finer.setup.problem.original().topology().tets().len();
-        let values = finer.values(&meshes.solved, interrupted)?;
-        let found = values.map(|values| verification(parts, tets, values)).transpose()?;
-        Ok(found.map_or(Outcome::CutShort, Outcome::Found))
+        let Some(analyses) = finer.analyses(&meshes.solved, interrupted)? else {
+            return Ok(Outcome::CutShort);
+        };
+        Ok(Outcome::Found(verification(&finer.setup.problem, parts, &analyses)?))
     }
 
     /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape or costs too much.
@@ -232,40 +225,38 @@ impl MeshIndependence<'_> {
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
         let problem = setup.problem;
-        let tets = problem.original().topology().tets().len();
-        let (mut values, mut bounds, mut constraints) = (Vec::new(), Vec::new(), Vec::new());
-        let mut cache = SolverCache::default();
-        for displacement in displacements {
-            if interrupted() {
-                return Ok(Outcome::CutShort);
-            }
-            let analysis = analysis_at(&problem, &mut cache, &displacement)?;
-            if values.is_empty() {
-                bounds = bounds_at(&problem, &analysis)?;
-            }
-            constraints = summary::constraints(&problem, &analysis, &bounds);
-            values.push(analysis.objective.unwrap_or(f64::NAN));
+        let cache = &mut SolverCache::default();
+        let [initial, best] = &displacements;
+        let initial = analysis_at(&problem, cache, initial)?;
+        if interrupted() {
+            return Ok(Outcome::CutShort);
         }
-        let (refinement, values) = (fresh.parts as f64, [values[0], values[1]]);
-        let found = verification(refinement, tets, values)?;
-        Ok(Outcome::Found(Verification { constraints, ..found }))
+        let best = analysis_at(&problem, cache, best)?;
+        Ok(Outcome::Found(verification(&problem, fresh.parts as f64, &[initial, best])?))
     }
 }
 
-/// What was found on a mesh with so many elements.
-fn verification(refinement: f64, tets: usize, [initial, best]: [f64; 2]) -> Result<Verification, Error> {
-    let ratio = best / initial;
+/// What the analyses of the initial and the best shape on such a mesh come to.
+fn verification(
+    problem: &Problem,
+    refinement: f64,
+    [initial, best]: &[Analysis; 2],
+) -> Result<Verification, Error> {
+    let [of_initial, of_best] = [initial, best].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
+    let ratio = of_best / of_initial;
     if !ratio.is_finite() {
         let cause = "the objective of the initial design is zero on the fresh mesh";
         return Err(OptimizerError::Optimisation { cause }.into());
     }
-    Ok(Verification { refinement, tets, initial, best, ratio, constraints: Vec::new() })
-}
-
-/// The bounds of the constraints where this is the analysis of the initial shape.
-fn bounds_at(problem: &Problem, initial: &Analysis) -> Result<Vec<Bound>, Error> {
-    let pairs = problem.constraints().iter().zip(&initial.constraints);
-    Ok(pairs.map(|(constraint, measured)| constraint.bound(measured.value)).collect::<Result<_, _>>()?)
+    let bounds = problem.bounds(None, initial)?;
+    Ok(Verification {
+        refinement,
+        tets: problem.original().topology().tets().len(),
+        initial: of_initial,
+        best: of_best,
+        ratio,
+        constraints: summary::constraints(problem, best, &bounds),
+    })
 }
 
 /// The configuration without what belongs to its own mesh.

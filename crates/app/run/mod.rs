@@ -57,7 +57,7 @@ pub(crate) use resume::configuration;
 pub(crate) use resume::resume_held;
 pub use resume::{RunLimits, SavedRun, resume};
 pub use solve::solve;
-use summary::{constraints, homogeneity, linear_solver, terms};
+use summary::{constraints, enter_errors, homogeneity, linear_solver, terms};
 
 /// What a session needs besides the configuration.
 #[derive(Clone, Copy)]
@@ -226,12 +226,16 @@ impl Session<'_> {
         };
         self.keep_search(&mut result, observer)?;
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
-        if let Some([_, at_best]) = &errors {
+        if let Some([at_initial, at_best]) = &errors {
+            let of_run = (&self.setup.problem, &optimised.bounds[..]);
+            enter_errors(&mut result.constraints, of_run, (Some(at_initial), at_best), observer);
             recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
-        let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved };
+        let members = best.analysis.members.iter().map(|member| member.value).collect();
+        let members = [optimised.initial_members.clone(), members];
+        let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved, members };
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);

@@ -2,11 +2,12 @@
 
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
+use fluxmorph_remesh::Moved;
 
 use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
-use super::summary::{constraints, design_result, homogeneity, terms};
+use super::summary::{constraints, design_result, enter_errors, homogeneity, terms};
 use super::{Options, Session};
 use crate::build::{Mode, memory_limit};
 use crate::config::{Config, FieldsKept, SourceMap};
@@ -33,22 +34,25 @@ pub fn solve(
     let p = values.as_deref().unwrap_or_default();
     let problem = &prepared.setup.problem;
     let mut moved = problem.moved(p)?;
+    // Bounds may be shares of what the initial design has.
+    let initial = problem.shape().map(|shape| shape.initial()).filter(|&initial| initial != p);
+    let mut initial = initial.map(|initial| problem.moved(initial)).transpose()?;
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
         let cut = Cut::Halvings(halvings);
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
         moved = finer.moved(&moved.mesh)?;
+        initial = initial.map(|initial| finer.moved(&initial.mesh)).transpose()?;
         prepared.setup = finer.setup;
         memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
     }
-    let p = if halvings > 0 { &[] } else { p };
     let session = prepared.begin("solve", observer)?;
     let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
         observer.phase("solving the field");
         let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
         let analysis = problem.analyse(moved, Derivatives::First, cache, stages)?;
-        let result = session.write_analysis((p, halvings), &analysis, observer)?;
+        let result = session.write_analysis((initial.take(), halvings), &analysis, observer)?;
         Ok(RunResult { design: design.take(), ..result })
     })?;
     Ok(concluded.result)
@@ -73,7 +77,7 @@ impl Session<'_> {
     /// Writes the field and the exports of an analysis; returns its result.
     fn write_analysis(
         &self,
-        (p, halvings): (&[f64], u32),
+        (initial, halvings): (Option<Moved>, u32),
         analysis: &Analysis,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
@@ -82,8 +86,14 @@ impl Session<'_> {
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
         }
-        let bounds = problem.bounds(p, analysis)?;
+        let is_initial = initial.is_none();
+        let bounds = problem.bounds(initial, analysis)?;
+        let mut constraints = constraints(problem, analysis, &bounds);
         let estimate = self.estimator().estimate(analysis, observer);
+        if let Some(estimate) = &estimate {
+            let at_initial = Some(estimate).filter(|_| is_initial);
+            enter_errors(&mut constraints, (problem, &bounds), (at_initial, estimate), observer);
+        }
         if config.output.fields != FieldsKept::Nothing {
             let error = estimate.as_ref().map(|estimate| estimate.by_element.as_slice());
             let error = error.filter(|by_element| !by_element.is_empty());
@@ -112,7 +122,7 @@ impl Session<'_> {
                 facets: self.facets_of(observer),
                 ..Accuracy::of_analysis(value, estimate.objective)
             }),
-            constraints: constraints(problem, analysis, &bounds),
+            constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })
     }

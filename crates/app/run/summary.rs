@@ -9,7 +9,7 @@ use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::objective::Term;
-use fluxmorph_optimizer::problem::{Analysis, Measured, Problem, Shape, Timings};
+use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Measured, Problem, Shape, Timings};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::linear::Method;
@@ -27,7 +27,7 @@ use crate::files::{
     LinearSolverResult, MeshResult, MultipoleResult, OpenResult, ProbeResult, RunResult, SaturatedRegion,
     SaturationResult, StateResult, StopReason, TermResult, peak_memory_bytes,
 };
-use crate::show::RunObserver;
+use crate::show::{Observer, RunObserver};
 
 impl Session<'_> {
     /// The parts of a result that run and solve share.
@@ -361,8 +361,39 @@ pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Boun
         value: measured.value,
         bound: bound.value,
         satisfied: bound.is_satisfied(measured.value),
+        error_estimate: None,
     };
     problem.constraints().iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
+}
+
+/// Share of a bound by which a constraint may be beyond it without its estimated error before that is said.
+const BEYOND: f64 = 1e-3;
+
+/// Enters what constraints on the field have for estimated errors at a design, and says which are kept on this mesh alone. A bound
+/// that is a share of the initial value has an error too: without the estimate `at_initial` nothing is known of such a constraint.
+pub(super) fn enter_errors(
+    results: &mut [ConstraintResult],
+    (problem, bounds): (&Problem, &[Bound]),
+    (at_initial, estimate): (Option<&ErrorEstimate>, &ErrorEstimate),
+    observer: &mut dyn Observer,
+) {
+    for (place, &(k, of_value)) in estimate.constraints.iter().enumerate() {
+        let of_bound = match problem.constraints()[k].limit.share() {
+            Some(share) => at_initial.map(|initial| share * initial.constraints[place].1),
+            None => Some(0.0),
+        };
+        let Some(error) = of_bound.map(|of_bound| of_value - of_bound) else { continue };
+        let result = &mut results[k];
+        result.error_estimate = Some(error);
+        let beyond = bounds[k].excess(result.value + error);
+        if result.satisfied && beyond > BEYOND {
+            observer.notice(&format!(
+                "the constraint `{}` keeps its bound on this mesh; without the estimated error of the mesh it is {:.2} % beyond",
+                result.name,
+                100.0 * beyond
+            ));
+        }
+    }
 }
 
 /// How the linear systems of an analysis were solved.
@@ -376,4 +407,67 @@ pub(super) fn linear_solver(
     };
     let methods = problem.states().iter().zip(&analysis.methods).map(name).collect();
     LinearSolverResult { methods, worst_residual, iterations: analysis.linear_iterations }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use fluxmorph_optimizer::constraint::{Limit, Quantity};
+    use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
+
+    use super::*;
+    use crate::build::{Mode, set_up};
+    use crate::config::Config;
+
+    /// What the observer received.
+    #[derive(Default)]
+    struct Notices(Vec<String>);
+
+    impl Observer for Notices {
+        fn notice(&mut self, message: &str) {
+            self.0.push(message.to_owned());
+        }
+    }
+
+    #[test]
+    fn a_constraint_that_is_kept_by_its_error_alone_is_said() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
+        let limits = "constraints=[{kind='loss', region='plate', upper=1, name='own'}, \
+                      {kind='loss', region='plate', upper_ratio=1.1, name='share'}, \
+                      {kind='volume', region='plate', upper_ratio=1}]";
+        let (config, source) = Config::from_file(&path, &[limits.to_owned()]).expect("sound");
+        let problem = set_up(&config, &source, Mode::Optimisation).expect("a sound problem").problem;
+        let moved = problem.moved(problem.shape().expect("a design").initial()).expect("a sound mesh");
+        let analysis =
+            problem.analyse(moved, Derivatives::None, &mut SolverCache::default(), &mut NoProgress);
+        let analysis = analysis.expect("a field");
+        let (value, error) = (analysis.constraints[0].value, 0.05 * analysis.constraints[0].value);
+        let estimate = ErrorEstimate {
+            objective: 0.0,
+            constraints: vec![(0, error), (1, error)],
+            by_element: Vec::new(),
+            iterations: 0,
+        };
+        let mut bounds = problem.bounds(None, &analysis).expect("numbers");
+        // Between the value and what it is without its error.
+        let between = Constraint {
+            name: "own".to_owned(),
+            quantity: Quantity::Field(Box::new(problem.objective().expect("one").terms[0].clone())),
+            limit: Limit::AtMost(1.02 * value),
+        };
+        bounds[0] = between.bound(value).expect("a number");
+        let entered = |at_initial| {
+            let (mut results, mut notices) = (constraints(&problem, &analysis, &bounds), Notices::default());
+            enter_errors(&mut results, (&problem, &bounds), (at_initial, &estimate), &mut notices);
+            (results.into_iter().map(|own| own.error_estimate).collect::<Vec<_>>(), notices.0)
+        };
+        let (errors, notices) = entered(None);
+        assert_eq!(errors, [Some(error), None, None]);
+        assert_eq!(notices.len(), 1);
+        assert!(notices[0].contains("`own`") && notices[0].contains("2.94 % beyond"), "{notices:?}");
+        // A bound of 1.1 times the initial value has 1.1 times its error.
+        let (errors, _) = entered(Some(&estimate));
+        assert_eq!(errors, [Some(error), Some(error - 1.1 * error), None]);
+    }
 }

@@ -207,9 +207,11 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
 }
 
 fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
-    let ConstraintResult { name, value, bound, satisfied } = constraint;
+    let ConstraintResult { name, value, bound, satisfied, error_estimate } = constraint;
+    let bar =
+        error_estimate.map_or(String::new(), |error| format!(" ± {:.1e} (estimated)", SAFETY * error.abs()));
     let verdict = if *satisfied { "satisfied".to_owned() } else { styled(styles.bad, "VIOLATED") };
-    ("constraint", format!("{}: {value:.6e}, bound {bound:.6e}, {verdict}", printable(name)))
+    ("constraint", format!("{}: {value:.6e}{bar}, bound {bound:.6e}, {verdict}", printable(name)))
 }
 
 /// Losses by state, with the words that tell it from others.

@@ -60,6 +60,16 @@ pub struct Bound {
     slope: f64,
 }
 
+impl Limit {
+    /// What it is a multiple of the initial value by; `None` for one in SI.
+    pub fn share(self) -> Option<f64> {
+        match self {
+            Self::AtMostRatio(share) | Self::AtLeastRatio(share) => Some(share),
+            Self::AtMost(_) | Self::AtLeast(_) => None,
+        }
+    }
+}
+
 impl Constraint {
     /// Value and gradient of a quantity of the shape alone; `None` for one of the field.
     ///

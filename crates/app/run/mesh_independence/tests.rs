@@ -158,7 +158,7 @@ fn where_a_fresh_mesh_costs_too_much_elements_are_cut() {
     let original = problem.original().clone();
     let best = shape.carried(shape.initial(), &dished(&setup)).expect("a mild shape").moved.mesh;
     let (full, tets) = (setup.full_mesh.clone(), original.topology().tets().len());
-    let meshes = ShapeMeshes { full, solved: [original, best] };
+    let meshes = ShapeMeshes { full, solved: [original, best], members: [Vec::new(), Vec::new()] };
     let fresh = FreshMesh { work: 1.0, ..FreshMesh::of(&config, problem).expect("a generated mesh") };
     let shapes = ShapePair::of(&config, &setup, &dished(&setup)).expect("a design");
     let check = MeshIndependence {

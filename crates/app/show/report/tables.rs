@@ -11,7 +11,7 @@ use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline};
 use crate::config::{BodyKind, Constraint, Limit, Objective, RegionModel};
-use crate::files::{ConstraintResult, ProbeResult, RunResult, StateResult, TermResult};
+use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
 
 /// Rows of a table that is shown at once; a longer one is opened by the reader.
@@ -178,10 +178,12 @@ fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Mark
         let verdict = if c.satisfied { "satisfied" } else { "violated" };
         let (unit, factor) = constraint_unit(&c.name, constraints);
         let [value, bound] = [c.value, c.bound].map(|v| format!("{} {unit}", number(factor * v, 5)));
-        vec![c.name.clone(), value, bound, verdict.to_owned()]
+        let bar =
+            c.error_estimate.map(|error| format!("± {} {unit}", number(factor * SAFETY * error.abs(), 2)));
+        vec![c.name.clone(), value, bar.unwrap_or_default(), bound, verdict.to_owned()]
     };
     let rows: Vec<Vec<String>> = results.iter().map(row).collect();
-    let head = ["constraint", "value", "bound", ""];
+    let head = ["constraint", "value", "error bar (estimated)", "bound", ""];
     titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
 }
 

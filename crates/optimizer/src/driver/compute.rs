@@ -67,7 +67,8 @@ impl Run<'_> {
         analysis.timings.remesh += before;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
-        let initial = self.initial(objective, analysis.quality.worst, &values)?;
+        let members = || analysis.members.iter().map(|member| member.value).collect();
+        let initial = self.initial((objective, &members), analysis.quality.worst, &values)?;
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
         // Before anything of it is kept.
@@ -107,7 +108,7 @@ impl Run<'_> {
     /// Scale of the objective and bounds of the constraints, which the first design fixes.
     pub(super) fn initial(
         &mut self,
-        objective: f64,
+        (objective, members): (f64, &dyn Fn() -> Vec<f64>),
         quality: f64,
         measured: &[f64],
     ) -> Result<Initial, Error> {
@@ -122,7 +123,8 @@ impl Run<'_> {
         }
         let constraints = self.problem.constraints().iter().zip(measured);
         let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
-        let initial = Initial { objective, quality, bounds: bounds.collect::<Result<_, _>>()? };
+        let bounds = bounds.collect::<Result<_, _>>()?;
+        let initial = Initial { objective, members: members(), quality, bounds };
         Ok(self.initial.insert(initial).clone())
     }
 

@@ -11,6 +11,8 @@ use crate::problem::{Analysis, SolverCache};
 #[derive(Clone, Debug)]
 pub(super) struct Initial {
     pub(super) objective: f64,
+    /// The terms of a worst case with their weights; empty otherwise.
+    pub(super) members: Vec<f64>,
     pub(super) quality: f64,
     pub(super) bounds: Vec<Bound>,
 }

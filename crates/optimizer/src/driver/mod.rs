@@ -11,6 +11,8 @@
 //!   around it (`trust_region`). Where nothing is left the run ends with [`StopReason::MeshLimited`]; so does one whose method came
 //!   to its tolerance in a small trust region while the gradient promises as much as before (`promised_gain`): that is no
 //!   convergence.
+//! * Where the method ends and no design keeps all constraints, the worst of them is minimised until one does; then the method goes
+//!   on from there. Where none does the run ends with the least violation.
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
@@ -115,6 +117,7 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
     match search.decide(run, ended)? {
         NextStep::Stop(reason) => return Ok(Some(reason)),
         NextStep::SearchOn => {}
+        NextStep::Restore => search.restore(run),
         NextStep::TightenTolerance => search.tighten_tolerance(run),
         NextStep::MoveTrustRegion => search.move_trust_region(run),
         NextStep::ShrinkTrustRegion { refused, gained } => search.shrink_trust_region(run, &refused, gained),

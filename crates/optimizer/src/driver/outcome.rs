@@ -30,6 +30,8 @@ pub struct Optimised {
     pub iterations: usize,
     /// The objective at the start.
     pub initial: f64,
+    /// The terms of a worst case there, with their weights; empty otherwise.
+    pub initial_members: Vec<f64>,
     /// Bounds of the constraints, in their order.
     pub bounds: Vec<Bound>,
     /// The best design.

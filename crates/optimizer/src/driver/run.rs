@@ -129,6 +129,11 @@ impl<'a> Run<'a> {
         self.best.as_ref().map(|best| (best.violation, best.objective))
     }
 
+    /// Whether there are designs, and none keeps all constraints.
+    pub(super) fn violates(&self) -> bool {
+        self.best.as_ref().is_some_and(|best| best.violation > 0.0)
+    }
+
     /// Whether the best design is better than it was `before`, after so many evaluations and with those
     /// [`Run::incumbent_values`], by more than the share `least`.
     pub(super) fn has_gained(&self, before: (usize, Option<(f64, f64)>), least: f64) -> bool {
@@ -259,6 +264,7 @@ impl<'a> Run<'a> {
             evaluations: self.evaluations,
             iterations: self.iterations,
             initial: initial.objective,
+            initial_members: initial.members,
             bounds: initial.bounds,
             best,
             initial_quality: initial.quality,

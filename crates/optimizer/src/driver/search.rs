@@ -7,7 +7,7 @@ use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
 use super::{Settings, StopReason};
 use crate::error::Error;
-use crate::nlopt::{Ending, Minimisation, Outcome, minimise};
+use crate::nlopt::{Ending, Minimisation, Outcome, Sample, minimise};
 
 /// How much of the trust region is left after a design in it was refused and nothing was gained.
 const SHRINK: f64 = 0.5;
@@ -46,6 +46,8 @@ pub(super) enum NextStep {
     TightenTolerance,
     /// From the best design, where the mesh leaves little room or the search has come from outside the constraints.
     SearchOn,
+    /// For a design that keeps all constraints, where the method has found none.
+    Restore,
     /// Around the best design.
     MoveTrustRegion,
     ShrinkTrustRegion {
@@ -62,6 +64,8 @@ pub(super) struct Search<'a> {
     /// How often the trust region shrank since the last gain.
     shrinks: usize,
     tightenings: usize,
+    /// Whether the worst constraint is minimised as long as no design keeps all.
+    is_restoring: bool,
     /// The design refused last.
     refused: Option<Refusal>,
 }
@@ -74,6 +78,7 @@ impl<'a> Search<'a> {
             ftol_rel: settings.ftol_rel,
             shrinks: 0,
             tightenings: 0,
+            is_restoring: false,
             refused: None,
         }
     }
@@ -81,18 +86,24 @@ impl<'a> Search<'a> {
     /// Runs the method once within the trust region, from the best design.
     pub(super) fn minimise(&mut self, run: &mut Run<'_>) -> Ended {
         let [lower, upper] = self.trust.bounds(run.shape());
+        let restores = self.is_restoring && run.violates();
+        let of_problem = if restores { run.constraint_count() } else { 0 };
         let minimisation = Minimisation {
             algorithm: self.settings.algorithm,
             lower,
             upper,
-            constraints: run.method_constraint_count(),
-            members: run.member_count(),
+            constraints: run.method_constraint_count() - of_problem,
+            members: if restores { of_problem } else { run.member_count() },
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
             first_step: self.settings.first_step,
         };
         let before = (run.evaluations(), run.incumbent_values());
-        let outcome = minimise(&minimisation, &run.centre(), |p| run.evaluate(p));
+        let outcome = minimise(&minimisation, &run.centre(), |p| match run.evaluate(p)? {
+            _ if restores && !run.violates() => Err(Stop::CutShort),
+            sample if restores => Ok(of_violation(sample, of_problem)),
+            sample => Ok(sample),
+        });
         let evaluations = run.evaluations() - before.0;
         if let Outcome::Interrupted(Stop::Mesh(refusal)) = &outcome {
             self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
@@ -110,6 +121,7 @@ impl<'a> Search<'a> {
         let Ended { outcome, gained, evaluations } = ended;
         match outcome {
             Outcome::Ended(ending) => Ok(self.after_ending(run, ending, gained, evaluations)),
+            Outcome::Failed(_) if run.violates() && !self.is_restoring => Ok(NextStep::Restore),
             Outcome::Failed(cause) if run.has_best() => {
                 run.warn(cause);
                 Ok(NextStep::Stop(StopReason::MethodStalled))
@@ -132,8 +144,11 @@ impl<'a> Search<'a> {
     /// After a method that ended by itself.
     fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
         let has_entered = ending == Ending::Entered;
-        if has_entered && run.incumbent_values().is_some_and(|(violation, _)| violation == 0.0) {
+        if has_entered && !run.violates() {
             return NextStep::SearchOn;
+        }
+        if run.violates() && !self.is_restoring {
+            return NextStep::Restore;
         }
         // A method that was given nothing new will not be at its next start either.
         let is_stuck = run.is_held_back && evaluations == 0;
@@ -160,7 +175,7 @@ impl<'a> Search<'a> {
     fn is_throttled(&self, run: &mut Run<'_>) -> bool {
         let scale = self.trust.scale;
         let Some([before, now]) = run.promised_gains() else { return false };
-        let is_throttled = scale < 1.0 && now > STILL_PROMISED * before;
+        let is_throttled = scale < 1.0 && !run.violates() && now > STILL_PROMISED * before;
         if is_throttled {
             run.warn(&format!(
                 "not converged: the search came to its tolerance in a trust region of {:.1} % of the bound range, where the \
@@ -197,6 +212,14 @@ impl<'a> Search<'a> {
         ));
     }
 
+    /// Continues with the worst constraint as the objective.
+    pub(super) fn restore(&mut self, run: &mut Run<'_>) {
+        self.is_restoring = true;
+        self.ftol_rel = self.settings.ftol_rel;
+        run.observer
+            .note("no design yet keeps all constraints: the search goes on for one with the least violation");
+    }
+
     /// Centres the trust region on the best design.
     pub(super) fn move_trust_region(&mut self, run: &Run<'_>) {
         self.trust = TrustRegion::new(run.centre(), self.trust.scale);
@@ -212,4 +235,14 @@ impl<'a> Search<'a> {
             100.0 * self.trust.scale
         ));
     }
+}
+
+/// What the method sees of a design while none keeps the constraints of the problem: the worst of these is the objective. The others
+/// are what the mesh leaves of room.
+fn of_violation(mut sample: Sample, of_problem: usize) -> Sample {
+    let others = sample.constraints.split_off(of_problem);
+    let members = std::mem::replace(&mut sample.constraints, others);
+    let of_worse = |worst: usize, k: usize| if members[k].0 > members[worst].0 { k } else { worst };
+    let (value, gradient) = members[(1..members.len()).fold(0, of_worse)].clone();
+    Sample { value, gradient, members, ..sample }
 }

@@ -49,13 +49,13 @@ impl AdjointAccumulator {
         owner: &str,
         work: &mut Work<'_>,
         solved: &mut Solved<'_>,
-        terms: &[(usize, &Term)],
+        terms: &[&Term],
         shape: Option<&Shape>,
     ) -> Result<(), Error> {
         let Solved { index, model, system, state } = solved;
         let mut clock = Stopwatch::start();
         let mut right_side: Option<Vec<c64>> = None;
-        for (number, term) in terms.iter().filter(|(_, term)| term.states.contains(index)) {
+        for (number, term) in terms.iter().enumerate().filter(|(_, term)| term.states.contains(index)) {
             work.timings.gradient += clock.lap();
             for &winding in term.functional.windings() {
                 model.respond(system, winding, state).map_err(finite::of_term(owner, term, model))?;
@@ -65,7 +65,7 @@ impl AdjointAccumulator {
             let evaluated = term.functional.evaluate(model, work.mesh, state);
             let FunctionalValue { value, derivative, explicit, inductances } =
                 evaluated.map_err(finite::of_term(owner, term, model))?;
-            self.values[*number] += value;
+            self.values[number] += value;
             let Some(shape) = shape else { continue };
             if !derivative.is_empty() {
                 let sum = right_side.get_or_insert_default();

@@ -89,6 +89,14 @@ impl Problem {
         analysis: &Analysis,
         models: &mut EnrichedModels,
     ) -> Result<ErrorEstimate, Error> {
+        let groups = self.groups_of_terms();
+        let values: Vec<f64> = match &analysis.members[..] {
+            [] => vec![0.0],
+            members => members.iter().map(|member| member.value).collect(),
+        };
+        let worst = |values: &[f64]| self.objective().map_or(0, |objective| objective.worst(values));
+        let active = worst(&values);
+        let mut errors = vec![0.0; groups.len()];
         let mut estimate = ErrorEstimate {
             objective: 0.0,
             constraints: self.field_constraints().map(|(k, _)| (k, 0.0)).collect(),
@@ -104,14 +112,18 @@ impl Problem {
             let solution = &analysis.solutions[index];
             let enriched = Enrichment::new(coarse, fine, (&analysis.mesh, solution), shared)?;
             let mut state = State { coarse, enriched, analysis, index };
-            let terms = self.terms_of_value(analysis);
-            estimate.objective += state.error_of(&terms, Some(&mut estimate.by_element))?;
+            for (k, (error, group)) in errors.iter_mut().zip(&groups).enumerate() {
+                *error += state.error_of(group, Some(&mut estimate.by_element).filter(|_| k == active))?;
+            }
             for (error, (_, term)) in estimate.constraints.iter_mut().zip(self.field_constraints()) {
                 error.1 += state.error_of(&[term], None)?;
             }
             estimate.iterations += state.enriched.iterations();
             before = Some(state.enriched);
         }
+        // Without its error another term may be the worst one.
+        let corrected: Vec<f64> = values.iter().zip(errors).map(|(value, error)| value + error).collect();
+        estimate.objective = corrected[worst(&corrected)] - values[active];
         Ok(estimate)
     }
 }
@@ -130,6 +142,9 @@ impl State<'_> {
         let mesh = &self.analysis.mesh;
         let solution = &self.analysis.solutions[self.index];
         let own = || terms.iter().filter(|term| term.states.contains(&self.index));
+        if own().next().is_none() {
+            return Ok(0.0);
+        }
         for &winding in own().flat_map(|term| term.functional.windings()) {
             if let Some(response) = solution.response(winding) {
                 self.enriched.respond(winding, response)?;

@@ -200,10 +200,7 @@ impl Problem {
         cache: &mut SolverCache,
         shape: Option<&Shape>,
     ) -> Result<Sums<'_>, Error> {
-        let terms: Vec<(usize, &Term)> = self.terms().iter().enumerate().collect();
-        let alone: Vec<[(usize, &Term); 1]> = self.terms().iter().map(|term| [(0, term)]).collect();
-        let groups: Vec<&[(usize, &Term)]> =
-            if self.is_worst_case() { alone.iter().map(|own| &own[..]).collect() } else { vec![&terms] };
+        let groups = self.groups_of_terms();
         let nodes = work.mesh.points().len();
         let fields: Vec<(usize, &Term)> = self.field_constraints().collect();
         let mut sums = Sums {
@@ -225,7 +222,7 @@ impl Problem {
                 }
                 for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
                     let name = format!("the constraint `{}`", self.constraints[*k].name);
-                    sum.add(&name, work, &mut solved, &[(0, *term)], shape)?;
+                    sum.add(&name, work, &mut solved, &[*term], shape)?;
                 }
                 let Solved { system, state, .. } = solved;
                 solutions[index] = Some(state);
@@ -352,13 +349,10 @@ impl Problem {
         weighted.iter().zip(&sums.objective).map(of).collect()
     }
 
-    /// The terms that the objective's value at an analysed design is made of: all, or the worst one.
-    pub(super) fn terms_of_value(&self, analysis: &Analysis) -> Vec<&Term> {
-        let Some(objective) = self.objective.as_ref().filter(|_| !analysis.members.is_empty()) else {
-            return self.terms().iter().collect();
-        };
-        let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
-        vec![&objective.terms[objective.worst(&values)]]
+    /// The terms of the objective: in one sum, or each alone where the worst counts.
+    pub(super) fn groups_of_terms(&self) -> Vec<Vec<&Term>> {
+        let terms = self.terms().iter();
+        if self.is_worst_case() { terms.map(|term| vec![term]).collect() } else { vec![terms.collect()] }
     }
 
     /// Constraints on functionals of the field, with their numbers.
@@ -376,9 +370,10 @@ impl Problem {
         differentiated: Option<&Shape>,
         sums: &Sums<'_>,
     ) -> Result<Vec<Measured>, Error> {
-        let Some(shape) = &self.shape else { return Ok(Vec::new()) };
         let of = |(k, constraint): (usize, &Constraint)| {
-            if let Some((value, gradient)) = constraint.of_shape(moved, shape)? {
+            if let Some(shape) = &self.shape
+                && let Some((value, gradient)) = constraint.of_shape(moved, shape)?
+            {
                 return Ok(Measured { value, gradient: differentiated.map(|_| gradient) });
             }
             let position = sums.fields.iter().position(|(number, _)| *number == k);

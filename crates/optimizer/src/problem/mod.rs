@@ -26,7 +26,7 @@ use fluxmorph_remesh::{Moved, RemeshError, StepToInversion};
 use fluxmorph_solver::FieldModel;
 
 use crate::body::Body;
-use crate::constraint::{Bound, Constraint, Limit};
+use crate::constraint::{Bound, Constraint, Quantity};
 use crate::error::Error;
 use crate::objective::WeightedSum;
 
@@ -52,10 +52,10 @@ pub struct Problem {
 
 impl Problem {
     /// A field problem on the undeformed mesh `original`, with one state a load case; without a shape nothing moves, and
-    /// no constraint has a meaning.
+    /// constraints on the field alone have a meaning.
     ///
     /// # Panics
-    /// If there is no state, a term is measured on a state that is not there, or there are constraints without a shape.
+    /// If there is no state, a term is measured on a state that is not there, or a body is constrained without a shape.
     pub fn new(
         original: Mesh,
         states: Vec<FieldModel>,
@@ -69,7 +69,11 @@ impl Problem {
             terms.flat_map(|term| &term.states).all(|&state| state < states.len()),
             "a term is measured on states of the problem"
         );
-        assert!(constraints.is_empty() || shape.is_some(), "what is constrained can move");
+        let is_of_the_field = |own: &Constraint| matches!(own.quantity, Quantity::Field(_));
+        assert!(
+            shape.is_some() || constraints.iter().all(is_of_the_field),
+            "a body that is constrained can move"
+        );
         Self { original, states, objective, constraints, shape, share: None, bodies: Vec::new() }
     }
 
@@ -121,7 +125,7 @@ impl Problem {
         self.objective.as_mut()
     }
 
-    /// What must keep within bounds; empty without a shape.
+    /// What must keep within bounds; without a shape functionals of the field alone.
     pub fn constraints(&self) -> &[Constraint] {
         &self.constraints
     }
@@ -179,25 +183,21 @@ impl Problem {
         }
     }
 
-    /// Bounds of the constraints; a share of the initial design's value costs its analysis, unless that is `p`.
+    /// Bounds of the constraints. `initial` is the mesh of the initial design where `analysis` is of another one: shares of its
+    /// values cost its analysis.
     ///
     /// # Errors
-    /// As [`Problem::evaluate`], and [`Error::Constraint`].
-    pub fn bounds(&self, p: &[f64], analysis: &Analysis) -> Result<Vec<Bound>, Error> {
-        let Some(shape) = self.shape.as_ref().filter(|_| !self.constraints.is_empty()) else {
-            return Ok(Vec::new());
+    /// As [`Problem::analyse`], and [`Error::Constraint`].
+    pub fn bounds(&self, initial: Option<Moved>, analysis: &Analysis) -> Result<Vec<Bound>, Error> {
+        let has_share = self.constraints.iter().any(|own| own.limit.share().is_some());
+        let initial = match initial.filter(|_| has_share) {
+            Some(moved) => {
+                let cache = &mut self.cache_after(analysis);
+                Some(self.analyse(moved, Derivatives::None, cache, &mut NoProgress)?)
+            }
+            None => None,
         };
-        let is_ratio = |constraint: &Constraint| {
-            matches!(constraint.limit, Limit::AtMostRatio(_) | Limit::AtLeastRatio(_))
-        };
-        let initial;
-        let measured = if p != shape.initial() && self.constraints.iter().any(is_ratio) {
-            let cache = &mut SolverCache::default();
-            initial = self.evaluate(shape.initial(), Derivatives::None, cache, &mut NoProgress)?;
-            &initial.constraints
-        } else {
-            &analysis.constraints
-        };
+        let measured = &initial.as_ref().unwrap_or(analysis).constraints;
         self.constraints.iter().zip(measured).map(|(constraint, m)| constraint.bound(m.value)).collect()
     }
 }
