@@ -56,6 +56,31 @@ fn steel_beyond_saturation_is_named_with_its_place() {
 }
 
 #[test]
+fn magnets_and_metals_that_do_not_exist_or_are_mirrored_reversed_are_warned_of() {
+    let sphere = repository("configs/sphere.toml");
+    let magnet = |remanence: &str| {
+        let own = format!("regions.sphere.remanence={remanence}");
+        let sets = ["--set", "analysis.frequency=0", "--set", &own];
+        texts(&finish(command(&[&"check", &sphere, &"--json"]).args(sets)).exits_with(0).json()["warnings"])
+    };
+    // The planes x_min and y_min are flux_parallel, z_min is flux_normal.
+    let found = magnet("[1, 0, 0]");
+    for part in [
+        "the magnet `sphere` is cut by `x_min`, a surface of flux_parallel",
+        "`z_min`, a surface of flux_normal",
+    ] {
+        assert!(found.contains(part), "no `{part}` in {found}");
+    }
+    assert!(!found.contains("y_min") && !found.contains("neodymium"), "along that plane it stays: {found}");
+    let found = magnet("[0, 0, 1200]");
+    assert!(found.contains("is 1200 T, more than any magnet has") && !found.contains("cut by"), "{found}");
+    let found = check(&["materials.steel.conductivity=58"]);
+    assert!(found.contains("\"58 MS/m\", where that is meant"), "{found}");
+    assert!(check(&["materials.steel.conductivity=3.5e8"]).contains("more than any metal"));
+    assert!(!check(&["materials.steel.conductivity=\"35 MS/m\""]).contains("metal"));
+}
+
+#[test]
 fn skins_are_audited_in_depth_at_the_bounds_and_of_the_result() {
     let thin = ["mesh.shield.skin=[\"0.4 mm\"]", "mesh.shield.side_skin=[\"0.5 mm\"]"];
     let found = check(&[&MESHED[..], &thin].concat());

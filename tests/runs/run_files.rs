@@ -327,7 +327,7 @@ fn a_converged_run_exits_with_success() {
     let out = home.path().join("out");
     // A tenth of the objective: the cautious first step of the method changes less, and is not taken for convergence.
     let arguments = ["--set", "optimizer.ftol_rel=0.1", "--max-evaluations", "30"];
-    on_quick("run", &out, &arguments).with(0, &["continuing with 1e-2"]);
+    on_quick("run", &out, &arguments).with(0, &["goes on with a relative tolerance of 1e-2"]);
     let run = RunFolder(out);
     assert_eq!(run.result()["stop_reason"], "objective_converged");
     assert_eq!(run.json("manifest.json")["status"], "converged");

@@ -351,6 +351,9 @@ pub(super) fn constraints(
             Written::Body { kind, region, bound } => {
                 let conductor = states[0].conductors().iter().find(|c| c.name == *region);
                 let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
+                if surface.is_none() {
+                    check_moves(source, k, (*kind, region), (shape, mesh))?;
+                }
                 let body =
                     geometric::Volume::new(mesh, full_mesh, region, surface).map_err(OptimizerError::from)?;
                 let body = match (kind, density(config, region)) {
@@ -388,6 +391,23 @@ pub(super) fn constraints(
         return Err(source.error(vec![fault]).into());
     }
     Ok(constraints)
+}
+
+/// Refuses to constrain a region of which no element has a node that may move.
+fn check_moves(
+    source: &SourceMap,
+    number: usize,
+    (kind, name): (BodyKind, &str),
+    (shape, mesh): (Option<&Shape>, &Mesh),
+) -> Result<(), Error> {
+    let topology = mesh.topology();
+    let (Some(shape), Ok(region)) = (shape, topology.region(name)) else { return Ok(()) };
+    if shape.motion().moving().iter().any(|e| topology.region_of()[e.index()] == region) {
+        return Ok(());
+    }
+    let message = format!("nothing of `{name}` moves with the design: its {} stays", kind.name());
+    let fault = source.diagnostic(&format!("constraints[{number}].region"), message);
+    Err(source.error(vec![fault.expected("a region that the design changes")]).into())
 }
 
 fn limit(bound: ValueBound) -> Limit {

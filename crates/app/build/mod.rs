@@ -50,8 +50,9 @@ use std::path::PathBuf;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::soundness::OpenPatch;
+use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::problem::{Problem, Progress, Stage};
+use fluxmorph_optimizer::problem::{Problem, Progress, Shape, Stage};
 use fluxmorph_solver::FieldModel;
 
 use self::curves::Curves;
@@ -200,6 +201,9 @@ fn problem_on(
         None => None,
     };
     sink.check()?;
+    if !motion_alone {
+        source.check(plausible::applied_field_faults(config, source, &full_mesh))?;
+    }
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
@@ -214,7 +218,11 @@ fn problem_on(
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);
             let observed = functional::fixed_elements(config, &mesh, &states)?;
-            Some(shape::shape(inputs, config, body, &states, &observed)?)
+            let shape = shape::shape(inputs, config, body, &states, &observed)?;
+            if group.is_none() {
+                check_initial_design(source, &shape)?;
+            }
+            Some(shape)
         }
         _ => None,
     };
@@ -254,6 +262,24 @@ fn look_at_mesh(
     }
     warnings.extend(soundness::layer_warnings(config, mesh));
     Ok(open)
+}
+
+/// Refuses an initial design of which the mesh carries a part alone. One process looks: several ranks move the mesh when all are set
+/// up.
+fn check_initial_design(source: &SourceMap, shape: &Shape) -> Result<(), Error> {
+    let initial = shape.initial();
+    if initial.iter().all(|&p| p == 0.0) {
+        return Ok(());
+    }
+    let carried = shape.carried(&vec![0.0; initial.len()], initial).map_err(OptimizerError::from)?;
+    if carried.share == 1.0 {
+        return Ok(());
+    }
+    let message = format!("the mesh carries {:.0} % of the initial design", 100.0 * carried.share);
+    let fault = source.diagnostic("design.initial", message);
+    Err(source
+        .error(vec![fault.expected("a design nearer to the mesh as it is, or more room for the mesh")])
+        .into())
 }
 
 /// Refuses a field problem whose potential no surface fixes.

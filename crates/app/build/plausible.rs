@@ -3,11 +3,11 @@
 //! What cannot be meant is refused at its key; what is rarely meant is a warning.
 
 use std::collections::HashSet;
+use std::ops::RangeInclusive;
 
-use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
@@ -26,6 +26,18 @@ const ALIKE: [f64; 2] = [2e-2, 2.0];
 
 /// Relative permeability below which none is of a usual material: bismuth has 0.9998.
 const LEAST_PERMEABILITY: f64 = 0.9;
+
+/// Conductivities [S/m] that are a metal's in MS/m: brass has 15, copper 58. Salt water has 5, ferrites less, carbon 10⁴.
+const OF_METALS_IN_MS: RangeInclusive<f64> = 10.0..=65.0;
+
+/// Conductivity that no metal has at room temperature [S/m]: silver has 6.3e7.
+const MOST_CONDUCTIVITY: f64 = 7e7;
+
+/// Remanence that no magnet has [T]: neodymium has 1.5.
+const MOST_REMANENCE: f64 = 2.0;
+
+/// Part of a unit vector along a plane, or across it, that is more than rounding.
+const INCLINED: f64 = 1e-3;
 
 /// Weights of the vertices at which an element is looked at: its middle, near every vertex, and on every edge.
 const NEAR: f64 = 0.85;
@@ -114,7 +126,22 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
                  superconductor does: of iron it is hundreds, and μr μ0 is not meant here"
             ));
         }
+        let conductivity = own.conductivity;
+        if OF_METALS_IN_MS.contains(&conductivity) {
+            warnings.push(format!(
+                "the material `{name}` has a conductivity of {conductivity} S/m, a millionth of a metal's: \"{conductivity} MS/m\", where \
+                 that is meant"
+            ));
+        } else if conductivity > MOST_CONDUCTIVITY {
+            warnings.push(format!(
+                "the material `{name}` has a conductivity of {conductivity:e} S/m, more than any metal at room temperature: silver has \
+                 6.3e7"
+            ));
+        }
     }
+    warnings.extend(config.regions.iter().flat_map(|(name, own)| {
+        own.remanence.map(|remanence| magnet_warnings(config, mesh, (name, remanence))).unwrap_or_default()
+    }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, body)));
     warnings.extend(unit_hint(config, mesh));
@@ -138,6 +165,89 @@ fn image_warning(config: &Config, topology: &Topology, coil: &Coil) -> Option<St
          along the current is flux_normal",
         coil.name
     ))
+}
+
+/// What to say of a magnet that is cut by a surface which mirrors a part of its remanence reversed, or that no magnet has.
+fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point)) -> Vec<String> {
+    let (topology, size) = (mesh.topology(), norm(remanence));
+    let mut warnings = Vec::new();
+    if size > MOST_REMANENCE {
+        warnings.push(format!(
+            "the remanence of `{name}` is {size} T, more than any magnet has: neodymium has 1.5 T"
+        ));
+    }
+    let Ok(region) = topology.region(name) else { return warnings };
+    let outer: HashSet<_> = topology.outer_faces(region).into_iter().map(face_key).collect();
+    let boundaries = &config.boundaries;
+    let across = |share: f64| share > INCLINED;
+    let along = |share: f64| beside(share) > INCLINED;
+    let kinds: [(_, &dyn Fn(f64) -> bool, _, _); 2] = [
+        (&boundaries.flux_parallel, &across, "flux_parallel", "across"),
+        (&boundaries.flux_normal, &along, "flux_normal", "along"),
+    ];
+    for (walls, is_reversed, kind, part) in kinds {
+        let cuts = |wall: &&String| {
+            let faces = faces_of(topology, [wall.as_str()]);
+            let mut own = faces.intersection(&outer);
+            own.any(|face| is_reversed(dot(normal(mesh, *face), remanence).abs() / size))
+        };
+        warnings.extend(walls.iter().find(cuts).map(|wall| {
+            format!(
+                "the magnet `{name}` is cut by `{wall}`, a surface of {kind}, which mirrors the part of its remanence {part} the surface \
+                 reversed"
+            )
+        }));
+    }
+    warnings
+}
+
+/// What a unit vector with this part across a surface has along it.
+fn beside(across: f64) -> f64 {
+    (1.0 - across * across).max(0.0).sqrt()
+}
+
+/// The unit normal of a face.
+fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
+    let area = area_vector(face.map(|node| mesh.points()[node.index()]));
+    area.map(|component| component / norm(area))
+}
+
+/// Faults of an applied field that lies along a surface which it can only cross at right angles, beside one where it is given: nothing
+/// of it would enter.
+pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
+    let Some(field) = &config.boundaries.uniform_field else { return Vec::new() };
+    let topology = mesh.topology();
+    let of = |names: &[String]| faces_of(topology, names.iter().map(String::as_str));
+    let applied: HashSet<NodeId> = of(&field.surfaces).into_iter().flatten().collect();
+    let size = norm(field.b);
+    let contradicts = |face: &[NodeId; 3]| {
+        face.iter().filter(|node| applied.contains(node)).count() >= 2
+            && beside(dot(normal(mesh, *face), field.b).abs() / size) > INCLINED
+    };
+    let expected = "flux_parallel, or the applied field there too";
+    let mut faults = Vec::new();
+    for (k, name) in config.boundaries.flux_normal.iter().enumerate() {
+        if faces_of(topology, [name.as_str()]).iter().any(contradicts) {
+            let message =
+                format!("the applied field does not cross `{name}` at right angles, as flux_normal asks");
+            faults
+                .push(source.diagnostic(&format!("boundaries.flux_normal[{k}]"), message).expected(expected));
+        }
+    }
+    let regions = (0..topology.region_names().len()).map(RegionId::new);
+    let outer = regions.flat_map(|region| topology.outer_faces(region)).map(face_key);
+    let conditions =
+        [of(&field.surfaces), of(&config.boundaries.flux_parallel), of(&config.boundaries.flux_normal)];
+    let mut open = outer.filter(|face| !conditions.iter().any(|own| own.contains(face)));
+    if let Some(face) = open.find(contradicts) {
+        let middle = centroid(face.map(|node| mesh.points()[node.index()]));
+        let message = format!(
+            "the applied field lies along the outer face at {}, which has no condition: flux crosses such faces at right angles",
+            millimetres(middle)
+        );
+        faults.push(source.diagnostic("boundaries.uniform_field", message).expected(expected));
+    }
+    faults
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
@@ -172,28 +282,21 @@ fn force_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<Strin
 pub(super) fn unit_hint(config: &Config, mesh: &Mesh) -> Option<String> {
     let size = size(mesh);
     let unlike = |width: &f64| *width < ALIKE[0] * size || *width > ALIKE[1] * size;
-    let of = |coil| Some((coil, widest(coil, mesh).filter(unlike)?));
+    let of = |coil: &Coil| {
+        let width = half_extent(coil).map(|[a, b, _]| 2.0 * a.max(b)).filter(unlike)?;
+        Some((coil.name.clone(), width))
+    };
     let (coil, width) = config.coils.iter().find_map(of)?;
     let unit = match &config.mesh {
         MeshConfig::File { .. } => "mesh.unit and the units of the coil",
         _ => "the units of the mesh and of the coil",
     };
-    Some(format!("the coil `{}` is {width:.4} m wide and the mesh {size:.4} m: check {unit}", coil.name))
+    Some(format!("the coil `{coil}` is {width:.4} m wide and the mesh {size:.4} m: check {unit}"))
 }
 
 fn size(mesh: &Mesh) -> f64 {
     let [low, high] = mesh.bounding_box();
     norm(sub(high, low))
-}
-
-/// Largest width of a coil [m]: that of its winding, or of the box around its region.
-fn widest(coil: &Coil, mesh: &Mesh) -> Option<f64> {
-    let CoilShape::Region(own) = &coil.shape else {
-        return half_extent(coil).map(|[a, b, _]| 2.0 * a.max(b));
-    };
-    let elements = mesh.topology().elements_of(mesh.topology().region(&own.region).ok()?);
-    let vertices: Vec<Point> = elements.into_iter().flat_map(|e| mesh.vertices(e)).collect();
-    (!vertices.is_empty()).then(|| AxisBox::around(&vertices).extent())
 }
 
 /// Half sizes of the box around an analytic coil, across its axis and along it [m].

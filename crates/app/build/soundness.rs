@@ -162,7 +162,7 @@ fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnost
     };
     let how_much = match contact {
         Contact { faces: 0, nodes, doubled, .. } => format!("{nodes} nodes, {doubled} of them doubled"),
-        Contact { faces, area, .. } => format!("{faces} faces of {:.4} cm²", area * 1e4),
+        Contact { faces, area, .. } => format!("{} of {:.4} cm²", count_of_faces(*faces), area * 1e4),
     };
     let message = format!("{who}, at {} and elsewhere: {how_much}", millimetres(contact.place));
     source
@@ -195,6 +195,10 @@ fn parts_fault(source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
     ]
 }
 
+fn count_of_faces(count: usize) -> String {
+    if count == 1 { "1 face".to_owned() } else { format!("{count} faces") }
+}
+
 /// What a patch is, where and how large.
 fn patch_text(hull: &Hull<'_>, patch: &OpenPatch) -> String {
     let region_at = |&face: &usize| hull.mesh().topology().region_name_at(hull.faces()[face].inside);
@@ -207,8 +211,8 @@ fn patch_text(hull: &Hull<'_>, patch: &OpenPatch) -> String {
         Situation::Hole => "the wall of a hole",
     };
     format!(
-        "{what} has no condition in [boundaries]: {} faces of `{regions}`, {:.4} cm², at {}",
-        patch.faces.len(),
+        "{what} has no condition in [boundaries]: {} of `{regions}`, {:.4} cm², at {}",
+        count_of_faces(patch.faces.len()),
         patch.area * 1e4,
         millimetres(patch.place)
     )

@@ -69,9 +69,17 @@ fn print(certificates: &Certificates, settings: &Settings, json: bool) -> Result
     let Some((certificate, name)) = all.into_iter().find(|(certificate, _)| !certificate.holds) else {
         return Ok(ExitCode::Success);
     };
+    let is_of_second_order =
+        certificate.directions.iter().all(|direction| direction.slope >= settings.least_slope);
+    let cure = if is_of_second_order {
+        "; the slope is that of a right gradient: what the residual of the linear solver leaves of differences may be larger than they \
+         are, and analysis.linear_solver.tolerance = 1e-14 tells"
+    } else {
+        ""
+    };
     Err(Error::Certificate {
         cause: format!(
-            "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} allowed)",
+            "least slope of {name} {:.4} (at least {} needed), largest relative difference {:.2e} (at most {:e} allowed){cure}",
             certificate.least_slope, settings.least_slope, certificate.largest_error, settings.largest_error
         ),
     })

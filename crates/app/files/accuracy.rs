@@ -7,6 +7,9 @@ use super::refinements::{RefinementStep, Refinements};
 /// Least share of a gain that must be left in another discretisation.
 const LEAST_SHARE: f64 = 0.5;
 
+/// Least gain, relative to the objective, of which anything can be said: a hundred times what the fields of checks are solved to.
+const LEAST_GAIN: f64 = 1e-5;
+
 /// What an estimate is multiplied by for an error bar: on meshes that show the device, estimates of 0.5 to 1.2 times the error
 /// have been measured (docs/verification.md, 2.12).
 pub const SAFETY: f64 = 2.0;
@@ -122,10 +125,10 @@ impl Accuracy {
         corrected
     }
 
-    /// Judges a gain by the ratios that other computations of the same shapes have; nothing is said of no gain or by none.
+    /// Judges a gain by the ratios that other computations of the same shapes have; nothing is said of hardly any gain, or by none.
     pub fn judge(&mut self, ratio: f64, others: &[f64]) {
         let share = |other: &f64| (other - 1.0) / (ratio - 1.0);
-        if ratio == 1.0 || others.is_empty() {
+        if (ratio - 1.0).abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
         let is_left = others.iter().all(|other| share(other) >= LEAST_SHARE);
@@ -166,6 +169,7 @@ mod tests {
         assert_eq!(verdict(2.0, &[1.6]), Some(Verdict::Confirmed));
         assert_eq!(verdict(2.0, &[1.4]), Some(Verdict::NotConfirmed));
         assert_eq!(verdict(1.0, &[1.0]), None);
+        assert_eq!(verdict(1.000_002_4, &[1.000_002]), None, "as much may be rounding");
         assert_eq!(verdict(0.5, &[]), None);
     }
 

@@ -99,7 +99,7 @@ impl Session<'_> {
     /// What is known of how exact the ratio of a run is.
     pub(super) fn accuracy(
         &self,
-        (objective, stop_reason): (&ObjectiveResult, StopReason),
+        (objective, stop_reason, keeps_all): (&ObjectiveResult, StopReason, bool),
         meshes: &ShapeMeshes,
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn Observer,
@@ -159,9 +159,10 @@ impl Session<'_> {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
         let others: Vec<f64> =
             [objective.verified_ratio, corrected, cross_check].into_iter().flatten().collect();
-        // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain.
+        // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain, nor has one
+        // that violates a constraint.
         let sign = self.config.objective.as_ref().map_or(1.0, |objective| objective.goal.sign());
-        if sign * objective.best < sign * objective.initial {
+        if keeps_all && sign * objective.best < sign * objective.initial {
             accuracy.judge(objective.ratio, &others);
         }
         if accuracy.verdict == Some(Verdict::NotConfirmed) {

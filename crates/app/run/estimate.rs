@@ -6,7 +6,7 @@
 //! eight times the elements, so that it has to be asked for.
 
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::constraint::{Constraint, Quantity};
+use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Measured, Problem, SolverCache};
 use fluxmorph_solver::SolverError;
@@ -108,14 +108,24 @@ impl<'a> Estimator<'a> {
             None => FinerProblem::new(self.config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?,
         };
         let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
-        let [fine, coarse] = [&found, analysis].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
-        let of_field = |(_, own): &(usize, &Constraint)| matches!(own.quantity, Quantity::Field(_));
-        let constrained = self.setup.problem.constraints().iter().enumerate().filter(of_field);
-        let error = |((k, _), fine): ((usize, &Constraint), &Measured)| {
-            (k, OF_HALVED_EDGES * (fine.value - analysis.constraints[k].value))
+        let change = |(fine, coarse): (&Measured, &Measured)| OF_HALVED_EDGES * (fine.value - coarse.value);
+        let objective = match self.setup.problem.objective() {
+            Some(objective) if !analysis.members.is_empty() => {
+                let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
+                let errors: Vec<f64> = found.members.iter().zip(&analysis.members).map(change).collect();
+                objective.error_of_worst(&values, &errors).1
+            }
+            _ => {
+                let [fine, coarse] = [&found, analysis].map(|own| own.objective.unwrap_or(f64::NAN));
+                OF_HALVED_EDGES * (fine - coarse)
+            }
         };
+        let of_field = |(_, own): &(usize, &Constraint)| own.quantity.is_of_field();
+        let constrained = self.setup.problem.constraints().iter().enumerate().filter(of_field);
+        let error =
+            |((k, _), fine): ((usize, &Constraint), &Measured)| (k, change((fine, &analysis.constraints[k])));
         Ok(ErrorEstimate {
-            objective: OF_HALVED_EDGES * (fine - coarse),
+            objective,
             constraints: constrained.zip(&found.constraints).map(error).collect(),
             by_element: Vec::new(),
             iterations: found.linear_iterations,

@@ -141,7 +141,8 @@ impl MeshIndependence<'_> {
         match outcome {
             Ok(Outcome::Found(verification)) => {
                 for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
-                    let (name, share) = (&constraint.name, constraint.value / constraint.bound - 1.0);
+                    let (name, bound) = (&constraint.name, constraint.bound);
+                    let share = (constraint.value - bound) / bound.abs().max(f64::MIN_POSITIVE);
                     observer.warning(&format!(
                         "on the finer mesh the best shape violates the constraint `{name}`: {:+.2} % from its bound",
                         100.0 * share
@@ -245,7 +246,7 @@ fn verification(
     let [of_initial, of_best] = [initial, best].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
     let ratio = of_best / of_initial;
     if !ratio.is_finite() {
-        let cause = "the objective of the initial design is zero on the fresh mesh";
+        let cause = "the objective of the initial design is zero on the finer mesh";
         return Err(OptimizerError::Optimisation { cause }.into());
     }
     let bounds = problem.bounds(None, initial)?;

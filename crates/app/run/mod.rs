@@ -344,8 +344,9 @@ impl Session<'_> {
                 // `resume` can do it later: the search is complete, the run is not.
                 result.status = RunStatus::Interrupted;
             }
+            let keeps_all = result.constraints.iter().all(|constraint| constraint.satisfied);
             result.accuracy =
-                self.accuracy((objective, stop_reason), meshes, (errors, refinements), observer);
+                self.accuracy((objective, stop_reason, keeps_all), meshes, (errors, refinements), observer);
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);

@@ -35,7 +35,8 @@ pub fn solve(
     let problem = &prepared.setup.problem;
     let mut moved = problem.moved(p)?;
     // Bounds may be shares of what the initial design has.
-    let initial = problem.shape().map(|shape| shape.initial()).filter(|&initial| initial != p);
+    let has_share = problem.constraints().iter().any(|constraint| constraint.limit.share().is_some());
+    let initial = problem.shape().map(|shape| shape.initial()).filter(|&initial| has_share && initial != p);
     let mut initial = initial.map(|initial| problem.moved(initial)).transpose()?;
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {

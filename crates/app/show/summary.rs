@@ -1,5 +1,7 @@
 //! The end of a run, or of a single analysis, in a few lines.
 
+use std::collections::BTreeMap;
+
 use fluxmorph_optimizer::body::BodyForce;
 
 use super::styles::{Styles, styled};
@@ -7,7 +9,7 @@ use super::{Started, probes};
 use crate::config::{Goal, Objective};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, ObjectiveResult, RunResult, RunStatus, SAFETY,
-    SaturatedRegion, StateResult, Verdict,
+    SaturatedRegion, SaturationResult, StateResult, Verdict,
 };
 use crate::printable::printable;
 
@@ -52,19 +54,22 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let is_run = result.command != "solve";
     let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
     rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, styles)));
-    for (at, losses) in states(result) {
-        rows.extend(
-            losses
-                .iter()
-                .map(|(region, loss)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)))),
-        );
+    let states = states(result);
+    for (at, state) in &states {
+        let loss =
+            |(region, loss): (&String, &f64)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)));
+        rows.extend(state.losses.iter().map(loss));
     }
-    for BodyForce { name, force_n: [x, y, z], .. } in &result.forces {
-        rows.push(("force", format!("({x:.6e}, {y:.6e}, {z:.6e}) N on {}", printable(name))));
+    for (at, state) in &states {
+        let force = |BodyForce { name, force_n: [x, y, z], .. }: &BodyForce| {
+            ("force", format!("({x:.6e}, {y:.6e}, {z:.6e}) N on {}{at}", printable(name)))
+        };
+        rows.extend(state.forces.iter().map(force));
     }
-    if let Some(saturation) = &result.saturation {
-        rows.extend(saturation.regions.iter().map(saturated));
-        rows.push(("Newton steps", saturation.newton_steps.to_string()));
+    for (at, state) in &states {
+        let Some(saturation) = state.saturation else { continue };
+        rows.extend(saturation.regions.iter().map(|region| saturated(region, at)));
+        rows.push(("Newton steps", format!("{}{at}", saturation.newton_steps)));
     }
     if result.loads.is_empty() {
         rows.extend(result.coils.iter().map(|coil| ("coil", coil_text(coil))));
@@ -98,7 +103,7 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
 }
 
 /// How far a region goes into its B–H curve.
-fn saturated(region: &SaturatedRegion) -> Row {
+fn saturated(region: &SaturatedRegion, at: &str) -> Row {
     let SaturatedRegion { region: name, highest_b_t: highest, table_ends_b_t: end, .. } = region;
     let end = match end {
         Some(end) if highest > end => format!(", beyond its curve, which ends at {end} T"),
@@ -106,7 +111,7 @@ fn saturated(region: &SaturatedRegion) -> Row {
         None => String::new(),
     };
     let share = 100.0 * region.volume_share_beyond_knee;
-    let text = format!("{highest:.3} T in {}{end}; {share:.1} % is beyond the knee", printable(name));
+    let text = format!("{highest:.3} T in {}{at}{end}; {share:.1} % is beyond the knee", printable(name));
     ("highest B", text)
 }
 
@@ -214,16 +219,28 @@ fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
     ("constraint", format!("{}: {value:.6e}{bar}, bound {bound:.6e}, {verdict}", printable(name)))
 }
 
-/// Losses by state, with the words that tell it from others.
-fn states(result: &RunResult) -> Vec<(String, &std::collections::BTreeMap<String, f64>)> {
+/// What a state has.
+struct State<'a> {
+    losses: &'a BTreeMap<String, f64>,
+    forces: &'a [BodyForce],
+    saturation: Option<&'a SaturationResult>,
+}
+
+/// The states, with the words that tell each from the others.
+fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
     if result.states.is_empty() {
-        return vec![(String::new(), &result.losses_w)];
+        let RunResult { losses_w: losses, forces, saturation, .. } = result;
+        return vec![(String::new(), State { losses, forces, saturation: saturation.as_ref() })];
     }
-    let of = |state: &StateResult| match &state.load {
-        Some(load) => format!(" under {}", printable(load)),
-        None => format!(" at {} Hz", state.frequency_hz),
-    };
-    result.states.iter().map(|state| (of(state), &state.losses_w)).collect()
+    let of = result.states.iter().map(|own| {
+        let StateResult { load, frequency_hz, losses_w: losses, forces, saturation, .. } = own;
+        let at = match load {
+            Some(load) => format!(" under {}", printable(load)),
+            None => format!(" at {frequency_hz} Hz"),
+        };
+        (at, State { losses, forces, saturation: saturation.as_ref() })
+    });
+    of.collect()
 }
 
 /// The whole time, and the parts that took a tenth of it or more.

@@ -51,6 +51,16 @@ pub enum Limit {
     AtLeastRatio(f64),
 }
 
+impl Limit {
+    /// The multiple of the initial value that it is; `None` for one in SI.
+    pub fn share(self) -> Option<f64> {
+        match self {
+            Self::AtMostRatio(share) | Self::AtLeastRatio(share) => Some(share),
+            Self::AtMost(_) | Self::AtLeast(_) => None,
+        }
+    }
+}
+
 /// A limit whose number is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
@@ -60,13 +70,10 @@ pub struct Bound {
     slope: f64,
 }
 
-impl Limit {
-    /// What it is a multiple of the initial value by; `None` for one in SI.
-    pub fn share(self) -> Option<f64> {
-        match self {
-            Self::AtMostRatio(share) | Self::AtLeastRatio(share) => Some(share),
-            Self::AtMost(_) | Self::AtLeast(_) => None,
-        }
+impl Quantity {
+    /// Whether it is a functional of the field.
+    pub fn is_of_field(&self) -> bool {
+        matches!(self, Self::Field(_))
     }
 }
 

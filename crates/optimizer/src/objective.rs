@@ -69,6 +69,14 @@ impl WeightedSum {
         let sign = self.goal.sign();
         (1..values.len()).fold(0, |worst, k| if sign * values[k] > sign * values[worst] { k } else { worst })
     }
+
+    /// The place of the term that is the worst of some weighted values without their errors, and the error of the worst value: what
+    /// that term's true value has more than the worst of these.
+    pub fn error_of_worst(&self, values: &[f64], errors: &[f64]) -> (usize, f64) {
+        let corrected: Vec<f64> = values.iter().zip(errors).map(|(value, error)| value + error).collect();
+        let worst = self.worst(&corrected);
+        (worst, corrected[worst] - values[self.worst(values)])
+    }
 }
 
 impl Goal {

@@ -11,6 +11,8 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
+use fluxmorph_remesh::RemeshError;
+
 use crate::constraint::Quantity;
 use crate::error::Error;
 use crate::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
@@ -26,6 +28,10 @@ const LEAST_SLOPE: f64 = 1e-3;
 /// Steps for the bound on a thickness, a smooth maximum over many places: it bends within hundredths of a millimetre, and
 /// is computed without a field, so that small steps cost no digits.
 const FINE: [f64; 2] = [8e-5, 4e-7];
+
+/// How often the first step may be halved for a mesh that does not carry it: to a sixteenth, a little more than what a
+/// central difference takes.
+const MOST_HALVINGS: usize = 4;
 
 /// Steps of the certificate, and what it asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +122,8 @@ pub struct Named {
 /// Measures the certificates of a problem's objective and constraints at the design `p`; `progress` gets the name of the
 /// constraint, if it is one, after each direction. `interrupted` is asked before each evaluation.
 ///
-/// The directions are the same for all, and each design is evaluated once.
+/// The directions are the same for all, and each design is evaluated once. Where the mesh does not carry the first step, all begins
+/// anew with half of it, down to a sixteenth.
 ///
 /// # Errors
 /// [`Error::Interrupted`], or when an evaluation fails.
@@ -133,6 +140,29 @@ pub fn certify(
     Error::check_interrupted(interrupted)?;
     let mut cache = SolverCache::default();
     let base = problem.evaluate(p, Derivatives::First, &mut cache, &mut NoProgress)?;
+    let at = (p, &base, &cache);
+    let mut settings = *settings;
+    for _ in 0..MOST_HALVINGS {
+        match certify_at(problem, at, &settings, interrupted, &mut progress) {
+            Err(Error::Remesh(RemeshError::Inverted { .. })) => {
+                // The last step stays.
+                (settings.first_step, settings.halvings) =
+                    (0.5 * settings.first_step, settings.halvings.saturating_sub(1).max(1));
+            }
+            certified => return certified,
+        }
+    }
+    certify_at(problem, at, &settings, interrupted, &mut progress)
+}
+
+/// The same with these steps at an analysed design; the cache is what its analysis has left.
+fn certify_at(
+    problem: &Problem,
+    (p, base, cache): (&[f64], &Analysis, &SolverCache),
+    settings: &Settings,
+    interrupted: &dyn Fn() -> bool,
+    progress: &mut dyn FnMut(Option<&str>, usize, &Direction),
+) -> Result<Certificates, Error> {
     let span = span(problem);
     let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
     let value = |p: &[f64], index: usize| -> Result<f64, Error> {

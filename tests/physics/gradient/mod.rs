@@ -70,6 +70,21 @@ fn check_in_five(certificate: &Certificate) {
     assert!(certificate.directions.len() >= 5);
 }
 
+/// A design so near to where the mesh breaks that the first Taylor step cannot be taken both ways.
+#[test]
+fn the_steps_of_a_certificate_are_halved_where_the_mesh_does_not_carry_them() {
+    let problem = crate::support::setup("shield_quick.toml", &["design.lower=\"-9.9 mm\""]).problem;
+    let shape = problem.shape().expect("a shape");
+    let thin: Vec<f64> = shape.lower().iter().map(|lower| 0.97 * lower).collect();
+    let settings = Settings { directions: 1, halvings: 2, ..Settings::default() };
+    let certificates = certify(&problem, &thin, &settings, &|| false, |_, _, _| {}).expect("a certificate");
+    let certificate = &certificates.objective;
+    let first = certificate.directions[0].steps[0];
+    println!("first step {first:e}, slope {:.4}", certificate.least_slope);
+    assert!(first < settings.first_step && first >= settings.first_step / 16.0, "{first}");
+    assert!(certificate.largest_error < settings.largest_error, "{}", certificate.largest_error);
+}
+
 /// dF/dx against the motion of every node that the elastic map may move, each on its own.
 fn node_gradient_holds(problem: &Problem) {
     let shape = problem.shape().expect("a shape");

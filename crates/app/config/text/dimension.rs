@@ -61,16 +61,16 @@ dimensions! {
         decimal("\u{3bc}m", -6), scaled("in", 0.0254);
     /// A frequency [Hz].
     Frequency = "a frequency", in "Hz", such as "60 Hz":
-        decimal("Hz", 0), decimal("kHz", 3), decimal("MHz", 6);
+        decimal("Hz", 0), decimal("mHz", -3), decimal("kHz", 3), decimal("MHz", 6);
     /// An electric conductivity [S/m].
     Conductivity = "a conductivity", in "S/m", such as "7e6 S/m":
-        decimal("S/m", 0), decimal("MS/m", 6);
+        decimal("S/m", 0), decimal("kS/m", 3), decimal("MS/m", 6);
     /// A mass density [kg/m³].
     MassDensity = "a mass density", in "kg/m\u{b3}", such as "7850 kg/m3":
         decimal("kg/m3", 0), decimal("kg/m\u{b3}", 0), decimal("g/cm3", 3), decimal("g/cm\u{b3}", 3);
     /// A current, or ampere-turns [A].
     Current = "a current", in "A", such as "40 kA":
-        decimal("A", 0), decimal("kA", 3), decimal("AT", 0), decimal("kAT", 3);
+        decimal("A", 0), decimal("mA", -3), decimal("kA", 3), decimal("MA", 6), decimal("AT", 0), decimal("kAT", 3);
     /// A magnetic flux density [T].
     FluxDensity = "a flux density", in "T", such as "5 mT":
         decimal("T", 0), decimal("mT", -3), decimal("G", -4);

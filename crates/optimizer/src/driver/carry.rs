@@ -48,9 +48,14 @@ pub(super) struct Carriage {
 }
 
 impl Carriage {
+    /// Whether another design is evaluated in place of the one that was asked for.
+    pub(super) fn is_cut(&self) -> bool {
+        self.cut.is_some()
+    }
+
     /// Whether the mesh holds the evaluated design back.
     pub(super) fn is_held_back(&self) -> bool {
-        self.cut.is_some() || self.room < LEAST_ROOM + HELD_BACK
+        self.is_cut() || self.room < LEAST_ROOM + HELD_BACK
     }
 }
 

@@ -6,15 +6,22 @@ use std::time::Instant;
 use fluxmorph_geometry::ElementId;
 use fluxmorph_remesh::Moved;
 
-use super::carry::Standing;
+use super::carry::{Carriage, Standing};
 use super::incumbent::{BestField, Comparison, Initial};
 use super::run::Run;
-use super::stop::Stop;
+use super::stop::{Refusal, Stop};
 use super::{Evaluation, Record, StopReason, Watching, column};
 use crate::error::Error;
 use crate::geometric::WallThickness;
 use crate::nlopt::Sample;
 use crate::problem::{Analysis, Derivatives, Measured, Stage};
+
+/// Share of the range of every variable within which two designs are one: what a linear continuation leaves out of an objective is
+/// the square of it, about the residual that fields are solved to.
+const NEARLY_THE_SAME: f64 = 1e-5;
+
+/// How many designs in a row are answered so before the method is stopped, to search on nearer to the best design.
+const MOST_REPEATED: usize = 20;
 
 impl Run<'_> {
     /// ±F/|F0| and the constraints of a design, with their gradients; where the mesh does not carry it, what the method is to
@@ -24,11 +31,41 @@ impl Run<'_> {
         if self.known(p).is_none() && !self.is_replaying() {
             self.check_limits()?;
         }
-        let carried = self.carry(p)?;
+        let mut carried = self.carry(p)?;
         let before =
             Standing { best: self.best_evaluation(), values: (self.evaluations, self.incumbent_values()) };
-        let sample = self.sample_of(&carried.design, (&carried.moved, carried.seconds))?;
+        let sample = match self.find_repetition(&carried) {
+            Some(_) if self.repeated == MOST_REPEATED => {
+                self.repeated = 0;
+                let cause = "the mesh carries the method's designs no further than those before".to_owned();
+                return Err(Stop::Mesh(Refusal { cause }));
+            }
+            Some((design, sample)) => {
+                self.repeated += 1;
+                carried.design = design;
+                sample
+            }
+            None => self.sample_of(&carried.design, (&carried.moved, carried.seconds))?,
+        };
         self.answer(p, (&carried, before), sample)
+    }
+
+    /// The best design or the one before with what is known of it, where the mesh carries no more than that of the step to a design:
+    /// a computation would tell nothing new.
+    fn find_repetition(&self, carried: &Carriage) -> Option<(Vec<f64>, Sample)> {
+        // What several ranks compute comes back to rounding alone, and a replay must decide alike.
+        if !carried.is_cut() || self.is_shared_out {
+            return None;
+        }
+        let p = &carried.design;
+        let (lower, upper) = (self.shape().lower(), self.shape().upper());
+        let is_near = |own: &[f64]| {
+            (0..p.len()).all(|k| (p[k] - own[k]).abs() <= NEARLY_THE_SAME * (upper[k] - lower[k]))
+        };
+        let best = self.best.as_ref().map(|best| (&best.values, &best.sample));
+        let known = best.into_iter().chain(self.latest.as_ref().map(|sample| (&self.last, sample)));
+        let near = known.into_iter().find(|(own, _)| is_near(own));
+        near.map(|(own, sample)| (own.clone(), sample.clone()))
     }
 
     /// ±F/|F0| and the constraints of a design, on its mesh, which took so many seconds.

@@ -62,9 +62,12 @@ impl Incumbent {
         }
     }
 
-    /// Whether it has gained more than the share `least` on violation and objective of the best design before.
+    /// Whether it has gained more than the share `least` on the best design before: on its violation, or on its objective where it has
+    /// none.
     pub(super) fn has_gained(&self, (violation, objective): (f64, f64), least: f64) -> bool {
-        self.violation < (1.0 - least) * violation
-            || (self.objective - objective).abs() > least * objective.abs()
+        if violation > 0.0 {
+            return self.violation < (1.0 - least) * violation;
+        }
+        (self.objective - objective).abs() > least * objective.abs()
     }
 }

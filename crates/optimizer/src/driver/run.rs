@@ -8,7 +8,7 @@ use super::promised_gain::promised_gain;
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
-use crate::nlopt::Sample;
+use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
 use crate::problem::{Problem, Shape, SolverCache, Timings};
 
@@ -27,6 +27,10 @@ pub(super) struct Run<'a> {
     pub(super) iterations: usize,
     pub(super) initial: Option<Initial>,
     pub(super) last: Vec<f64>,
+    /// What the method has seen of the design before.
+    pub(super) latest: Option<Sample>,
+    /// Designs in a row that were answered from another one's sample.
+    pub(super) repeated: usize,
     /// The record that the next design should be answered with.
     pub(super) next: Option<Record>,
     pub(super) best: Option<Incumbent>,
@@ -70,6 +74,8 @@ impl<'a> Run<'a> {
             iterations: 0,
             initial: None,
             last,
+            latest: None,
+            repeated: 0,
             next: None,
             best: None,
             is_held_back: false,
@@ -197,6 +203,8 @@ impl<'a> Run<'a> {
         if self.promised.is_none() {
             self.promised = Some(self.promised_gain(&sample, &record.design));
         }
+        self.latest = Some(sample.clone());
+        self.repeated = 0;
         if comparison.is_improved() {
             self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
@@ -250,12 +258,16 @@ impl<'a> Run<'a> {
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
+        let violated = best.sample.constraints.iter().zip(self.problem.constraints());
+        let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
+        let names: Vec<String> =
+            violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
         let best = self.with_field(best)?;
         if best.violation > 0.0 {
             self.warn(&format!(
-                "no design keeps all constraints: the best one is beyond a bound by {:.1e} of it; loosen the constraint, \
-                 widen the design's bounds, or allow more evaluations",
-                best.violation
+                "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
+                 design's bounds, or allow more evaluations",
+                names.join(", of ")
             ));
         }
         let is_infeasible = stop_reason.is_converged() && best.violation > 0.0;

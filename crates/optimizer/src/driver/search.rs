@@ -29,6 +29,10 @@ const CAUTIOUS: usize = 3;
 /// promise less than a hundredth (`configs/shield_quick.toml`: 0.0001, with two frequencies 0.001).
 const STILL_PROMISED: f64 = 0.1;
 
+/// Multiple of the tolerance that the gradient may promise where a search has converged. What it promises is far above what is to be
+/// had: at the ends of the shipped runs one to ten times the tolerance.
+const PROMISED_TOLERANCES: f64 = 10.0;
+
 /// How often an end after the cautious first step is not believed.
 const MAX_TIGHTENINGS: usize = 3;
 
@@ -44,7 +48,8 @@ pub(super) struct Ended {
 pub(super) enum NextStep {
     Stop(StopReason),
     TightenTolerance,
-    /// From the best design, where the mesh leaves little room or the search has come from outside the constraints.
+    /// From the best design, where the mesh leaves little room, the search has come from outside the constraints, or the gradient
+    /// still promises much.
     SearchOn,
     /// For a design that keeps all constraints, where the method has found none.
     Restore,
@@ -101,7 +106,7 @@ impl<'a> Search<'a> {
         let before = (run.evaluations(), run.incumbent_values());
         let outcome = minimise(&minimisation, &run.centre(), |p| match run.evaluate(p)? {
             _ if restores && !run.violates() => Err(Stop::CutShort),
-            sample if restores => Ok(of_violation(sample, of_problem)),
+            sample if restores => Ok(with_violation_as_objective(sample, of_problem)),
             sample => Ok(sample),
         });
         let evaluations = run.evaluations() - before.0;
@@ -144,7 +149,7 @@ impl<'a> Search<'a> {
     /// After a method that ended by itself.
     fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
         let has_entered = ending == Ending::Entered;
-        if has_entered && !run.violates() {
+        if has_entered && (!run.violates() || self.is_restoring && gained) {
             return NextStep::SearchOn;
         }
         if run.violates() && !self.is_restoring {
@@ -159,6 +164,7 @@ impl<'a> Search<'a> {
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
             _ if held_back && gained => NextStep::MoveTrustRegion,
+            _ if ending == Ending::Objective && gained && self.still_promises(run) => NextStep::SearchOn,
             Some(refusal) if held_back && self.trust.scale < 1.0 => {
                 self.after_refusal(run, refusal.clone(), gained)
             }
@@ -169,6 +175,12 @@ impl<'a> Search<'a> {
                 Ending::Step => StopReason::StepConverged,
             }),
         }
+    }
+
+    /// Whether the gradient promises many times the tolerance by which the method has ended.
+    fn still_promises(&self, run: &Run<'_>) -> bool {
+        let promised = run.promised_gains().filter(|_| !run.violates() && !run.is_held_back);
+        promised.is_some_and(|[_, now]| now > PROMISED_TOLERANCES * self.settings.ftol_rel)
     }
 
     /// Whether the method came to its tolerance only because the trust region is small, which is said then.
@@ -195,6 +207,7 @@ impl<'a> Search<'a> {
             None if gained || self.shrinks < MAX_SHRINKS => {
                 NextStep::ShrinkTrustRegion { refused: refusal, gained }
             }
+            None if run.violates() && !self.is_restoring => NextStep::Restore,
             None => {
                 run.warn(&format!("{}: the mesh carries the design no further", refusal.cause));
                 NextStep::Stop(StopReason::MeshLimited)
@@ -206,8 +219,8 @@ impl<'a> Search<'a> {
     pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
-        run.warn(&format!(
-            "the method's first step changed the objective by less than its relative tolerance: continuing with {:.0e}",
+        run.observer.note(&format!(
+            "the method ended within its first steps: the search goes on with a relative tolerance of {:.0e}",
             self.ftol_rel
         ));
     }
@@ -215,7 +228,8 @@ impl<'a> Search<'a> {
     /// Continues with the worst constraint as the objective.
     pub(super) fn restore(&mut self, run: &mut Run<'_>) {
         self.is_restoring = true;
-        self.ftol_rel = self.settings.ftol_rel;
+        (self.ftol_rel, self.tightenings) = (self.settings.ftol_rel, 0);
+        self.move_trust_region(run);
         run.observer
             .note("no design yet keeps all constraints: the search goes on for one with the least violation");
     }
@@ -239,7 +253,7 @@ impl<'a> Search<'a> {
 
 /// What the method sees of a design while none keeps the constraints of the problem: the worst of these is the objective. The others
 /// are what the mesh leaves of room.
-fn of_violation(mut sample: Sample, of_problem: usize) -> Sample {
+fn with_violation_as_objective(mut sample: Sample, of_problem: usize) -> Sample {
     let others = sample.constraints.split_off(of_problem);
     let members = std::mem::replace(&mut sample.constraints, others);
     let of_worse = |worst: usize, k: usize| if members[k].0 > members[worst].0 { k } else { worst };

@@ -18,7 +18,8 @@ pub struct ErrorEstimate {
     pub objective: f64,
     /// Of each constraint on a functional of the field, with its number.
     pub constraints: Vec<(usize, f64)>,
-    /// Where the objective's error is made: what each element adds to it, shape `(n_tets,)`.
+    /// Where the objective's error is made: what each element adds to it, shape `(n_tets,)`; of a worst case to that of the term which
+    /// is the worst without the errors.
     pub by_element: Vec<f64>,
     /// Iterations of all corrections.
     pub iterations: usize,
@@ -90,17 +91,12 @@ impl Problem {
         models: &mut EnrichedModels,
     ) -> Result<ErrorEstimate, Error> {
         let groups = self.groups_of_terms();
-        let values: Vec<f64> = match &analysis.members[..] {
-            [] => vec![0.0],
-            members => members.iter().map(|member| member.value).collect(),
-        };
-        let worst = |values: &[f64]| self.objective().map_or(0, |objective| objective.worst(values));
-        let active = worst(&values);
         let mut errors = vec![0.0; groups.len()];
+        let mut by_element = vec![vec![0.0; analysis.mesh.topology().tets().len()]; groups.len()];
         let mut estimate = ErrorEstimate {
             objective: 0.0,
             constraints: self.field_constraints().map(|(k, _)| (k, 0.0)).collect(),
-            by_element: vec![0.0; analysis.mesh.topology().tets().len()],
+            by_element: Vec::new(),
             iterations: 0,
         };
         let mut before: Option<Enrichment> = None;
@@ -112,8 +108,8 @@ impl Problem {
             let solution = &analysis.solutions[index];
             let enriched = Enrichment::new(coarse, fine, (&analysis.mesh, solution), shared)?;
             let mut state = State { coarse, enriched, analysis, index };
-            for (k, (error, group)) in errors.iter_mut().zip(&groups).enumerate() {
-                *error += state.error_of(group, Some(&mut estimate.by_element).filter(|_| k == active))?;
+            for ((error, by_element), group) in errors.iter_mut().zip(&mut by_element).zip(&groups) {
+                *error += state.error_of(group, Some(by_element))?;
             }
             for (error, (_, term)) in estimate.constraints.iter_mut().zip(self.field_constraints()) {
                 error.1 += state.error_of(&[term], None)?;
@@ -121,10 +117,15 @@ impl Problem {
             estimate.iterations += state.enriched.iterations();
             before = Some(state.enriched);
         }
-        // Without its error another term may be the worst one.
-        let corrected: Vec<f64> = values.iter().zip(errors).map(|(value, error)| value + error).collect();
-        estimate.objective = corrected[worst(&corrected)] - values[active];
-        Ok(estimate)
+        let (of_objective, error) = match self.objective() {
+            // Without its error another term may be the worst one.
+            Some(objective) if !analysis.members.is_empty() => {
+                let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
+                objective.error_of_worst(&values, &errors)
+            }
+            _ => (0, errors[0]),
+        };
+        Ok(ErrorEstimate { objective: error, by_element: by_element.swap_remove(of_objective), ..estimate })
     }
 }
 

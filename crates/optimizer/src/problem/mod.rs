@@ -69,9 +69,9 @@ impl Problem {
             terms.flat_map(|term| &term.states).all(|&state| state < states.len()),
             "a term is measured on states of the problem"
         );
-        let is_of_the_field = |own: &Constraint| matches!(own.quantity, Quantity::Field(_));
+        let mut quantities = constraints.iter().map(|constraint| &constraint.quantity);
         assert!(
-            shape.is_some() || constraints.iter().all(is_of_the_field),
+            shape.is_some() || quantities.all(Quantity::is_of_field),
             "a body that is constrained can move"
         );
         Self { original, states, objective, constraints, shape, share: None, bodies: Vec::new() }
