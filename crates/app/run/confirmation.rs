@@ -109,53 +109,27 @@ impl Session<'_> {
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
-        if let Some((tolerance, errors)) = self.config.accuracy.tolerance.zip(errors) {
-            let larger = objective.initial.abs().max(objective.best.abs());
-            let scales = [("initial", objective.initial), ("best", larger)];
-            let beyond: Vec<String> = scales
-                .into_iter()
-                .zip(errors)
-                .map(|((design, scale), error)| (design, relative_bar(error, scale).unwrap_or(f64::INFINITY)))
-                .filter(|(_, bar)| *bar > tolerance)
-                .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
-                .collect();
-            accuracy.within_tolerance = Some(beyond.is_empty());
-            if !beyond.is_empty() {
-                observer.notice(&format!(
-                    "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
-                    100.0 * tolerance,
-                    beyond.join(", ")
-                ));
-            }
-        }
+        let tolerance = self.config.accuracy.tolerance.zip(errors);
+        accuracy.within_tolerance =
+            tolerance.map(|(tolerance, errors)| is_within(tolerance, errors, objective, observer));
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         let analysis = &self.config.analysis;
-        let is_first_order_edge =
-            (analysis.elements, analysis.order) == (Elements::Edge, ElementOrder::Linear);
-        if !self.is_checked(stop_reason) || objective.ratio == 1.0 {
-        } else if is_first_order_edge && corrected.is_none() {
-            observer.notice(
-                "the best shape is not checked by other elements: of first-order edge elements the estimated error is that \
-                 check, and there is none",
-            );
-        } else if !is_first_order_edge {
-            observer.phase("checking the best shape by other elements");
-            let of_run = [objective.initial, objective.best];
-            match cross_check(self.config, self.source, (meshes, of_run), self.interrupted) {
-                Ok(Some(CrossChecked::Ratio(found))) => accuracy.cross_check = Some(found),
-                Ok(Some(CrossChecked::NotResolved([found, own]))) => observer.notice(&format!(
-                    "the best shape is not checked by other elements: those of first order have {found:.3e} for the objective \
-                     or a term of it at the initial shape, {own:.3e} of this run, and do not resolve a gain of {:.3e}",
-                    (of_run[0] - of_run[1]).abs()
-                )),
-                Ok(None) => {}
-                Err(error) => observer.notice(&format!("there is no check by other elements: {error}")),
+        let is_checked = self.is_checked(stop_reason) && objective.ratio != 1.0;
+        accuracy.cross_check = match (analysis.elements, analysis.order) {
+            (Elements::Edge, ElementOrder::Linear) => {
+                if is_checked && corrected.is_none() {
+                    observer.notice(
+                        "the best shape is not checked by other elements: of first-order edge elements the estimated error is \
+                         that check, and there is none",
+                    );
+                }
+                let of =
+                    |ratio| CrossCheck { elements: "edge".to_owned(), order: 2, ratio, by_estimate: true };
+                corrected.map(of)
             }
-        }
-        if let Some(ratio) = corrected.filter(|_| is_first_order_edge) {
-            let elements = "edge".to_owned();
-            accuracy.cross_check = Some(CrossCheck { elements, order: 2, ratio, by_estimate: true });
-        }
+            _ if is_checked => self.by_other_elements(objective, meshes, observer),
+            _ => None,
+        };
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
         let others: Vec<f64> =
             [objective.verified_ratio, corrected, cross_check].into_iter().flatten().collect();
@@ -178,6 +152,28 @@ impl Session<'_> {
         (accuracy != Accuracy::default()).then_some(accuracy)
     }
 
+    /// The ratio by elements that the estimate knows nothing of; where there is none the reason is reported.
+    fn by_other_elements(
+        &self,
+        objective: &ObjectiveResult,
+        meshes: &ShapeMeshes,
+        observer: &mut dyn Observer,
+    ) -> Option<CrossCheck> {
+        observer.phase("checking the best shape by other elements");
+        let of_run = [objective.initial, objective.best];
+        match cross_check(self.config, self.source, (meshes, of_run), self.interrupted) {
+            Ok(Some(CrossChecked::Ratio(found))) => return Some(found),
+            Ok(Some(CrossChecked::NotResolved([found, own]))) => observer.notice(&format!(
+                "the best shape is not checked by other elements: those of first order have {found:.3e} for the objective or a term \
+                 of it at the initial shape, {own:.3e} of this run, and do not resolve a gain of {:.3e}",
+                (of_run[0] - of_run[1]).abs()
+            )),
+            Ok(None) => {}
+            Err(error) => observer.notice(&format!("there is no check by other elements: {error}")),
+        }
+        None
+    }
+
     /// What no estimate and no refinement has of the geometry, which is reported.
     pub(super) fn facets_of(&self, observer: &mut dyn Observer) -> Option<CurvedFacets> {
         let facets = self.facets.clone()?;
@@ -194,6 +190,32 @@ impl Session<'_> {
     fn is_cut_short(&self, stop_reason: StopReason) -> bool {
         matches!(stop_reason, StopReason::Interrupted | StopReason::MaxTime) || (self.interrupted)()
     }
+}
+
+/// Whether the error bars of both designs are within a tolerance; which are not is reported.
+fn is_within(
+    tolerance: f64,
+    errors: [f64; 2],
+    objective: &ObjectiveResult,
+    observer: &mut dyn Observer,
+) -> bool {
+    let larger = objective.initial.abs().max(objective.best.abs());
+    let scales = [("initial", objective.initial), ("best", larger)];
+    let beyond: Vec<String> = scales
+        .into_iter()
+        .zip(errors)
+        .map(|((design, scale), error)| (design, relative_bar(error, scale).unwrap_or(f64::INFINITY)))
+        .filter(|(_, bar)| *bar > tolerance)
+        .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
+        .collect();
+    if !beyond.is_empty() {
+        observer.notice(&format!(
+            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
+            100.0 * tolerance,
+            beyond.join(", ")
+        ));
+    }
+    beyond.is_empty()
 }
 
 /// What other elements say of a gain.

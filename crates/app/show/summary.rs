@@ -6,7 +6,7 @@ use fluxmorph_optimizer::body::BodyForce;
 
 use super::styles::{Styles, styled};
 use super::{Started, probes};
-use crate::config::{Goal, Objective};
+use crate::config::Objective;
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, ObjectiveResult, RunResult, RunStatus, SAFETY,
     SaturatedRegion, SaturationResult, StateResult, Verdict,
@@ -27,10 +27,7 @@ impl Named {
     }
 
     fn objective(objective: &Objective) -> Self {
-        let goal = match objective.goal {
-            Goal::Minimise => "minimise",
-            Goal::Maximise => "maximise",
-        };
+        let goal = objective.goal_word();
         let terms = objective.terms();
         let name = match terms {
             [term] => {

@@ -7,7 +7,9 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
-use fluxmorph_optimizer::problem::{Progress, Shape};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::{self, Quantity};
+use fluxmorph_optimizer::problem::{Problem, Progress, Shape};
 use fluxmorph_remesh::MotionLaw;
 use fluxmorph_solver::FieldModel;
 use serde::Serialize;
@@ -71,6 +73,8 @@ pub(super) struct Summary<'a> {
     /// Unit of the objective in SI; `None` where its terms have several.
     pub(super) objective_unit: Option<&'static str>,
     pub(super) constraints: &'a [Constraint],
+    /// Volumes [m³] and masses [kg] of the initial design that are constrained, by the names of the constraints.
+    pub(super) constrained_bodies: BTreeMap<String, f64>,
     pub(super) design: Option<&'a Design>,
     /// Whether the mesh follows all variables to their bounds.
     pub(super) reach: Vec<Reach>,
@@ -228,6 +232,7 @@ pub(super) fn summary<'a>(
         objective: config.objective.as_ref(),
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,
+        constrained_bodies: constrained_bodies(problem)?,
         design: config.design.as_ref(),
         reach: Reach::of(problem),
         remesh: config.remesh.as_ref(),
@@ -238,6 +243,19 @@ pub(super) fn summary<'a>(
         estimate: None,
         warnings,
     })
+}
+
+/// What constrained volumes and masses are initially.
+fn constrained_bodies(problem: &Problem) -> Result<BTreeMap<String, f64>, Error> {
+    let is_body = |own: &&constraint::Constraint| matches!(own.quantity, Quantity::Volume(_));
+    let mut bodies = problem.constraints().iter().filter(is_body).peekable();
+    let Some(shape) = problem.shape().filter(|_| bodies.peek().is_some()) else { return Ok(BTreeMap::new()) };
+    let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
+    let value = |own: &constraint::Constraint| {
+        let found = own.of_shape(&moved, shape).map_err(OptimizerError::from)?;
+        Ok(found.map(|(value, _)| (own.name.clone(), value)))
+    };
+    bodies.filter_map(|own| value(own).transpose()).collect()
 }
 
 impl MeshFileSummary {

@@ -6,7 +6,7 @@ use super::estimate::EstimateSummary;
 use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
 use crate::config::{
-    CoilShape, Constraint, Corner, DesignDirection, Goal, Limit, Material, RemeshExtent, ValueBound,
+    BodyKind, CoilShape, Constraint, Corner, DesignDirection, Limit, Material, RemeshExtent, ValueBound,
     WrittenCurve,
 };
 use crate::files::shell_word;
@@ -120,7 +120,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     row("linear solver", summary.linear_solvers.join(", "));
     row("objective", objective(summary));
     for constraint in summary.constraints {
-        row("constraint", bound_of(constraint));
+        row("constraint", bound_of(constraint, summary.constrained_bodies.get(&constraint.name)));
     }
     if !summary.probes.is_empty() {
         let probe = |p: &crate::config::Probe| format!("{} ({})", p.name, p.points.len());
@@ -131,10 +131,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 /// The objective in a line: its goal, its terms and its unit.
 fn objective(summary: &Summary<'_>) -> String {
     let Some(objective) = summary.objective else { return "none".to_owned() };
-    let goal = match objective.goal {
-        Goal::Minimise => "minimise",
-        Goal::Maximise => "maximise",
-    };
+    let goal = objective.goal_word();
     let term = |term: &crate::config::Term| {
         let weight = if term.weight == 1.0 { String::new() } else { format!("{} x ", term.weight) };
         let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
@@ -200,11 +197,17 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 }
 
 /// A constraint in words.
-fn bound_of(constraint: &Constraint) -> String {
+fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
+    let unit = match &constraint.limit {
+        Limit::Field { functional, .. } => functional.dimension().si_unit(),
+        Limit::Body { kind: BodyKind::Volume, .. } => "m\u{b3}",
+        Limit::Body { kind: BodyKind::Mass, .. } => "kg",
+        Limit::Thickness { .. } => "m",
+    };
     let value = |bound: &ValueBound| match bound {
-        ValueBound::AtMost(upper) => format!("at most {upper:e} in SI"),
+        ValueBound::AtMost(upper) => format!("at most {upper:e} {unit}"),
         ValueBound::AtMostRatio(ratio) => format!("at most {ratio} times that of the initial design"),
-        ValueBound::AtLeast(lower) => format!("at least {lower:e} in SI"),
+        ValueBound::AtLeast(lower) => format!("at least {lower:e} {unit}"),
         ValueBound::AtLeastRatio(ratio) => format!("at least {ratio} times that of the initial design"),
     };
     let bounds = match &constraint.limit {
@@ -216,7 +219,8 @@ fn bound_of(constraint: &Constraint) -> String {
             sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
         }
     };
-    format!("{} {bounds}", constraint.name)
+    let initial = initial.map_or(String::new(), |value| format!(", {value:.4e} {unit} initially"));
+    format!("{} {bounds}{initial}", constraint.name)
 }
 
 fn region_table(summary: &Summary<'_>) -> Table<5> {

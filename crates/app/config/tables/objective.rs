@@ -146,6 +146,14 @@ table! {
 }
 
 impl Objective {
+    /// What is done to its value.
+    pub fn goal_word(&self) -> &'static str {
+        match self.goal {
+            Goal::Minimise => "minimise",
+            Goal::Maximise => "maximise",
+        }
+    }
+
     /// Which of its terms a worst case is, in words; `None` of a sum.
     pub fn worst(&self) -> Option<&'static str> {
         match (self.combine, self.goal) {
