@@ -217,8 +217,8 @@ fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
 pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
     let Some(field) = &config.boundaries.uniform_field else { return Vec::new() };
     let topology = mesh.topology();
-    let of = |names: &[String]| faces_of(topology, names.iter().map(String::as_str));
-    let applied: HashSet<NodeId> = of(&field.surfaces).into_iter().flatten().collect();
+    let applied = faces_of(topology, field.surfaces.iter().map(String::as_str));
+    let applied: HashSet<NodeId> = applied.into_iter().flatten().collect();
     let size = norm(field.b);
     let contradicts = |face: &[NodeId; 3]| {
         face.iter().filter(|node| applied.contains(node)).count() >= 2
@@ -236,9 +236,8 @@ pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &M
     }
     let regions = (0..topology.region_names().len()).map(RegionId::new);
     let outer = regions.flat_map(|region| topology.outer_faces(region)).map(face_key);
-    let conditions =
-        [of(&field.surfaces), of(&config.boundaries.flux_parallel), of(&config.boundaries.flux_normal)];
-    let mut open = outer.filter(|face| !conditions.iter().any(|own| own.contains(face)));
+    let conditions = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
+    let mut open = outer.filter(|face| !conditions.contains(face));
     if let Some(face) = open.find(contradicts) {
         let middle = centroid(face.map(|node| mesh.points()[node.index()]));
         let message = format!(

@@ -108,25 +108,21 @@ impl<'a> Estimator<'a> {
             None => FinerProblem::new(self.config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?,
         };
         let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
-        let change = |(fine, coarse): (&Measured, &Measured)| OF_HALVED_EDGES * (fine.value - coarse.value);
-        let objective = match self.setup.problem.objective() {
-            Some(objective) if !analysis.members.is_empty() => {
-                let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
-                let errors: Vec<f64> = found.members.iter().zip(&analysis.members).map(change).collect();
-                objective.error_of_worst(&values, &errors).1
-            }
-            _ => {
-                let [fine, coarse] = [&found, analysis].map(|own| own.objective.unwrap_or(f64::NAN));
-                OF_HALVED_EDGES * (fine - coarse)
-            }
+        let error = |(fine, coarse): (f64, f64)| OF_HALVED_EDGES * (fine - coarse);
+        let values = |own: &Analysis| match own.member_values() {
+            members if members.is_empty() => vec![own.objective.unwrap_or(f64::NAN)],
+            members => members,
         };
+        let errors: Vec<f64> = values(&found).into_iter().zip(values(analysis)).map(error).collect();
+        let problem = &self.setup.problem;
         let of_field = |(_, own): &(usize, &Constraint)| own.quantity.is_of_field();
-        let constrained = self.setup.problem.constraints().iter().enumerate().filter(of_field);
-        let error =
-            |((k, _), fine): ((usize, &Constraint), &Measured)| (k, change((fine, &analysis.constraints[k])));
+        let constrained = problem.constraints().iter().enumerate().filter(of_field);
+        let of_constraint = |((k, _), fine): ((usize, &Constraint), &Measured)| {
+            (k, error((fine.value, analysis.constraints[k].value)))
+        };
         Ok(ErrorEstimate {
-            objective,
-            constraints: constrained.zip(&found.constraints).map(error).collect(),
+            objective: problem.error_of_objective(analysis, &errors).1,
+            constraints: constrained.zip(&found.constraints).map(of_constraint).collect(),
             by_element: Vec::new(),
             iterations: found.linear_iterations,
         })

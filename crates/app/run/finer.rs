@@ -118,18 +118,10 @@ impl FinerProblem {
     /// The analyses of two shapes; `None` where a signal comes first.
     pub fn analyses(
         &self,
-        [first, second]: &[Mesh; 2],
+        shapes: &[Mesh; 2],
         interrupted: &dyn Fn() -> bool,
     ) -> Result<Option<[Analysis; 2]>, Error> {
-        let cache = &mut SolverCache::default();
-        if interrupted() {
-            return Ok(None);
-        }
-        let first = self.analyse(first, cache)?;
-        if interrupted() {
-            return Ok(None);
-        }
-        Ok(Some([first, self.analyse(second, cache)?]))
+        both(shapes.each_ref(), interrupted, |shape, cache| self.analyse(shape, cache))
     }
 }
 
@@ -157,6 +149,23 @@ impl Cut {
         }
         Ok(refinement.then(bisection.refinement()?))
     }
+}
+
+/// Two analyses with one cache; `None` where a signal comes first.
+pub(super) fn both<S>(
+    [first, second]: [S; 2],
+    interrupted: &dyn Fn() -> bool,
+    mut analyse: impl FnMut(S, &mut SolverCache) -> Result<Analysis, Error>,
+) -> Result<Option<[Analysis; 2]>, Error> {
+    let cache = &mut SolverCache::default();
+    if interrupted() {
+        return Ok(None);
+    }
+    let first = analyse(first, cache)?;
+    if interrupted() {
+        return Ok(None);
+    }
+    Ok(Some([first, analyse(second, cache)?]))
 }
 
 /// A configuration without what moves, and without constraints on that.

@@ -20,7 +20,7 @@ use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 use super::confirmation::ShapeMeshes;
-use super::finer::{Cut, FinerMesh, FinerProblem, looked_at_once};
+use super::finer::{Cut, FinerMesh, FinerProblem, both, looked_at_once};
 use super::shape_pair::ShapePair;
 use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
@@ -226,14 +226,12 @@ impl MeshIndependence<'_> {
         }
         let displacements = self.shapes.displacements(&config, &setup)?;
         let problem = setup.problem;
-        let cache = &mut SolverCache::default();
-        let [initial, best] = &displacements;
-        let initial = analysis_at(&problem, cache, initial)?;
-        if interrupted() {
+        let analyse =
+            |displacement: &Vec<Point>, cache: &mut SolverCache| analysis_at(&problem, cache, displacement);
+        let Some(analyses) = both(displacements.each_ref(), interrupted, analyse)? else {
             return Ok(Outcome::CutShort);
-        }
-        let best = analysis_at(&problem, cache, best)?;
-        Ok(Outcome::Found(verification(&problem, fresh.parts as f64, &[initial, best])?))
+        };
+        Ok(Outcome::Found(verification(&problem, fresh.parts as f64, &analyses)?))
     }
 }
 

@@ -233,8 +233,7 @@ impl Session<'_> {
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
-        let members = best.analysis.members.iter().map(|member| member.value).collect();
-        let members = [optimised.initial_members.clone(), members];
+        let members = [optimised.initial_members.clone(), best.analysis.member_values()];
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved, members };
         drop(optimised);
         // The ranks' part of the problem goes with it.

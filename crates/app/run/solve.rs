@@ -35,8 +35,8 @@ pub fn solve(
     let problem = &prepared.setup.problem;
     let mut moved = problem.moved(p)?;
     // Bounds may be shares of what the initial design has.
-    let has_share = problem.constraints().iter().any(|constraint| constraint.limit.share().is_some());
-    let initial = problem.shape().map(|shape| shape.initial()).filter(|&initial| has_share && initial != p);
+    let initial = problem.shape().filter(|_| problem.has_shared_bounds()).map(|shape| shape.initial());
+    let initial = initial.filter(|&initial| initial != p);
     let mut initial = initial.map(|initial| problem.moved(initial)).transpose()?;
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
@@ -87,12 +87,12 @@ impl Session<'_> {
         for event in &analysis.solver_events {
             observer.notice(&event.to_string());
         }
-        let is_initial = initial.is_none();
+        let has_initial_bounds = initial.is_none();
         let bounds = problem.bounds(initial, analysis)?;
         let mut constraints = constraints(problem, analysis, &bounds);
         let estimate = self.estimator().estimate(analysis, observer);
         if let Some(estimate) = &estimate {
-            let at_initial = Some(estimate).filter(|_| is_initial);
+            let at_initial = Some(estimate).filter(|_| has_initial_bounds);
             enter_errors(&mut constraints, (problem, &bounds), (at_initial, estimate), observer);
         }
         if config.output.fields != FieldsKept::Nothing {

@@ -104,8 +104,7 @@ impl Run<'_> {
         analysis.timings.remesh += before;
         let values: Vec<f64> = analysis.constraints.iter().map(|measured| measured.value).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");
-        let members = || analysis.members.iter().map(|member| member.value).collect();
-        let initial = self.initial((objective, &members), analysis.quality.worst, &values)?;
+        let initial = self.initial((objective, analysis.member_values()), analysis.quality.worst, &values)?;
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
         // Before anything of it is kept.
@@ -145,7 +144,7 @@ impl Run<'_> {
     /// Scale of the objective and bounds of the constraints, which the first design fixes.
     pub(super) fn initial(
         &mut self,
-        (objective, members): (f64, &dyn Fn() -> Vec<f64>),
+        (objective, members): (f64, Vec<f64>),
         quality: f64,
         measured: &[f64],
     ) -> Result<Initial, Error> {
@@ -161,7 +160,7 @@ impl Run<'_> {
         let constraints = self.problem.constraints().iter().zip(measured);
         let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
         let bounds = bounds.collect::<Result<_, _>>()?;
-        let initial = Initial { objective, members: members(), quality, bounds };
+        let initial = Initial { objective, members, quality, bounds };
         Ok(self.initial.insert(initial).clone())
     }
 

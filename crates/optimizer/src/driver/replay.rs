@@ -44,8 +44,8 @@ impl Run<'_> {
     /// The answer to a design that was computed before the run was interrupted.
     pub(super) fn replay(&mut self, record: Record) -> Result<Sample, Stop> {
         let values: Vec<f64> = record.constraints.iter().map(|(value, _)| *value).collect();
-        let members = || record.members.iter().map(|(value, _)| *value).collect();
-        let initial = self.initial((record.row.objective, &members), record.row.worst_quality, &values)?;
+        let members = record.members.iter().map(|(value, _)| *value).collect();
+        let initial = self.initial((record.row.objective, members), record.row.worst_quality, &values)?;
         let sample = self.sample(&initial, &record);
         let cache = std::mem::replace(&mut self.cache, SolverCache::with_methods(&record.methods));
         let comparison = self.compare(record.row.objective, &sample);

@@ -76,6 +76,13 @@ pub struct Analysis {
     pub timings: Timings,
 }
 
+impl Analysis {
+    /// Values of the terms of a worst case, with their weights; empty otherwise.
+    pub fn member_values(&self) -> Vec<f64> {
+        self.members.iter().map(|member| member.value).collect()
+    }
+}
+
 /// The value of what a constraint or a term measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {

@@ -117,15 +117,22 @@ impl Problem {
             estimate.iterations += state.enriched.iterations();
             before = Some(state.enriched);
         }
-        let (of_objective, error) = match self.objective() {
-            // Without its error another term may be the worst one.
+        let (group, objective) = self.error_of_objective(analysis, &errors);
+        Ok(ErrorEstimate { objective, by_element: by_element.swap_remove(group), ..estimate })
+    }
+
+    /// The error of an analysed design's objective from that of its sum, or from those of each term of a worst case; with it whose
+    /// of these it is. Without its error another term may be the worst one.
+    ///
+    /// # Panics
+    /// If there is no error.
+    pub fn error_of_objective(&self, analysis: &Analysis, errors: &[f64]) -> (usize, f64) {
+        match self.objective() {
             Some(objective) if !analysis.members.is_empty() => {
-                let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();
-                objective.error_of_worst(&values, &errors)
+                objective.error_of_worst(&analysis.member_values(), errors)
             }
             _ => (0, errors[0]),
-        };
-        Ok(ErrorEstimate { objective: error, by_element: by_element.swap_remove(of_objective), ..estimate })
+        }
     }
 }
 

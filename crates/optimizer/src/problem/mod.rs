@@ -183,20 +183,22 @@ impl Problem {
         }
     }
 
-    /// Bounds of the constraints. `initial` is the mesh of the initial design where `analysis` is of another one: shares of its
-    /// values cost its analysis.
+    /// Whether a bound is a share of the initial design's value.
+    pub fn has_shared_bounds(&self) -> bool {
+        self.constraints.iter().any(|constraint| constraint.limit.share().is_some())
+    }
+
+    /// Bounds of the constraints. Where there are [shares](Problem::has_shared_bounds) of the initial design's values and `analysis`
+    /// is of another one, `initial` is the mesh of that, which is analysed.
     ///
     /// # Errors
     /// As [`Problem::analyse`], and [`Error::Constraint`].
     pub fn bounds(&self, initial: Option<Moved>, analysis: &Analysis) -> Result<Vec<Bound>, Error> {
-        let has_share = self.constraints.iter().any(|own| own.limit.share().is_some());
-        let initial = match initial.filter(|_| has_share) {
-            Some(moved) => {
-                let cache = &mut self.cache_after(analysis);
-                Some(self.analyse(moved, Derivatives::None, cache, &mut NoProgress)?)
-            }
-            None => None,
+        let analyse = |moved| {
+            let cache = &mut self.cache_after(analysis);
+            self.analyse(moved, Derivatives::None, cache, &mut NoProgress)
         };
+        let initial = initial.map(analyse).transpose()?;
         let measured = &initial.as_ref().unwrap_or(analysis).constraints;
         self.constraints.iter().zip(measured).map(|(constraint, m)| constraint.bound(m.value)).collect()
     }
