@@ -27,7 +27,8 @@ def print_plain(rows, result):
     print(f"{result['status']}: {result['stop_reason']} after {result['evaluations']} evaluations")
     print(f"F/F0 {objective['ratio']:.4f} at evaluation {objective['best_evaluation']}")
     if objective.get("verified_ratio") is not None:
-        print(f"F/F0 {objective['verified_ratio']:.4f} on a fresh mesh")
+        is_cut = (objective.get("verification") or {}).get("mesh") == "cut"
+        print(f"F/F0 {objective['verified_ratio']:.4f} on {'cut elements' if is_cut else 'a fresh mesh'}")
     row = rows[objective["best_evaluation"]]
     if row["min_thickness_m"]:
         low, high = 1e3 * float(row["min_thickness_m"]), 1e3 * float(row["max_thickness_m"])

@@ -76,6 +76,22 @@ fn every_method_with_constraints_keeps_them() {
     }
 }
 
+/// The lightest plate for a field and the best field for a mass are one plate: either bound is used up at the other's optimum.
+#[test]
+fn the_lightest_plate_for_a_field_is_the_best_one_for_its_mass() {
+    let exact = |s| Optimizer { max_evaluations: 60, ftol_rel: 1e-6, ..s };
+    let (best, _) = with("shield_mass_limit.toml", &[], exact);
+    let bound = format!("{SQUARED}upper = {:e}\n", best.best.objective);
+    let lightest = [
+        (SQUARED, "kind = \"mass\"\nregion = \"plate\"\n"),
+        ("kind = \"mass\"\nregion = \"plate\"\nupper = \"2.5 kg\"\n", bound.as_str()),
+    ];
+    let (lightest, rows) = with("shield_mass_limit.toml", &lightest, exact);
+    let mass = lightest.best.objective;
+    println!("{mass:.5} kg of 2.5 after {} evaluations, F {:.6e}", rows.len(), measured(&lightest, 0));
+    assert!(lightest.best.violation == 0.0 && (mass / 2.5 - 1.0).abs() < 2e-3, "{mass}");
+}
+
 #[test]
 fn a_design_that_starts_outside_is_led_inside() {
     // The flat plate has 2.26 kg.

@@ -261,7 +261,7 @@ fn a_check_on_a_fresh_mesh_that_is_interrupted_is_made_up_for() {
     run.answer("INT");
     let (code, said) = run.end();
     assert_eq!(code, Some(130), "{said}");
-    assert!(said.contains("not checked on a fresh mesh") && said.contains("fluxmorph resume"), "{said}");
+    assert!(said.contains("not checked on a finer mesh") && said.contains("fluxmorph resume"), "{said}");
     finish(&mut resume(&out)).completed();
     assert_same(&essence(&files(&out)), &expected, "interrupted check");
 }

@@ -64,7 +64,7 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let options = ["--max-evaluations", "2", "--set", "analysis.order=1", "--set", limit];
     finish(&mut shipped("inductor", &options).command("run", &out)).with(
         1,
-        &["checking the best shape on finer elements", "F/F0 on a fresh mesh", "is curved, and its facets"],
+        &["checking the best shape on finer elements", "F/F0 on cut elements", "is curved, and its facets"],
     );
     let result = read_json(&out.join("result.json"));
     assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);

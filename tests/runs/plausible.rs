@@ -185,10 +185,45 @@ fn the_resolved_configuration_of_a_run_is_not_warned_of() {
 }
 
 #[test]
-fn a_permeability_far_below_one_is_asked_about() {
+fn a_permeability_far_below_one_or_beyond_all_is_asked_about() {
+    assert!(check(&["materials.steel.relative_permeability=1e9"]).contains("more than any"));
+    assert!(!check(&["materials.steel.relative_permeability=1e6"]).contains("more than any"));
     let found = check(&["materials.odd.relative_permeability=0.0025"]);
     assert!(found.contains("the material `odd` has the relative permeability 0.0025"), "{found}");
     assert!(!check(&["materials.odd.relative_permeability=0.9998"]).contains("`odd` has the relative"));
+}
+
+/// Iron whose permeability was forgotten is air to a static field.
+#[test]
+fn a_design_that_no_field_sees_is_asked_about() {
+    let said = "both sides of the design surface `plate_bottom` are alike to the field";
+    let forgotten = ["materials.steel.relative_permeability=1", "analysis.elements=edge"];
+    let at = |frequency| check(&[&MESHED[..], &forgotten, &[frequency]].concat());
+    assert!(at("analysis.frequency=0").contains(said));
+    assert!(!at("analysis.frequency=60").contains(said), "it conducts");
+    assert!(!check(&[]).contains(said), "an impedance surface is none of air");
+}
+
+#[test]
+fn surfaces_that_move_otherwise_than_they_are_said_to_are_asked_about() {
+    let found = check(&["remesh.fixed=[\"plate_bottom\"]"]);
+    assert!(
+        found.contains("nodes of `plate_bottom` in remesh.fixed belong to the design and move with it"),
+        "{found}"
+    );
+    let said = "`remesh|air` in remesh.free is a face of `air` beyond what moves: its elements there are dragged along";
+    assert!(check(&["remesh.free=[\"remesh|air\"]"]).contains(said));
+    // The other side of the plate moves too.
+    let free = [&MESHED[..], &["remesh.free=[\"plate_top\"]"]].concat();
+    assert!(!check(&free).contains("dragged along"));
+}
+
+#[test]
+fn a_tolerance_that_no_mesh_is_refined_for_is_said_by_check() {
+    let said = "accuracy.tolerance needs analysis.order = 1";
+    let tolerance = ["analysis.elements=edge", "accuracy.tolerance=5 %"];
+    assert!(check(&[&tolerance[..], &["analysis.order=2"]].concat()).contains(said));
+    assert!(!check(&tolerance).contains(said));
 }
 
 #[test]

@@ -6,17 +6,17 @@ use std::sync::Arc;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, RegionId, Topology};
 use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
+use fluxmorph_optimizer::geometric;
 use fluxmorph_optimizer::objective::{Label, Term, WeightedSum};
 use fluxmorph_optimizer::problem::Shape;
-use fluxmorph_optimizer::{Error as OptimizerError, geometric};
-use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observed, Weighting};
+use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observed, Volume, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use super::entries::material;
 use super::references::{functionals, regions};
 use crate::config::{
-    self, BodyKind, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, RegionModel,
-    SourceMap, ValueBound,
+    self, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, RegionModel, SourceMap,
+    ValueBound,
 };
 use crate::error::Error;
 
@@ -40,7 +40,9 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
     faults.extend(body_faults(config, source));
     faults.extend(coil_faults(config, source));
     faults.extend(super::multipole::faults(config, source));
-    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_region()) {
+    faults.extend(mass_faults(config, source, topology));
+    let is_of_a_region = |f: &config::Functional| f.kind.is_of_a_region() && f.kind.is_of_the_field();
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| is_of_a_region(f)) {
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
         let model = config.regions.get(region).map(|entry| entry.model);
         let is_loss = functional.kind == ObjectiveKind::Loss;
@@ -60,21 +62,28 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
         };
         faults.push(source.diagnostic(&format!("{path}.region"), message).expected(expected));
     }
-    for (k, constraint) in config.constraints.iter().enumerate() {
-        let Written::Body { kind: BodyKind::Mass, region, .. } = &constraint.limit else { continue };
-        if known(&region.as_str()) && density(config, region).is_none() {
-            let message = format!("the mass of `{region}` is limited, but its material has no density");
-            let fault = source.diagnostic(&format!("constraints[{k}].kind"), message);
-            faults.push(match config.regions.get(region) {
-                Some(entry) => fault.help(format!(
-                    "add a line like: density = \"7850 kg/m3\" to [materials.{}], or limit the volume",
-                    entry.material
-                )),
-                None => fault.expected("a region with a material, or kind = \"volume\""),
-            });
-        }
-    }
     faults
+}
+
+/// Masses of regions without density.
+fn mass_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let masses = functionals(config).into_iter().filter(|(_, f)| f.kind == ObjectiveKind::Mass);
+    let fault = |(path, functional): (String, &config::Functional)| {
+        let region = functional.region.as_deref().filter(|name| topology.region(name).is_ok())?;
+        if density(config, region).is_some() {
+            return None;
+        }
+        let message = format!("the mass of `{region}` is asked for, but its material has no density");
+        let fault = source.diagnostic(&format!("{path}.kind"), message);
+        Some(match config.regions.get(region) {
+            Some(entry) => fault.help(format!(
+                "add a line like: density = \"7850 kg/m3\" to [materials.{}], or take the volume",
+                entry.material
+            )),
+            None => fault.expected("a region with a material, or kind = \"volume\""),
+        })
+    };
+    masses.filter_map(fault).collect()
 }
 
 /// Bodies that are not there, and bodies that are not meshed.
@@ -149,16 +158,19 @@ fn density(config: &Config, region: &str) -> Option<f64> {
 /// The objective on the states of a configuration.
 pub(super) fn objective(
     config: &Config,
-    mesh: &Mesh,
+    meshes: [&Mesh; 2],
     states: &[FieldModel],
 ) -> Result<Option<WeightedSum>, Error> {
     let Some(objective) = &config.objective else { return Ok(None) };
     let mut terms = Vec::new();
     for written in objective.terms() {
-        let own = Term { weight: written.weight, ..term(config, &written.functional, mesh, states)? };
+        let own = Term { weight: written.weight, ..term(config, &written.functional, meshes, states)? };
         match objective.combine {
             Combination::Sum => terms.push(own),
-            Combination::WorstCase => terms.extend(at_each_state(config, &own)),
+            Combination::WorstCase if own.functional.is_of_field() => {
+                terms.extend(at_each_state(config, &own))
+            }
+            Combination::WorstCase => terms.push(own),
         }
     }
     Ok(Some(WeightedSum { goal: objective.goal, combination: objective.combine, terms }))
@@ -176,17 +188,21 @@ fn at_each_state(config: &Config, term: &Term) -> Vec<Term> {
     term.states.iter().map(at).collect()
 }
 
-/// A functional on the states that it is taken at, with the weight one.
+/// A functional on the states that it is taken at, with the weight one; `meshes` are the whole one and that which moves.
 fn term(
     config: &Config,
     functional: &config::Functional,
-    mesh: &Mesh,
+    meshes: [&Mesh; 2],
     states: &[FieldModel],
 ) -> Result<Term, Error> {
     let cases = config.load_cases();
-    let taken: Vec<usize> = (0..states.len()).filter(|&k| functional.is_taken_under(&cases[k])).collect();
+    let mut taken: Vec<usize> = (0..states.len()).filter(|&k| functional.is_taken_under(&cases[k])).collect();
+    if !functional.kind.is_of_the_field() {
+        // All have the same.
+        taken.truncate(1);
+    }
     Ok(Term {
-        functional: measured(config, functional, mesh, (states, &taken))?,
+        functional: measured(config, functional, meshes, (states, &taken))?,
         states: taken,
         weight: 1.0,
         label: Label {
@@ -203,9 +219,10 @@ fn term(
 fn measured(
     config: &Config,
     functional: &config::Functional,
-    mesh: &Mesh,
+    meshes: [&Mesh; 2],
     (states, taken): (&[FieldModel], &[usize]),
 ) -> Result<Functional, Error> {
+    let [_, mesh] = meshes;
     let name = functional.region.as_deref().unwrap_or_default();
     let region = || mesh.topology().region(name);
     // All states have the regions, conductors, windings and node numbers of the first that takes part.
@@ -253,7 +270,26 @@ fn measured(
         ObjectiveKind::Voltage => at_terminals(AtTerminals::Voltage),
         ObjectiveKind::Power => at_terminals(AtTerminals::Power),
         ObjectiveKind::PowerFactor => at_terminals(AtTerminals::PowerFactor),
+        ObjectiveKind::Volume | ObjectiveKind::Mass => {
+            Ok(Functional::Volume(body(config, (functional.kind, name), meshes, model)?))
+        }
     }
+}
+
+/// The volume of a region, or its mass.
+fn body(
+    config: &Config,
+    (kind, region): (ObjectiveKind, &str),
+    [full_mesh, mesh]: [&Mesh; 2],
+    model: &FieldModel,
+) -> Result<Volume, Error> {
+    let conductor = model.conductors().iter().find(|own| own.name == region);
+    let surface: Option<&[[NodeId; 3]]> = conductor.map(|own| own.surface.as_slice());
+    let volume = Volume::new(mesh, full_mesh, region, surface)?;
+    Ok(match density(config, region) {
+        Some(density) if kind == ObjectiveKind::Mass => volume.with_density(density),
+        _ => volume,
+    })
 }
 
 /// What observed places do where the mesh moves.
@@ -317,13 +353,13 @@ fn regions_of(body: &config::ForceBody, mesh: &Mesh) -> Result<Vec<RegionId>, Me
 /// Elements that must not move, with the key path of the region they observe.
 pub(super) fn fixed_elements(
     config: &Config,
-    mesh: &Mesh,
+    meshes: [&Mesh; 2],
     states: &[FieldModel],
 ) -> Result<Vec<(String, Vec<ElementId>)>, Error> {
     functionals(config)
         .into_iter()
         .map(|(path, functional)| {
-            let elements = term(config, functional, mesh, states)?.functional.fixed_elements().collect();
+            let elements = term(config, functional, meshes, states)?.functional.fixed_elements().collect();
             Ok((format!("{path}.region"), elements))
         })
         .collect()
@@ -333,7 +369,7 @@ pub(super) fn fixed_elements(
 pub(super) fn constraints(
     config: &Config,
     source: &SourceMap,
-    [full_mesh, mesh]: [&Mesh; 2],
+    meshes: [&Mesh; 2],
     states: &[FieldModel],
     shape: Option<&Shape>,
 ) -> Result<Vec<Constraint>, Error> {
@@ -343,24 +379,15 @@ pub(super) fn constraints(
             constraints.push(Constraint { name, quantity, limit });
         };
         match &written.limit {
-            Written::Field { functional, bound } => {
-                let term = term(config, functional, mesh, states)?;
-                add(written.name.clone(), Quantity::Field(Box::new(term)), limit(*bound));
-            }
-            Written::Body { .. } if shape.is_none() => {}
-            Written::Body { kind, region, bound } => {
-                let conductor = states[0].conductors().iter().find(|c| c.name == *region);
-                let surface: Option<&[[NodeId; 3]]> = conductor.map(|c| c.surface.as_slice());
-                if surface.is_none() {
-                    check_moves(source, k, (*kind, region), (shape, mesh))?;
-                }
-                let body =
-                    geometric::Volume::new(mesh, full_mesh, region, surface).map_err(OptimizerError::from)?;
-                let body = match (kind, density(config, region)) {
-                    (BodyKind::Mass, Some(density)) => body.with_density(density),
-                    _ => body,
+            Written::Functional { functional, .. }
+                if !functional.kind.is_of_the_field() && shape.is_none() => {}
+            Written::Functional { functional, bound } => {
+                let term = term(config, functional, meshes, states)?;
+                let quantity = match term.functional {
+                    Functional::Volume(body) => Quantity::Volume(body),
+                    _ => Quantity::Field(Box::new(term)),
                 };
-                add(written.name.clone(), Quantity::Volume(body), limit(*bound));
+                add(written.name.clone(), quantity, limit(*bound));
             }
             Written::Thickness { minimum, maximum, .. } => {
                 let Some(shape) = shape else { continue };
@@ -393,21 +420,28 @@ pub(super) fn constraints(
     Ok(constraints)
 }
 
-/// Refuses to constrain a region of which no element has a node that may move.
-fn check_moves(
+/// Volumes and masses of meshed regions of which no element has a node that may move.
+pub(super) fn bodies_at_rest(
+    config: &Config,
     source: &SourceMap,
-    number: usize,
-    (kind, name): (BodyKind, &str),
-    (shape, mesh): (Option<&Shape>, &Mesh),
-) -> Result<(), Error> {
+    mesh: &Mesh,
+    shape: &Shape,
+) -> Vec<Diagnostic> {
     let topology = mesh.topology();
-    let (Some(shape), Ok(region)) = (shape, topology.region(name)) else { return Ok(()) };
-    if shape.motion().moving().iter().any(|e| topology.region_of()[e.index()] == region) {
-        return Ok(());
-    }
-    let message = format!("nothing of `{name}` moves with the design: its {} stays", kind.name());
-    let fault = source.diagnostic(&format!("constraints[{number}].region"), message);
-    Err(source.error(vec![fault.expected("a region that the design changes")]).into())
+    let bodies = functionals(config).into_iter().filter(|(_, own)| !own.kind.is_of_the_field());
+    let at_rest = |(path, own): (String, &config::Functional)| {
+        let name = own.region.as_deref()?;
+        let region = topology.region(name).ok()?;
+        let is_of_it = |e: &ElementId| topology.region_of()[e.index()] == region;
+        // One that is replaced by its surface has no elements here.
+        if !topology.elements().any(|e| is_of_it(&e)) || shape.motion().moving().iter().any(is_of_it) {
+            return None;
+        }
+        let message = format!("nothing of `{name}` moves with the design: its {} stays", own.kind.name());
+        let fault = source.diagnostic(&format!("{path}.region"), message);
+        Some(fault.expected("a region that the design changes"))
+    };
+    bodies.filter_map(at_rest).collect()
 }
 
 fn limit(bound: ValueBound) -> Limit {

@@ -5,7 +5,6 @@
 
 use fluxmorph_geometry::MeshError;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::geometric::GeometricError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::coil::{PlaneFault, RegionFault};
 use fluxmorph_solver::{NewtonFailure, NonConvergence, SolverError};
@@ -21,7 +20,6 @@ pub(crate) fn attribute_error(error: Error, config: &Config, source: &SourceMap)
     let fault = match cause {
         OptimizerError::Solver(error) => blame.solver(error),
         OptimizerError::Remesh(error) => blame.remesh(error),
-        OptimizerError::Geometric(error) => blame.geometric(error),
         OptimizerError::Mesh(error) => blame.mesh(error),
         OptimizerError::Constraint { name, .. } => blame.constraint(name, cause),
         OptimizerError::FirstDesign { .. } => {
@@ -181,7 +179,9 @@ impl Blame<'_> {
                 let is_region = self.config.open.as_ref().is_some_and(|open| open.region.is_some());
                 self.at(if is_region { "open.region" } else { "open.surfaces" }, error)
             }
-            SolverError::EmptyRegion { region, .. } => self.region(region, error),
+            SolverError::EmptyRegion { region, .. } | SolverError::Boxed { region } => {
+                self.region(region, error)
+            }
             SolverError::CurveOnRanks { region } => {
                 let name = &self.config.regions.get(region)?.material;
                 let material = self.config.materials.get(name)?;
@@ -223,16 +223,6 @@ impl Blame<'_> {
                 self.at(&path, error)
             }
             RemeshError::Mesh(error) => self.mesh(error),
-            _ => None,
-        }
-    }
-
-    fn geometric(&self, error: &GeometricError) -> Option<Diagnostic> {
-        match error {
-            GeometricError::NoElements { region } | GeometricError::Boxed { region } => {
-                self.region(region, error)
-            }
-            GeometricError::Mesh(error) => self.mesh(error),
             _ => None,
         }
     }

@@ -59,7 +59,7 @@ use self::curves::Curves;
 use self::locate_error::DiagnosticSink;
 use self::names::{check_names, name_faults};
 use self::skin::audits;
-use crate::config::{Config, SourceMap};
+use crate::config::{Config, ElementOrder, Objective, SourceMap};
 use crate::error::Error;
 
 /// A problem, and what the user should know of it.
@@ -207,18 +207,21 @@ fn problem_on(
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
-        warnings.push(
-            "nothing excites a field, it is zero everywhere; add [[coils]], a magnet's remanence or an applied field"
-                .to_owned(),
-        );
+        let message = "nothing excites a field, it is zero everywhere";
+        let advice = "add [[coils]], a magnet's remanence or an applied field";
+        if mode != Mode::Analysis && config.objective.is_some() {
+            return Err(source.error(vec![source.diagnostic("objective", message).help(advice)]).into());
+        }
+        warnings.push(format!("{message}; {advice}"));
     }
-    let objective = functional::objective(config, &mesh, &states)?;
+    let objective = functional::objective(config, [&full_mesh, &mesh], &states)?;
     let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
     let shape = match (&design, body) {
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);
-            let observed = functional::fixed_elements(config, &mesh, &states)?;
+            let observed = functional::fixed_elements(config, [&full_mesh, &mesh], &states)?;
             let shape = shape::shape(inputs, config, body, &states, &observed)?;
+            source.check(functional::bodies_at_rest(config, source, &mesh, &shape))?;
             if group.is_none() {
                 check_initial_design(source, &shape)?;
             }
@@ -231,6 +234,23 @@ fn problem_on(
     if shape.is_none() && constraints.len() < config.constraints.len() {
         warnings
             .push("[[constraints]] on a body have no meaning without [design]: they are left out".to_owned());
+    }
+    let is_of_shape = |own: &Objective| !own.is_of_the_field();
+    if config.objective.as_ref().is_some_and(is_of_shape)
+        && constraints.iter().all(|own| !own.quantity.is_of_field())
+    {
+        warnings.push(
+            "the objective is of the shape alone and no constraint is on the field: no field has a say in the optimum; bound \
+             what the device has to do in [[constraints]]"
+                .to_owned(),
+        );
+    }
+    if config.accuracy.tolerance.is_some()
+        && config.analysis.order == ElementOrder::Quadratic
+        && mode != Mode::Analysis
+    {
+        warnings
+            .push("accuracy.tolerance needs analysis.order = 1: the mesh of a run is not refined".to_owned());
     }
     let bodies = functional::bodies(config, &mesh, &states)?;
     let problem =

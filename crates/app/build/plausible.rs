@@ -30,6 +30,9 @@ const LEAST_PERMEABILITY: f64 = 0.9;
 /// Conductivities [S/m] that are a metal's in MS/m: brass has 15, copper 58. Salt water has 5, ferrites less, carbon 10⁴.
 const OF_METALS_IN_MS: RangeInclusive<f64> = 10.0..=65.0;
 
+/// Relative permeability that no material has: annealed permalloy has 10⁶.
+const MOST_PERMEABILITY: f64 = 2e6;
+
 /// Conductivity that no metal has at room temperature [S/m]: silver has 6.3e7.
 const MOST_CONDUCTIVITY: f64 = 7e7;
 
@@ -124,6 +127,11 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             warnings.push(format!(
                 "the material `{name}` has the relative permeability {permeability}, which keeps flux out as no material but a \
                  superconductor does: of iron it is hundreds, and μr μ0 is not meant here"
+            ));
+        }
+        if permeability > MOST_PERMEABILITY {
+            warnings.push(format!(
+                "the material `{name}` has the relative permeability {permeability:e}, more than any: the best annealed alloys reach a million"
             ));
         }
         let conductivity = own.conductivity;

@@ -54,7 +54,7 @@ pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
         terms.map(|(k, term)| (objective.path(k), &term.functional))
     });
     let constraints = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
-        let Written::Field { functional, .. } = &constraint.limit else { return None };
+        let Written::Functional { functional, .. } = &constraint.limit else { return None };
         Some((format!("constraints[{k}]"), functional))
     });
     terms.chain(constraints).collect()
@@ -62,7 +62,7 @@ pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
 
 /// Key path and name of every region that objective and constraints name.
 pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
-    let fields = functionals(config)
+    let measured = functionals(config)
         .into_iter()
         .filter(|(_, f)| f.kind.is_of_a_region())
         .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
@@ -70,9 +70,5 @@ pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
         let path = move |(i, name): (usize, &'a String)| (format!("forces[{k}].regions[{i}]"), name.as_str());
         force.regions.iter().enumerate().map(path)
     });
-    let bodies = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
-        let Written::Body { region, .. } = &constraint.limit else { return None };
-        Some((format!("constraints[{k}].region"), region.as_str()))
-    });
-    fields.chain(forces).chain(bodies).collect()
+    measured.chain(forces).collect()
 }

@@ -4,17 +4,19 @@ use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{add, centroid, dot, sub};
+use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::Shape;
-use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup};
+use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
 use fluxmorph_solver::FieldModel;
 
-use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup, unused_keys};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
+use super::entries::material;
 use super::outline::same_nodes;
 use super::plausible;
-use crate::config::{self, Config, Design, Diagnostic, Remesh, SourceMap};
+use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
 /// What the shape is made from.
@@ -72,26 +74,89 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
             surface.variable_count()
         ));
     }
-    let materials: BTreeSet<&str> = regions_at(full_mesh, full_surface.nodes())
-        .into_iter()
-        .map(|region| {
-            let name = full_mesh.topology().region_names()[region.index()].as_str();
-            config.regions.get(name).map_or("air", |region| region.material.as_str())
-        })
-        .collect();
-    if materials.len() < 2 {
-        warnings.push(format!(
-            "both sides of the design surface `{}` have the same material: moving it changes no field; check [regions]",
-            design.surface.join("`, `")
-        ));
-    }
+    warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
+    warnings.extend(held_warning(inputs.remesh, mesh, surface.nodes()));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
     let setup = remesh_setup(source, inputs.remesh, mesh, surface.nodes(), (law, guidance), warnings)?;
+    warnings.extend(torn_warning(inputs.remesh, mesh, &setup.subregions));
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
+}
+
+/// What is rarely meant by a design surface with the same on both sides, or with nothing on one.
+fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId]) -> Option<String> {
+    let topology = mesh.topology();
+    let is_part = |f: &&Facet| f.nodes.iter().all(|n| nodes.binary_search(n).is_ok());
+    let facets: Vec<&Facet> = topology.facets().iter().filter(is_part).collect();
+    let surface = design.surface.join("`, `");
+    if !facets.is_empty() && facets.iter().all(|f| f.outside.is_none()) {
+        return Some(format!(
+            "the design surface `{surface}` is at the outside of the mesh: it is the wall of the model that moves, with its condition"
+        ));
+    }
+    let is_static = config.frequencies().iter().all(|&f| f == 0.0);
+    let matter = |e: ElementId| {
+        let name = topology.region_name_at(e);
+        let material = material(config, name);
+        let region = config.regions.get(name);
+        let entry = region.and_then(|region| config.materials.get(&region.material));
+        let curve = entry.filter(|entry| entry.saturates()).and(region).map(|region| &region.material);
+        (
+            material.relative_permeability,
+            if is_static { 0.0 } else { material.conductivity },
+            curve,
+            region.and_then(|region| region.remanence),
+            region.map_or(RegionModel::Volume, |region| region.model),
+        )
+    };
+    let is_alike = |f: &&Facet| f.outside.is_some_and(|other| matter(f.inside) == matter(other));
+    (!facets.is_empty() && facets.iter().all(is_alike)).then(|| {
+        format!(
+            "both sides of the design surface `{surface}` are alike to the field: moving it changes none; check [regions] and the \
+             relative_permeability of [materials]"
+        )
+    })
+}
+
+/// Nodes of the design on surfaces that are said to stay.
+fn held_warning(remesh: &Remesh, mesh: &Mesh, nodes: &[NodeId]) -> Vec<String> {
+    let of = |name: &String| {
+        let faces = mesh.topology().surface(name).ok()?;
+        let own: BTreeSet<NodeId> = faces.iter().flatten().copied().collect();
+        let shared = own.iter().filter(|n| nodes.binary_search(n).is_ok()).count();
+        (shared > 0).then(|| {
+            format!(
+                "{shared} nodes of `{name}` in remesh.fixed belong to the design and move with it; design.rim = \"fixed\" holds the \
+                 edge of the design surface"
+            )
+        })
+    };
+    remesh.fixed.iter().filter_map(of).collect()
+}
+
+/// Faces in `remesh.free` whose other side is no part of the elastic body.
+fn torn_warning(remesh: &Remesh, mesh: &Mesh, parts: &[Subregion]) -> Vec<String> {
+    let topology = mesh.topology();
+    let mut moves = vec![false; topology.tets().len()];
+    parts.iter().flat_map(|part| &part.elements).for_each(|e| moves[e.index()] = true);
+    let still = |f: &Facet| {
+        let sides = [f.inside, f.outside?];
+        let still = sides.into_iter().find(|e| !moves[e.index()])?;
+        sides.iter().any(|e| moves[e.index()]).then_some(still)
+    };
+    let of = |free: &String| {
+        let faces: BTreeSet<_> = topology.surface(free).ok()?.iter().map(|face| face_key(*face)).collect();
+        let facets = topology.facets().iter().filter(|f| faces.contains(&face_key(f.nodes)));
+        let dragged = topology.region_name_at(facets.filter_map(still).next()?);
+        Some(format!(
+            "`{free}` in remesh.free is a face of `{dragged}` beyond what moves: its elements there are dragged along; take them into \
+             remesh.region or remesh.box, or name the surface in remesh.fixed"
+        ))
+    };
+    remesh.free.iter().filter_map(of).collect()
 }
 
 /// The shape of a body, held against the field problem and the bounds.

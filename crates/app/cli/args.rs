@@ -2,7 +2,7 @@
 
 mod sweep;
 
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -101,7 +101,7 @@ pub struct WorkArgs {
     #[arg(long)]
     pub allow_outside: bool,
 
-    /// Replace an earlier run in the output directory, and skip the check that the memory is sufficient
+    /// Skip the check that the memory is sufficient, and where a run is begun replace an earlier one in its directory
     #[arg(long)]
     pub force: bool,
 }
@@ -113,7 +113,7 @@ pub struct CommonArgs {
     #[arg(value_name = "CONFIG")]
     pub config: PathBuf,
 
-    /// Directory to write into, instead of the configuration's output.directory
+    /// Directory of the run, instead of the configuration's output.directory
     #[arg(long, value_name = "DIR", alias = "output")]
     pub out: Option<PathBuf>,
 
@@ -327,7 +327,8 @@ impl CommonArgs {
             memory_limit::check_mesh(&config, &source)?;
         }
         if let Some(out) = &self.out {
-            config.output.directory = std::path::absolute(out).unwrap_or_else(|_| out.clone());
+            config.output.directory =
+                without_upward_steps(&std::path::absolute(out).unwrap_or_else(|_| out.clone()));
         }
         Ok((config, source))
     }
@@ -336,6 +337,20 @@ impl CommonArgs {
     pub fn overwrite_policy(&self) -> OverwritePolicy {
         self.work.overwrite_policy()
     }
+}
+
+/// An absolute path without `..`, which a configuration that is written there may not name; links before one are followed.
+fn without_upward_steps(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        if component == Component::ParentDir {
+            plain = plain.canonicalize().unwrap_or(plain);
+            plain.pop();
+        } else {
+            plain.push(component);
+        }
+    }
+    plain
 }
 
 impl WorkArgs {

@@ -80,6 +80,9 @@ pub struct CrossCheck {
     pub order: u8,
     /// `best / initial` by them.
     pub ratio: f64,
+    /// The objective at both shapes by them; of an earlier version zero.
+    #[serde(default)]
+    pub values: [f64; 2],
     /// Whether it is the ratio without the estimated errors, and no opinion beside the estimate.
     #[serde(default)]
     pub by_estimate: bool,
@@ -117,21 +120,25 @@ impl Accuracy {
         self.levels = refinements.refinements.iter().map(level).collect();
     }
 
-    /// Enters the estimated errors of the objective at both designs of a run; the ratio without them.
-    pub fn estimated(&mut self, [initial, best]: [f64; 2], errors: [f64; 2]) -> f64 {
-        let corrected = (best + errors[1]) / (initial + errors[0]);
+    /// Enters the estimated errors of the objective at both designs of a run; its values without them.
+    pub fn estimated(&mut self, [initial, best]: [f64; 2], errors: [f64; 2]) -> [f64; 2] {
+        let corrected = [initial + errors[0], best + errors[1]];
         self.error_estimate = Some(errors);
-        self.error_estimate_relative = relative(corrected - best / initial, best / initial);
+        self.error_estimate_relative = relative(corrected[1] / corrected[0] - best / initial, best / initial);
         corrected
     }
 
-    /// Judges a gain by the ratios that other computations of the same shapes have; nothing is said of hardly any gain, or by none.
-    pub fn judge(&mut self, ratio: f64, others: &[f64]) {
-        let share = |other: &f64| (other - 1.0) / (ratio - 1.0);
-        if (ratio - 1.0).abs() < LEAST_GAIN || others.is_empty() {
+    /// Judges a gain by what other computations have for the objective of the initial and of the best shape; nothing is said of hardly
+    /// any gain, or by none. The gain must be left in the ratio and in the unit of the objective: where a mesh has most of both
+    /// values wrong, the ratio of what is left may be anything.
+    pub fn judge(&mut self, [initial, best]: [f64; 2], others: &[[f64; 2]]) {
+        let gain = best / initial - 1.0;
+        if gain.abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
-        let is_left = others.iter().all(|other| share(other) >= LEAST_SHARE);
+        let shares =
+            |[first, last]: &[f64; 2]| [(last / first - 1.0) / gain, (last - first) / (best - initial)];
+        let is_left = others.iter().flat_map(shares).all(|share| share >= LEAST_SHARE);
         self.verdict = Some(if is_left { Verdict::Confirmed } else { Verdict::NotConfirmed });
     }
 }
@@ -156,9 +163,22 @@ mod tests {
     use super::*;
 
     fn verdict(ratio: f64, others: &[f64]) -> Option<Verdict> {
+        verdict_of([3.0, 3.0 * ratio], &others.iter().map(|other| [3.0, 3.0 * other]).collect::<Vec<_>>())
+    }
+
+    fn verdict_of(own: [f64; 2], others: &[[f64; 2]]) -> Option<Verdict> {
         let mut accuracy = Accuracy::default();
-        accuracy.judge(ratio, others);
+        accuracy.judge(own, others);
         accuracy.verdict
+    }
+
+    #[test]
+    fn a_gain_that_the_error_of_the_mesh_is_most_of_is_none() {
+        // The force on a magnet over a plate of air: nine tenths of it are the mesh's.
+        let own = [6.14e-2, 8.48e-2];
+        assert_eq!(verdict_of(own, &[[9.6e-3, 2.2e-2], [7.6e-3, 9.6e-3]]), Some(Verdict::NotConfirmed));
+        assert_eq!(verdict_of(own, &[[4.0e-2, 5.6e-2]]), Some(Verdict::Confirmed));
+        assert_eq!(verdict_of(own, &[[4.0e-2, -5.6e-2]]), Some(Verdict::NotConfirmed));
     }
 
     #[test]
@@ -176,7 +196,7 @@ mod tests {
     #[test]
     fn errors_that_both_designs_have_alike_cancel_in_the_ratio() {
         let mut accuracy = Accuracy::default();
-        assert_eq!(accuracy.estimated([2.0, 1.0], [0.2, 0.1]), 0.5);
+        assert_eq!(accuracy.estimated([2.0, 1.0], [0.25, 0.125]), [2.25, 1.125]);
         assert_eq!(accuracy.error_estimate_relative, Some(0.0));
         accuracy.estimated([2.0, 1.0], [0.0, 0.1]);
         let error = accuracy.error_estimate_relative.expect("a number");

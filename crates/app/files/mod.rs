@@ -39,7 +39,7 @@ pub use refinements::{RefinementStep, Refinements};
 pub use result::{
     Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,
     LinearSolverResult, MeshResult, MultipoleResult, ObjectiveResult, OpenResult, ProbeResult, RunResult,
-    SaturatedRegion, SaturationResult, StateResult, TermResult, Verification,
+    SaturatedRegion, SaturationResult, StateResult, TermResult, Verification, VerificationMesh,
 };
 pub(crate) use run_directory::LOCK;
 pub use run_directory::{OverwritePolicy, RunDirectory};

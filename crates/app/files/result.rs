@@ -90,6 +90,13 @@ pub struct RunResult {
     pub peak_memory_bytes: u64,
 }
 
+impl RunResult {
+    /// Names of the constraints that the best design violates.
+    pub fn violated(&self) -> Vec<String> {
+        self.constraints.iter().filter(|own| !own.satisfied).map(|own| own.name.clone()).collect()
+    }
+}
+
 /// An expansion of the flux density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MultipoleResult {
@@ -185,7 +192,11 @@ pub struct HomogeneityResult {
 /// The gain of a run computed again on a mesh that the optimiser never saw.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verification {
-    /// Parts of every cell of the run's mesh that moves or is observed, along each axis.
+    /// How that mesh came about.
+    #[serde(default)]
+    pub mesh: VerificationMesh,
+    /// Parts of every cell of the run's mesh that moves or is observed, along each axis; of cut elements how many times as many
+    /// were asked for at least.
     pub refinement: f64,
     /// Its tetrahedra.
     pub tets: usize,
@@ -198,6 +209,17 @@ pub struct Verification {
     /// The constraints at the best design there, with their bounds there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub constraints: Vec<ConstraintResult>,
+}
+
+/// The mesh of a verification.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum VerificationMesh {
+    /// Generated anew.
+    #[default]
+    Fresh,
+    /// The elements of the run, cut.
+    Cut,
 }
 
 /// One term of an objective.
@@ -386,6 +408,7 @@ pub(crate) mod tests {
                 best_evaluation: 7,
                 verified_ratio: Some(0.5),
                 verification: Some(Verification {
+                    mesh: VerificationMesh::Fresh,
                     refinement: 2.0,
                     tets: 147_000,
                     initial: 2.2,
@@ -415,6 +438,7 @@ pub(crate) mod tests {
                     elements: "edge".to_owned(),
                     order: 2,
                     ratio: 0.502,
+                    values: [2.2, 1.1],
                     by_estimate: true,
                 }),
                 verdict: Some(Verdict::Confirmed),

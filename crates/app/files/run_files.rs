@@ -36,7 +36,7 @@ files! {
     refinements = "refinements.json";
     /// `config.toml`, the configuration as given.
     config = "config.toml";
-    /// `resolved.toml`, with every default.
+    /// `resolved.toml`, with its defaults.
     resolved = "resolved.toml";
     /// `history.csv`.
     history_csv = "history.csv";

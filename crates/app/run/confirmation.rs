@@ -13,14 +13,14 @@ use fluxmorph_remesh::Moved;
 
 use super::Session;
 use super::estimate::{Estimator, left_out};
-use super::facets::described;
+use super::facets::{curved_facets, described};
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
-use crate::config::{Config, ElementOrder, Elements, SolverMethod, SourceMap};
+use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
     Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict,
-    relative_bar,
+    Verification, VerificationMesh, relative_bar,
 };
 use crate::show::Observer;
 
@@ -104,8 +104,13 @@ impl Session<'_> {
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
-        let facets = errors.and_then(|_| self.facets_of(observer));
+        let shape = self.cut_shape(objective, meshes);
+        let is_said = errors.is_some() || shape.is_some();
+        let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
         let mut accuracy = Accuracy { facets, ..Accuracy::default() };
+        if !self.has_field_objective() {
+            return accuracy.facets.is_some().then_some(accuracy);
+        }
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
@@ -123,21 +128,23 @@ impl Session<'_> {
                          that check, and there is none",
                     );
                 }
-                let of =
-                    |ratio| CrossCheck { elements: "edge".to_owned(), order: 2, ratio, by_estimate: true };
+                let of = |values: [f64; 2]| {
+                    let ratio = values[1] / values[0];
+                    CrossCheck { elements: "edge".to_owned(), order: 2, ratio, values, by_estimate: true }
+                };
                 corrected.map(of)
             }
             _ if is_checked => self.by_other_elements(objective, meshes, observer),
             _ => None,
         };
-        let cross_check = accuracy.cross_check.as_ref().map(|check| check.ratio);
-        let others: Vec<f64> =
-            [objective.verified_ratio, corrected, cross_check].into_iter().flatten().collect();
+        let cross_check = accuracy.cross_check.as_ref().map(|check| check.values);
+        let verified = objective.verification.as_ref().map(|found| [found.initial, found.best]);
+        let others: Vec<[f64; 2]> = [verified, corrected, cross_check].into_iter().flatten().collect();
         // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain, nor has one
         // that violates a constraint.
         let sign = self.config.objective.as_ref().map_or(1.0, |objective| objective.goal.sign());
         if keeps_all && sign * objective.best < sign * objective.initial {
-            accuracy.judge(objective.ratio, &others);
+            accuracy.judge([objective.initial, objective.best], &others);
         }
         if accuracy.verdict == Some(Verdict::NotConfirmed) {
             let cure = match analysis.order {
@@ -174,9 +181,28 @@ impl Session<'_> {
         None
     }
 
-    /// What no estimate and no refinement has of the geometry, which is reported.
-    pub(super) fn facets_of(&self, observer: &mut dyn Observer) -> Option<CurvedFacets> {
-        let facets = self.facets.clone()?;
+    /// Whether the objective has errors of the field; those of a volume or mass are its constraints'.
+    pub(super) fn has_field_objective(&self) -> bool {
+        self.config.objective.as_ref().is_some_and(Objective::is_of_the_field)
+    }
+
+    /// The best shape, where a control grid gives it between the nodes too and the check kept its facets: a mesh that is generated anew
+    /// has other ones.
+    fn cut_shape<'a>(&self, objective: &ObjectiveResult, meshes: &'a ShapeMeshes) -> Option<&'a Mesh> {
+        let has_grid = self.config.design.as_ref().is_some_and(|design| design.grid.is_some());
+        let is_cut = |found: &Verification| found.mesh == VerificationMesh::Cut;
+        (has_grid && objective.verification.as_ref().is_some_and(is_cut)).then_some(&meshes.solved[1])
+    }
+
+    /// What no estimate and no refinement has of the geometry, initially and at a `shape`, which is reported.
+    pub(super) fn facets_of(
+        &self,
+        shape: Option<&Mesh>,
+        observer: &mut dyn Observer,
+    ) -> Option<CurvedFacets> {
+        let of_shape = shape.and_then(curved_facets);
+        let off = |facets: &Option<CurvedFacets>| facets.as_ref().map_or(0.0, |facets| facets.off_m);
+        let facets = if off(&of_shape) > off(&self.facets) { of_shape } else { self.facets.clone() }?;
         observer.notice(&described(&facets));
         Some(facets)
     }
@@ -267,7 +293,7 @@ fn opinion([initial, best]: [f64; 2], at_initial: &[[f64; 2]], gain: f64, order:
         return CrossChecked::NotResolved(*off);
     }
     let (elements, ratio) = ("edge".to_owned(), best / initial);
-    CrossChecked::Ratio(CrossCheck { elements, order, ratio, by_estimate: false })
+    CrossChecked::Ratio(CrossCheck { elements, order, ratio, values: [initial, best], by_estimate: false })
 }
 
 #[cfg(test)]

@@ -84,8 +84,8 @@ pub(super) fn curved_facets(mesh: &Mesh) -> Option<CurvedFacets> {
 /// What no refinement takes away, in words.
 pub(super) fn described(found: &CurvedFacets) -> String {
     format!(
-        "`{}` is curved, and its facets are up to {:.3} mm off it, at {}: no error bar counts that, and refined meshes keep the \
-         facets; begin with smaller faces there to see what it does",
+        "`{}` is curved, and its facets are up to {:.3} mm off it, at {}: no error bar counts that, and refined meshes and cut \
+         elements keep the facets; begin with smaller faces there to see what it does",
         found.surface,
         1e3 * found.off_m,
         millimetres(found.at_m)

@@ -171,7 +171,7 @@ pub(super) fn both<S>(
 /// A configuration without what moves, and without constraints on that.
 fn field_alone(config: &Config) -> Config {
     let mut alone = Config { design: None, remesh: None, morph: None, ..config.clone() };
-    alone.constraints.retain(|constraint| matches!(constraint.limit, Limit::Field { .. }));
+    alone.constraints.retain(|constraint| matches!(&constraint.limit, Limit::Functional { functional, .. } if functional.kind.is_of_the_field()));
     looked_at_once(alone)
 }
 

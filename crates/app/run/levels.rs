@@ -105,13 +105,11 @@ impl Session<'_> {
         let settings = self.config.optimizer.settings();
         let mut levels = Levels::of(self)?;
         let is_shared_out = self.setup.problem.share().is_some();
-        let is_second_order = self.config.analysis.order == ElementOrder::Quadratic;
-        if levels.is_some() && (is_shared_out || is_second_order) {
-            let needs = if is_shared_out { "one process" } else { "analysis.order = 1" };
-            observer
-                .warning(&format!("accuracy.tolerance needs {needs}: the mesh of this run is not refined"));
-            levels = None;
+        if levels.is_some() && is_shared_out {
+            observer.warning("accuracy.tolerance needs one process: the mesh of this run is not refined");
         }
+        // Of second order the set-up has said it.
+        levels = levels.filter(|_| !is_shared_out && self.config.analysis.order == ElementOrder::Linear);
         if let Some(levels) = &mut levels {
             self.refine_before_search(levels, recorder.is_replaying(), observer)?;
         }

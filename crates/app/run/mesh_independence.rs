@@ -26,7 +26,7 @@ use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, Verification};
+use crate::files::{ObjectiveResult, Verification, VerificationMesh};
 use crate::show::Observer;
 
 /// Counted work of a shape on a fresh mesh, in evaluations, beyond which elements are cut instead. The shipped runs have 4 to 21, and
@@ -155,14 +155,14 @@ impl MeshIndependence<'_> {
                 .notice(&format!("the best shape is not checked on a finer mesh, which takes {shortage}")),
             Ok(Outcome::CutShort | Outcome::TooDear(_)) => {
                 observer
-                    .notice("the best shape is not checked on a fresh mesh: the run was stopped before that");
+                    .notice("the best shape is not checked on a finer mesh: the run was stopped before that");
                 if !cut_short {
                     return Check::CutShort;
                 }
             }
             Err(error) => {
                 observer.warning(&format!(
-                    "the best shape could not be checked on a fresh mesh: {error}; output.verify_refinement = 0 leaves this check out"
+                    "the best shape could not be checked on a finer mesh: {error}; output.verify_refinement = 0 leaves this check out"
                 ));
             }
         }
@@ -184,7 +184,7 @@ impl MeshIndependence<'_> {
         let Some(analyses) = finer.analyses(&meshes.solved, interrupted)? else {
             return Ok(Outcome::CutShort);
         };
-        Ok(Outcome::Found(verification(&finer.setup.problem, parts, &analyses)?))
+        Ok(Outcome::Found(verification(&finer.setup.problem, (VerificationMesh::Cut, parts), &analyses)?))
     }
 
     /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape or costs too much.
@@ -231,14 +231,14 @@ impl MeshIndependence<'_> {
         let Some(analyses) = both(displacements.each_ref(), interrupted, analyse)? else {
             return Ok(Outcome::CutShort);
         };
-        Ok(Outcome::Found(verification(&problem, fresh.parts as f64, &analyses)?))
+        Ok(Outcome::Found(verification(&problem, (VerificationMesh::Fresh, fresh.parts as f64), &analyses)?))
     }
 }
 
 /// What the analyses of the initial and the best shape on such a mesh come to.
 fn verification(
     problem: &Problem,
-    refinement: f64,
+    (mesh, refinement): (VerificationMesh, f64),
     [initial, best]: &[Analysis; 2],
 ) -> Result<Verification, Error> {
     let [of_initial, of_best] = [initial, best].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
@@ -249,6 +249,7 @@ fn verification(
     }
     let bounds = problem.bounds(None, initial)?;
     Ok(Verification {
+        mesh,
         refinement,
         tets: problem.original().topology().tets().len(),
         initial: of_initial,

@@ -150,6 +150,7 @@ impl Session<'_> {
             title: &config.title,
             optimizer: (*command == "run").then_some(&config.optimizer),
             objective: config.objective.as_ref(),
+            constraints: &config.constraints,
             variables: shape.map_or(0, |shape| shape.surface().variable_count()),
             filter_radius: shape.and_then(|shape| shape.surface().filter_radius()),
             motion: moves.map(|(remesh, shape)| motion_in_words(remesh, shape.motion())),
@@ -309,7 +310,7 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// The result with the gain checked on a fresh mesh, by other elements and by its estimated errors; the run's own problem
+    /// The result with the gain checked on a finer mesh, by other elements and by its estimated errors; the run's own problem
     /// is gone then.
     fn confirm(
         &mut self,
@@ -338,12 +339,12 @@ impl Session<'_> {
             meshes: Some(meshes),
             sizes,
         };
+        let keeps_all = result.violated().is_empty();
         if let Some(objective) = &mut result.objective {
             if check.verify(objective, self.interrupted, observer) == Check::CutShort {
                 // `resume` can do it later: the search is complete, the run is not.
                 result.status = RunStatus::Interrupted;
             }
-            let keeps_all = result.constraints.iter().all(|constraint| constraint.satisfied);
             result.accuracy =
                 self.accuracy((objective, stop_reason, keeps_all), meshes, (errors, refinements), observer);
         }

@@ -118,11 +118,13 @@ impl Session<'_> {
                 homogeneity: homogeneity(problem, analysis, value),
                 terms: terms(problem, analysis),
             }),
-            accuracy: analysis.objective.zip(estimate).map(|(value, estimate)| Accuracy {
-                refinements: halvings as usize,
-                facets: self.facets_of(observer),
-                ..Accuracy::of_analysis(value, estimate.objective)
-            }),
+            accuracy: analysis.objective.zip(estimate).filter(|_| self.has_field_objective()).map(
+                |(value, estimate)| Accuracy {
+                    refinements: halvings as usize,
+                    facets: self.facets_of(None, observer),
+                    ..Accuracy::of_analysis(value, estimate.objective)
+                },
+            ),
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })

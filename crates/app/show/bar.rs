@@ -240,6 +240,7 @@ mod tests {
             title: "Plate",
             optimizer: Some(optimizer),
             objective: None,
+            constraints: &[],
             variables: 91,
             filter_radius: None,
             motion: None,

@@ -16,7 +16,7 @@ pub(crate) mod text_table;
 use std::io::Write;
 use std::path::Path;
 
-use crate::config::{FieldsKept, Objective, Optimizer};
+use crate::config::{Constraint, FieldsKept, Objective, Optimizer};
 use crate::files::RunResult;
 
 pub use fluxmorph_optimizer::driver::{Evaluation, Observer, Silent, column};
@@ -34,6 +34,8 @@ pub struct Started<'a> {
     pub optimizer: Option<&'a Optimizer>,
     /// What is optimised or measured.
     pub objective: Option<&'a Objective>,
+    /// What must keep within bounds.
+    pub constraints: &'a [Constraint],
     /// Design variables.
     pub variables: usize,
     /// Radius of the filter of the design [m], where there is one.

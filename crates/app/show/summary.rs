@@ -6,10 +6,10 @@ use fluxmorph_optimizer::body::BodyForce;
 
 use super::styles::{Styles, styled};
 use super::{Started, probes};
-use crate::config::Objective;
+use crate::config::{Constraint, Limit, Objective, ValueBound};
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, CrossCheck, ObjectiveResult, RunResult, RunStatus, SAFETY,
-    SaturatedRegion, SaturationResult, StateResult, Verdict,
+    Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, MultipoleResult, ObjectiveResult,
+    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateResult, Verdict, VerificationMesh,
 };
 use crate::printable::printable;
 
@@ -19,11 +19,14 @@ pub(super) struct Named {
     name: String,
     /// Behind a value, with a blank before it; empty where terms of several units are added.
     unit: String,
+    /// What is limited.
+    constraints: Vec<Constraint>,
 }
 
 impl Named {
     pub(super) fn of(started: &Started<'_>) -> Self {
-        started.objective.map_or_else(Self::default, Self::objective)
+        let objective = started.objective.map_or_else(Self::default, Self::objective);
+        Self { constraints: started.constraints.to_vec(), ..objective }
     }
 
     fn objective(objective: &Objective) -> Self {
@@ -39,9 +42,29 @@ impl Named {
         };
         let name = printable(&name).into_owned();
         let unit = objective.si_unit().filter(|unit| *unit != "1");
-        Self { name, unit: unit.map_or_else(String::new, |unit| format!(" {unit}")) }
+        Self { name, unit: unit.map_or_else(String::new, |unit| format!(" {unit}")), constraints: Vec::new() }
+    }
+
+    fn limit_of(&self, constraint: &str) -> Option<&Limit> {
+        self.constraints.iter().find(|own| own.is_called(constraint)).map(|own| &own.limit)
+    }
+
+    /// Whether the bound of a constraint is a share of the initial value.
+    fn has_shared_bound(&self, constraint: &str) -> bool {
+        let is_share =
+            |bound: &ValueBound| matches!(bound, ValueBound::AtMostRatio(_) | ValueBound::AtLeastRatio(_));
+        matches!(self.limit_of(constraint), Some(Limit::Functional { bound, .. }) if is_share(bound))
+    }
+
+    /// The unit of a constraint, with a blank before it.
+    fn unit_of(&self, constraint: &str) -> String {
+        let unit = self.limit_of(constraint).map(Limit::si_unit).filter(|unit| *unit != "1");
+        unit.map_or_else(String::new, |unit| format!(" {unit}"))
     }
 }
+
+/// Terms of an expansion that are shown; all are in `result.json`.
+const MOST_TERMS: usize = 6;
 
 /// A name and its text.
 type Row = (&'static str, String);
@@ -50,7 +73,7 @@ type Row = (&'static str, String);
 pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<String> {
     let is_run = result.command != "solve";
     let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
-    rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, styles)));
+    rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, named, styles)));
     let states = states(result);
     for (at, state) in &states {
         let loss =
@@ -75,6 +98,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         let under = state.load.as_deref().map(|load| format!(" under {}", printable(load)));
         let row = |coil| ("coil", format!("{}{}", coil_text(coil), under.as_deref().unwrap_or_default()));
         rows.extend(state.coils.iter().map(row));
+    }
+    for set in &result.multipoles {
+        rows.push(("expansion", expansion_text(set)));
     }
     if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
         rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
@@ -130,8 +156,12 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
     rows.extend(homogeneity(objective));
-    if let Some(fresh) = &objective.verification {
-        rows.push(("F/F0 on a fresh mesh", format!("{:.5} ({} tetrahedra)", fresh.ratio, fresh.tets)));
+    if let Some(found) = &objective.verification {
+        let name = match found.mesh {
+            VerificationMesh::Fresh => "F/F0 on a fresh mesh",
+            VerificationMesh::Cut => "F/F0 on cut elements",
+        };
+        rows.push((name, format!("{:.5} ({} tetrahedra)", found.ratio, found.tets)));
     }
     let Some(accuracy) = &result.accuracy else { return rows };
     if let Some(error) = accuracy.error_estimate_relative {
@@ -141,7 +171,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         let verdict = if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
         rows.push(("tolerance", format!("{verdict} after {} refinements of the mesh", accuracy.refinements)));
     }
-    if let Some(CrossCheck { elements, order, ratio, by_estimate }) = &accuracy.cross_check {
+    if let Some(CrossCheck { elements, order, ratio, by_estimate, .. }) = &accuracy.cross_check {
         let source = if *by_estimate { ", by the estimate" } else { "" };
         rows.push(("F/F0 by other elements", format!("{ratio:.5} ({elements}, order {order}{source})")));
     }
@@ -157,6 +187,21 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ("gain", format!("{}{remark}", styled(style, verdict.describe())))
     }));
     rows
+}
+
+/// The terms of an expansion, most of them relative to its main order.
+fn expansion_text(set: &MultipoleResult) -> String {
+    let term = |term: &HarmonicResult| {
+        let value = match term.value_t {
+            Amplitude::Static(value) => value,
+            Amplitude::Phasor([re, im]) => re.hypot(im),
+        };
+        let units = term.units.map_or(String::new(), |units| format!(" ({units:.2} units)"));
+        format!("{} {value:.4e} T{units}", term.name)
+    };
+    let shown: Vec<String> = set.terms.iter().take(MOST_TERMS).map(term).collect();
+    let more = if set.terms.len() > MOST_TERMS { ", and more in result.json" } else { "" };
+    format!("{}: {}{more}", printable(&set.name), shown.join(", "))
 }
 
 /// What the terminals of a coil see.
@@ -208,12 +253,26 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows
 }
 
-fn constraint_row(constraint: &ConstraintResult, styles: &Styles) -> Row {
+fn constraint_row(constraint: &ConstraintResult, named: &Named, styles: &Styles) -> Row {
     let ConstraintResult { name, value, bound, satisfied, error_estimate } = constraint;
-    let bar =
-        error_estimate.map_or(String::new(), |error| format!(" ± {:.1e} (estimated)", SAFETY * error.abs()));
+    let bar = error_estimate.map(|error| format!(" ± {:.1e}", SAFETY * error.abs()));
+    // The errors of a value and of a bound that is a share of the initial one cancel in part.
+    let [of_value, of_both] = match bar {
+        None => [String::new(), String::new()],
+        Some(bar) if named.has_shared_bound(name) => {
+            [String::new(), format!(", difference{bar}{} (estimated)", named.unit_of(name))]
+        }
+        Some(bar) => [format!("{bar} (estimated)"), String::new()],
+    };
     let verdict = if *satisfied { "satisfied".to_owned() } else { styled(styles.bad, "VIOLATED") };
-    ("constraint", format!("{}: {value:.6e}{bar}, bound {bound:.6e}, {verdict}", printable(name)))
+    let unit = named.unit_of(name);
+    (
+        "constraint",
+        format!(
+            "{}: {value:.6e}{of_value}{unit}, bound {bound:.6e}{unit}{of_both}, {verdict}",
+            printable(name)
+        ),
+    )
 }
 
 /// What a state has.
@@ -260,7 +319,8 @@ mod tests {
 
     #[test]
     fn the_summary_names_the_outcome() {
-        let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
+        let named =
+            Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned(), ..Named::default() };
         let text = lines(&crate::files::example_result(), &named, &Styles::default()).join("\n");
         for fragment in [
             "the objective has converged",
@@ -278,7 +338,8 @@ mod tests {
     #[test]
     fn an_analysis_does_not_read_like_an_optimisation() {
         let result = RunResult { command: "solve".to_owned(), ..crate::files::example_result() };
-        let named = Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned() };
+        let named =
+            Named { name: "minimise loss in plate".to_owned(), unit: " W".to_owned(), ..Named::default() };
         let text = lines(&result, &named, &Styles::default()).join("\n");
         assert!(text.contains("value                  1.000000e0 W  loss in plate"), "{text}");
         for word in ["F/F0", "ended", "iterations", "minimise", "was "] {

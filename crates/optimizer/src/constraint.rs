@@ -4,6 +4,7 @@
 //! itself, so `c` is the relative distance from it. Quantities of the field are computed by [`crate::problem`].
 
 use fluxmorph_remesh::{Moved, RemeshError};
+use fluxmorph_solver::functional::Volume;
 
 use crate::error::Error;
 use crate::geometric;
@@ -28,7 +29,7 @@ pub enum Quantity {
     /// A functional of the field; its weight is one.
     Field(Box<Term>),
     /// A volume [m³] or mass [kg].
-    Volume(geometric::Volume),
+    Volume(Volume),
     /// The least or greatest thickness [m] of the designed body, where the measure counts from `bound`.
     Thickness {
         /// By how much the worst place is beyond the bound.
@@ -85,7 +86,10 @@ impl Constraint {
     pub fn of_shape(&self, moved: &Moved, shape: &Shape) -> Result<Option<(f64, Vec<f64>)>, RemeshError> {
         Ok(match &self.quantity {
             Quantity::Field(_) => None,
-            Quantity::Volume(body) => Some(body.evaluate(moved, shape)?),
+            Quantity::Volume(body) => {
+                let nodal = moved.pull_back(&body.node_derivative(&moved.mesh))?;
+                Some((body.value(&moved.mesh), shape.surface().gradient(&nodal)))
+            }
             Quantity::Thickness { measure, bound } => {
                 // Beyond a minimum is below it, beyond a maximum above.
                 let sign = if matches!(self.limit, Limit::AtLeast(_)) { -1.0 } else { 1.0 };

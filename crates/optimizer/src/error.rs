@@ -5,7 +5,6 @@ use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::SolverError;
 
 use crate::design::SurfaceMismatch;
-use crate::geometric::GeometricError;
 
 /// Errors of this crate.
 #[derive(Debug, thiserror::Error)]
@@ -36,9 +35,6 @@ pub enum Error {
     /// The mesh cannot follow the design.
     #[error(transparent)]
     Remesh(#[from] RemeshError),
-    /// A geometric constraint has no meaning for the shape.
-    #[error(transparent)]
-    Geometric(#[from] GeometricError),
     /// A shape cannot be transferred to another mesh.
     #[error(transparent)]
     SurfaceMismatch(#[from] SurfaceMismatch),

@@ -17,7 +17,7 @@ pub enum Goal {
 pub struct Term {
     /// What is measured on each state; the values are added.
     pub functional: Functional,
-    /// Indices of the states it is measured on, ascending.
+    /// Indices of the states it is measured on, ascending; of a volume or mass one.
     pub states: Vec<usize>,
     /// Its factor in a sum.
     pub weight: f64,

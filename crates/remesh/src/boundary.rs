@@ -91,7 +91,9 @@ impl NodeConditions {
         check_nodes("the list of design nodes", &setup.design_nodes, node_count)?;
         check_nodes("the list of fixed nodes", &setup.fixed_nodes, node_count)?;
         let faces = sorted_faces(topology, elements);
-        let rules = FaceRules::new(mesh, &setup.boundaries, &faces)?;
+        let mut is_design = vec![false; node_count];
+        setup.design_nodes.iter().for_each(|n| is_design[n.index()] = true);
+        let rules = FaceRules::new(mesh, &setup.boundaries, &faces, &is_design)?;
 
         let mut held = vec![ALL; node_count];
         let mut touched_outside = vec![true; node_count];
@@ -197,6 +199,7 @@ impl FaceRules {
         mesh: &Mesh,
         boundaries: &[Boundary],
         faces: &[([NodeId; 3], ElementId)],
+        is_design: &[bool],
     ) -> Result<Self, RemeshError> {
         let mut rules = Vec::new();
         let mut design_nodes = Vec::new();
@@ -216,6 +219,8 @@ impl FaceRules {
                         continue;
                     }
                     BoundaryKind::Fixed => ALL,
+                    // What the design prescribes need not be flat: an optimum goes on as a mesh.
+                    BoundaryKind::Slide if triangle.iter().all(|n| is_design[n.index()]) => continue,
                     BoundaryKind::Slide => 1 << normal_axis(mesh, boundary, triangle)?,
                     BoundaryKind::Free => 0,
                 };

@@ -8,8 +8,9 @@ use fluxmorph_solver::coil::{
     Coil, CoilShape, Condition, ConditionedSurface, Corner, Path, PlaneFault, Racetrack, RegionCurrent,
     SourceTerms, planes,
 };
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, SolverError};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order, SolverError};
 
 /// The shield's coil with conditions of choice on the planes x = 0 and z = z_max.
 fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
@@ -143,6 +144,61 @@ fn the_sources_of_several_coils_add_up() {
     for ((_, x), (_, y)) in both.moments.iter().zip(&sum.moments) {
         for (x, y) in x.iter().flatten().zip(y.iter().flatten()) {
             assert!((x - y).norm() <= 1e-14 * y.norm());
+        }
+    }
+}
+
+/// A sheet of current between two walls: `B_y` is constant beside it and linear inside, `±½ μ0 J d` at its faces, where its slope
+/// jumps. The value at a point is that of its own side.
+#[test]
+fn no_value_at_a_point_is_mixed_with_those_across_the_face_of_a_winding() {
+    let (current, thickness) = (1e3, 0.02);
+    let sheet = |[x, ..]: [f64; 3]| u32::from(x > 0.02 && x < 0.04);
+    let across = vec![0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06];
+    let along = vec![0.0, 0.013, 0.021, 0.04];
+    let mesh = painted([across, along.clone(), along], &["air", "sheet"], sheet);
+    let winding = mesh.topology().region("sheet").expect("a region");
+    let path = Path::Terminals { from: terminal(&mesh, "z_min"), to: terminal(&mesh, "z_max") };
+    let elements = mesh.topology().elements_of(winding);
+    let shape = RegionCurrent::new(&mesh, "sheet", &elements, &path).expect("a bar");
+    let mut boundaries = flux_parallel(&["x_min", "x_max", "z_min", "z_max"]);
+    boundaries.extend(["y_min", "y_max"].map(|name| (name.to_owned(), Boundary::FluxNormal)));
+    // Ampere-turns over the section of the sheet.
+    let density = current / (thickness * 0.04);
+    let at_face = 0.5 * VACUUM_PERMEABILITY * density * thickness;
+    let points = [0.003, 0.017, 0.0199, 0.022, 0.027, 0.033, 0.041, 0.055].map(|x| [x, 0.018, 0.023]);
+    for (family, order) in [
+        (ElementFamily::Nodal, Order::Quadratic),
+        (ElementFamily::Edge, Order::Linear),
+        (ElementFamily::Edge, Order::Quadratic),
+    ] {
+        let coil = Coil {
+            name: "sheet".to_owned(),
+            ampere_turns: c64::new(current, 0.0),
+            shape: shape.clone().into(),
+        };
+        let setup = FieldModelSetup {
+            family,
+            order,
+            frequency: 0.0,
+            materials: vec![Material::AIR; 2],
+            coils: vec![coil],
+            boundaries: boundaries.clone(),
+            ..FieldModelSetup::default()
+        };
+        let model = FieldModel::new(&mesh, setup).expect("a sound problem");
+        let (field, _) = model.solve(&mesh).expect("solved");
+        let found = probe(&field, &model, &mesh, "line", &points).expect("inside");
+        // Second order has A exactly; of first order B is the mean of an element, and off by half a cell's change of it.
+        let allowed = if order == Order::Quadratic { 1e-7 } else { 0.06 };
+        for (b, x) in found.iter().zip(points.map(|p| p[0])) {
+            let exact = at_face * ((x - 0.03) / (0.5 * thickness)).clamp(-1.0, 1.0);
+            println!("{family:?} {order:?} x = {x}: {:.6e} of {exact:.6e} T", b[1].re);
+            assert!(
+                (b[1].re - exact).abs() < allowed * at_face,
+                "{family:?} {order:?} {x}: {} {exact}",
+                b[1].re
+            );
         }
     }
 }

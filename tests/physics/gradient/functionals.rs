@@ -84,7 +84,7 @@ fn every_kind_is_exact_in_statics() {
     all_hold_on(&problem(OBSERVED, &format!("{FIELD}{inside}"), "frequency = 0", &overrides), wavy);
 }
 
-/// Two frequencies; one term at each and one at both, with weights that make them alike in size.
+/// Two frequencies; one term at each, one at both and one of the shape alone, with weights that make them alike in size.
 const SUM: &str = r#"goal = "maximise"
 [[objective.terms]]
 region = "observation"
@@ -98,6 +98,10 @@ weight = -1e-2
 kind = "energy"
 frequency = "200 Hz"
 weight = -0.1
+[[objective.terms]]
+kind = "volume"
+region = "plate"
+weight = -1e4
 "#;
 
 const TWICE: &str = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper = \"1 kW\"\n\
@@ -117,6 +121,9 @@ fn sums_over_two_frequencies_are_exact() {
             "every term has a say"
         );
     }
+    // The volume counts once, whatever the number of frequencies.
+    let volume = analysis.terms[3] / (0.12 * 0.24);
+    assert!((0.012..0.016).contains(&volume), "a plate of 10 mm that grows by 4 mm in the mean: {volume}");
     all_hold_on(&problem, wavy);
 }
 

@@ -1,8 +1,10 @@
 //! Volume and thickness of a plate; Taylor remainders of both are in `gradient`.
 
 use fluxmorph::build::Setup;
-use fluxmorph_optimizer::geometric::{MARGIN, ThicknessBound, ThicknessLimit, Volume};
+use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
+use fluxmorph_optimizer::geometric::{MARGIN, ThicknessBound, ThicknessLimit};
 use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_solver::functional::Volume;
 
 use crate::problems::variables;
 use crate::support::setup;
@@ -32,7 +34,9 @@ fn a_quarter_plate_has_its_volume_and_grows_with_its_face() {
         let shape = problem.shape().expect("a shape");
         let uniform = vec![3e-3; shape.surface().variable_count()];
         let moved = problem.moved(&uniform).expect("inside the bounds");
-        let (value, gradient) = plate.evaluate(&moved, shape).expect("a direct solve");
+        let quantity = Quantity::Volume(plate.clone());
+        let limit = Constraint { name: "volume".to_owned(), quantity, limit: Limit::AtMost(1.0) };
+        let (value, gradient) = limit.of_shape(&moved, shape).expect("a direct solve").expect("of the shape");
         // 120 × 240 × (10 + 3) mm³; a uniform motion sweeps the face of 120 × 240 mm².
         assert!((value - 0.12 * 0.24 * 0.013).abs() < 1e-12 * value, "{value}");
         let swept: f64 = gradient.iter().sum();

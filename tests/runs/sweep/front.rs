@@ -5,13 +5,13 @@ use super::outcome::cells;
 use crate::support::markup::elements;
 use crate::support::repository;
 
-/// A sweep of a shipped configuration in a few evaluations; head and rows of its table.
-fn table(home: &Home, config: &str, set: &str) -> (Vec<String>, Vec<Vec<String>>) {
+/// A sweep of a shipped configuration in a few evaluations, which must be said to have `shown`; head and rows of its table.
+fn table(home: &Home, config: &str, set: &str, shown: &[&str]) -> (Vec<String>, Vec<Vec<String>>) {
     let config = repository("configs").join(config).display().to_string();
     let quick =
         ["--set", "output.verify_refinement=0", "--set", "output.report=false", "--max-evaluations", "4"];
     let arguments = [&["sweep", config.as_str(), "--out", "out", "--set", set], &quick[..]].concat();
-    home.fluxmorph(&arguments).with(1, &[]);
+    home.fluxmorph(&arguments).with(1, shown);
     let text = home.text("out/sweep.csv");
     let mut lines = text.lines().map(cells);
     (lines.next().expect("a head"), lines.collect())
@@ -25,7 +25,8 @@ fn is_beaten([a, b]: [f64; 2], others: &[[f64; 2]]) -> bool {
 #[test]
 fn two_terms_whose_weight_is_swept_have_a_front() {
     let home = Home::new();
-    let (head, rows) = table(&home, "shield_two_frequencies.toml", "objective.terms[1].weight=0.1,1,10,100");
+    let (head, rows) =
+        table(&home, "shield_two_frequencies.toml", "objective.terms[1].weight=0.1,1,10,100", &[]);
     let place =
         |name: &str| head.iter().position(|own| own == name).unwrap_or_else(|| panic!("{name}: {head:?}"));
     let columns = [60, 200].map(|f| place(&format!("flux density squared in observation at {f} Hz [T²]")));
@@ -44,13 +45,20 @@ fn two_terms_whose_weight_is_swept_have_a_front() {
     assert!(page.contains(&format!("{on_front} of 4 runs are on the front")));
 }
 
-/// The smaller mass and the weaker field are the better ones: every bound that is kept gives a run of the front.
+/// The smaller mass and the weaker field are the better ones: every bound that is kept gives a run of the front, and one that is not
+/// is named.
 #[test]
 fn the_objective_over_a_swept_bound_has_a_front() {
     let home = Home::new();
-    let (head, rows) = table(&home, "shield_mass_limit.toml", "constraints[0].upper=2.4 kg,2.8 kg,3.2 kg");
+    // At its lower bound everywhere the plate has 1.13 kg.
+    let bounds = "constraints[0].upper=1 kg,2.4 kg,2.8 kg,3.2 kg";
+    let (head, mut rows) = table(&home, "shield_mass_limit.toml", bounds, &[", violates mass_plate, F/F0 "]);
     let place =
         |name: &str| head.iter().position(|own| own == name).unwrap_or_else(|| panic!("{name}: {head:?}"));
+    let violated: Vec<&str> = rows.iter().map(|row| row[place("violated")].as_str()).collect();
+    assert_eq!(violated, ["mass_plate", "", "", ""]);
+    assert!(home.text("out/sweep.html").contains("violates mass_plate"));
+    assert_eq!(rows.remove(0)[place("on_front")], "false");
     let columns = [place("flux density squared in observation [T²]"), place("mass_plate [kg]")];
     let points: Vec<[f64; 2]> =
         rows.iter().map(|row| columns.map(|k| row[k].parse().expect("a number"))).collect();

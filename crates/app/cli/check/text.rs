@@ -6,7 +6,7 @@ use super::estimate::EstimateSummary;
 use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
 use crate::config::{
-    BodyKind, CoilShape, Constraint, Corner, DesignDirection, Limit, Material, RemeshExtent, ValueBound,
+    CoilShape, Constraint, Corner, DesignDirection, Limit, Material, RegionModel, RemeshExtent, ValueBound,
     WrittenCurve,
 };
 use crate::files::shell_word;
@@ -198,12 +198,7 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 
 /// A constraint in words.
 fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
-    let unit = match &constraint.limit {
-        Limit::Field { functional, .. } => functional.dimension().si_unit(),
-        Limit::Body { kind: BodyKind::Volume, .. } => "m\u{b3}",
-        Limit::Body { kind: BodyKind::Mass, .. } => "kg",
-        Limit::Thickness { .. } => "m",
-    };
+    let unit = constraint.limit.si_unit();
     let value = |bound: &ValueBound| match bound {
         ValueBound::AtMost(upper) => format!("at most {upper:e} {unit}"),
         ValueBound::AtMostRatio(ratio) => format!("at most {ratio} times that of the initial design"),
@@ -211,7 +206,7 @@ fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
         ValueBound::AtLeastRatio(ratio) => format!("at least {ratio} times that of the initial design"),
     };
     let bounds = match &constraint.limit {
-        Limit::Field { bound, .. } | Limit::Body { bound, .. } => value(bound),
+        Limit::Functional { bound, .. } => value(bound),
         Limit::Thickness { minimum, maximum, .. } => {
             let side =
                 |word: &str, value: &Option<f64>| value.map(|t| format!("{word} {} mm", millimetre(t)));
@@ -345,8 +340,11 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         ("2V/S in depths", Right),
     ]);
     for s in &summary.skin {
-        let elements =
-            format!("{:.2} (least {:.2})", s.median_elements_per_skin_depth, s.least_elements_per_skin_depth);
+        let elements = if s.model == RegionModel::Volume.name() {
+            format!("{:.2} (least {:.2})", s.median_elements_per_skin_depth, s.least_elements_per_skin_depth)
+        } else {
+            "none inside".to_owned()
+        };
         let depth = format!("{:.3}", s.skin_depth_m * 1e3);
         let thickness = format!("{:.1}", s.thickness_in_skin_depths);
         table.row([s.region.clone(), s.model.to_owned(), depth, elements, thickness]);

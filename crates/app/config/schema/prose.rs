@@ -145,6 +145,7 @@ fn shown(value: f64) -> String {
 fn plural(one: &str) -> String {
     match one.strip_suffix('y') {
         Some(stem) => format!("{stem}ies"),
+        None if one.ends_with('s') => format!("lists of {one}"),
         None => format!("{one}s"),
     }
 }

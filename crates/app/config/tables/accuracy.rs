@@ -26,9 +26,10 @@ table! {
     /// ```
     pub struct Accuracy: Default {
         /// Whether the error of the objective that comes from the mesh is estimated: by `solve`, and by `run` at the first and
-        /// the best design, unless `output.verify_refinement` is 0. In one process. Default: of first order, where its iterations
-        /// cost no more counted work than three evaluations, or two seconds, along a B–H curve each step of Newton's method;
-        /// `true`: whatever it costs, and of second order too, on eight times the elements. B–H curves have one at 0 Hz.
+        /// the best design, unless `output.verify_refinement` is 0. In one process. Default: an estimate is made for elements of first
+        /// order, and given up where it would cost more than three evaluations and more than two seconds (along a B–H curve: than
+        /// each step of Newton's method may). `true`: it is made whatever it costs, and for elements of second order too, on eight
+        /// times as many. With B–H curves there is one at 0 Hz alone.
         estimate: Option<bool> = FLAG;
         /// `run`: largest error bar of the objective that the mesh may make: at the initial design relative to the objective there,
         /// at the best one relative to the larger of both. With first order, in one process. Default: the mesh stays what it is,

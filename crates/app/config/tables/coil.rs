@@ -380,7 +380,9 @@ impl Group for CoilShape {
         );
         check_axis(written.axis, section);
         match written.region.clone() {
-            Some(region) if !section.has("shape") => {
+            // What is no name is a fault of its own.
+            region if section.has("region") && !section.has("shape") => {
+                let region = region.unwrap_or_default();
                 let conductor = written.conductor.unwrap_or(ConductorWord::Stranded);
                 let connection = written.connection.unwrap_or(ConnectionWord::Series);
                 if conductor == ConductorWord::Stranded && section.has("connection") {

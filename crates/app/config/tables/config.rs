@@ -167,6 +167,14 @@ impl Config {
     fn check_functionals(&self, root: &Section<'_>, is_known: bool) {
         let cases = if is_known { self.load_cases() } else { Vec::new() };
         if let Some(objective) = &self.objective {
+            if !objective.is_of_the_field()
+                && self.accuracy.tolerance.is_some()
+                && let Some(section) = root.inner("accuracy")
+            {
+                let message =
+                    "the objective is of the shape alone, and has no error that a mesh could be refined for";
+                section.wrong("tolerance", message, "no such key, or an objective of the field");
+            }
             for (index, term) in objective.terms().iter().enumerate() {
                 if let Some(section) = root.inner(&objective.path(index)) {
                     term.functional.check_load(&section, &cases);
@@ -174,7 +182,7 @@ impl Config {
             }
         }
         for (index, constraint) in self.constraints.iter().enumerate() {
-            if let Limit::Field { functional, .. } = &constraint.limit
+            if let Limit::Functional { functional, .. } = &constraint.limit
                 && let Some(section) = root.inner(&format!("constraints[{index}]"))
             {
                 functional.check_load(&section, &cases);

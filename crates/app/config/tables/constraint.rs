@@ -4,7 +4,7 @@ use fluxmorph_solver::frequency_label;
 use serde::Serialize;
 use serde_json::json;
 
-use super::constraint_kind::{BodyKind, Kind, ThicknessKind};
+use super::constraint_kind::{Kind, ThicknessKind};
 use super::design::COMPONENTS;
 use super::functional::{Compared, Follow, Functional, ObjectiveKind, Weighting, keys_of_the_kind};
 use crate::config::section::Section;
@@ -118,7 +118,6 @@ impl LimitKeys {
     fn unused(section: &Section<'_>) -> Vec<&'static str> {
         match section.peek("kind", &WORD) {
             Some(Kind::Thickness(_)) => not_of_a_thickness(),
-            Some(Kind::Body(_)) => [&OF_A_FIELD[..], &THICKNESSES[..]].concat(),
             Some(_) => THICKNESSES.to_vec(),
             // Nothing can be said of the other keys.
             None => {
@@ -132,12 +131,10 @@ impl LimitKeys {
 /// Which keys go with which kind, and the unit of the bound.
 fn keys_of_the_limit(rules: Rules) -> Rules {
     let thickness = Then { required: &[], refused: &not_of_a_thickness() };
-    let body = Then { required: &["region"], refused: &OF_A_FIELD };
     let mut rules = rules
         .when("kind", &["thickness"], thickness)
         .unless("kind", &["thickness"], Then { required: &[], refused: &THICKNESSES })
-        .when("kind", &["volume", "mass"], body)
-        .branch(is("kind", &["volume", "mass", "thickness"]), "else", keys_of_the_kind)
+        .branch(is("kind", &["thickness"]), "else", keys_of_the_kind)
         .add(json!({
             "if": is("kind", &["thickness"]),
             "then": { "anyOf": present(&THICKNESSES) },
@@ -157,8 +154,6 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
             units.push((pointwise, usual, kind.range()));
         }
     }
-    let bodies = BodyKind::choices().into_iter();
-    units.extend(bodies.map(|(word, kind, _)| (is("kind", &[word]), kind.dimension(), Range::POSITIVE)));
     for (condition, dimension, range) in units {
         let bound = rules.definitions.quantity(dimension, range);
         let bounds = json!({ "upper": bound, "lower": bound });
@@ -171,21 +166,11 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Limit {
-    /// A functional of the field, from one side.
-    Field {
+    /// A functional, from one side.
+    Functional {
         /// What is measured.
         #[serde(flatten)]
         functional: Functional,
-        /// Its bound.
-        #[serde(flatten)]
-        bound: ValueBound,
-    },
-    /// Volume or mass of a region, from one side.
-    Body {
-        /// Which of them.
-        kind: BodyKind,
-        /// The region.
-        region: String,
         /// Its bound.
         #[serde(flatten)]
         bound: ValueBound,
@@ -228,16 +213,23 @@ impl Constraint {
         }
         let mut words = vec![kind.name().to_owned()];
         match &self.limit {
-            Limit::Field { functional, .. } => {
+            Limit::Functional { functional, .. } => {
                 let of_coils = functional.coils.as_ref().map(|coils| coils.join("_"));
                 words.extend(of_coils.or_else(|| functional.region.clone()));
                 words.extend(functional.frequency.map(frequency_label));
                 words.extend(functional.load.clone());
             }
-            Limit::Body { region, .. } => words.push(region.clone()),
             Limit::Thickness { .. } => {}
         }
         self.name = Column::of(&words.join("_"));
+    }
+}
+
+impl Constraint {
+    /// Whether a constraint of the results is this one, or one of both of a thickness.
+    pub fn is_called(&self, name: &str) -> bool {
+        let side = name.strip_prefix(self.name.as_str());
+        side.is_some_and(|side| ["", "_minimum", "_maximum"].contains(&side))
     }
 }
 
@@ -249,15 +241,22 @@ impl Group for Limit {
             return Self::Thickness { kind: ThicknessKind::Thickness, minimum: None, maximum: None };
         };
         match kind {
-            Kind::Field(kind) => Self::field(kind, written, section),
-            Kind::Body(kind) => Self::body(kind, written, section),
+            Kind::Functional(kind) => Self::functional(kind, written, section),
             Kind::Thickness(_) => Self::thickness(&written, section),
         }
     }
 }
 
 impl Limit {
-    fn field(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
+    /// Unit of what is limited in SI; `1` for a ratio.
+    pub fn si_unit(&self) -> &'static str {
+        match self {
+            Self::Functional { functional, .. } => functional.dimension().si_unit(),
+            Self::Thickness { .. } => "m",
+        }
+    }
+
+    fn functional(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
         let ratios = written.ratios();
         let LimitKeys {
             region,
@@ -287,15 +286,7 @@ impl Limit {
         };
         functional.check(section);
         let bound = ValueBound::of(ratios, section, functional.dimension(), kind.range());
-        Self::Field { functional, bound }
-    }
-
-    fn body(kind: BodyKind, written: LimitKeys, section: &Section<'_>) -> Self {
-        if !section.has("region") {
-            section.missing(&["region"], "region = \"plate\"");
-        }
-        let bound = ValueBound::of(written.ratios(), section, kind.dimension(), Range::POSITIVE);
-        Self::Body { kind, region: written.region.unwrap_or_default(), bound }
+        Self::Functional { functional, bound }
     }
 
     fn thickness(&LimitKeys { minimum, maximum, .. }: &LimitKeys, section: &Section<'_>) -> Self {

@@ -13,7 +13,7 @@ use crate::config::value::choice::choice;
 use crate::config::value::range::Range;
 
 table! {
-    /// A real quantity of the field.
+    /// A real quantity of the field or of the shape.
     pub struct Functional {
         /// What is measured. The default is the paper's objective.
         kind: ObjectiveKind = WORD => ObjectiveKind::FluxDensitySquared;
@@ -83,6 +83,9 @@ const OBSERVES: [&str; 7] = [
     OF_TERMS[1],
 ];
 
+/// Kinds of the shape alone.
+const OF_THE_SHAPE: [&str; 2] = ["volume", "mass"];
+
 /// Kinds that may have one.
 const MAY_BE_DIRECTED: [&str; 4] = ["field_component", "force", "torque", "homogeneity"];
 
@@ -104,9 +107,10 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
         .add(count(&OF_TWO_COILS, &of_two))
         .when(
             "kind",
-            &[&["field_component", "loss", "energy", "force", "torque"], &OF_TERMS[..], &of_coils].concat(),
+            &[&["field_component", "loss", "energy", "force", "torque"], &OF_TERMS[..], &of_coils, &OF_THE_SHAPE].concat(),
             Then { required: &[], refused: &["weighting"] },
         )
+        .when("kind", &OF_THE_SHAPE, Then { required: &[], refused: &["frequency", "load"] })
         .when("kind", &TARGET_FIELD, Then { required: &["target"], refused: &[] })
         .unless("kind", &TARGET_FIELD, Then { required: &[], refused: &["target"] })
         .when("kind", &DIRECTED, Then { required: &["direction"], refused: &[] })
@@ -172,6 +176,11 @@ choice! {
         /// How much of some `harmonics` an expansion has: their summed squares over those of the main order [1], the square of what
         /// builders of magnets give in units of 1e-4. The places stay; where the mesh moves there, see `follow`.
         MultipoleContent = "multipole_content",
+        /// Volume of a region [m³], meshed or replaced by its impedance surface: to be made small while `[[constraints]]` keep what
+        /// the field has to do.
+        Volume = "volume",
+        /// Mass of a region [kg], by the `density` of its material.
+        Mass = "mass",
     }
 }
 
@@ -248,6 +257,8 @@ impl ObjectiveKind {
             | Self::LinkEfficiency
             | Self::PowerFactor
             | Self::MultipoleContent => Dimension::Ratio,
+            Self::Volume => Dimension::Volume,
+            Self::Mass => Dimension::Mass,
             Self::Resistance => Dimension::Resistance,
             Self::FluxLinkage => Dimension::FluxLinkage,
             Self::Current => Dimension::Current,
@@ -293,6 +304,11 @@ impl ObjectiveKind {
         !self.is_of_a_body() && !self.is_of_terms()
     }
 
+    /// Whether the field has a say in it.
+    pub fn is_of_the_field(self) -> bool {
+        !matches!(self, Self::Volume | Self::Mass)
+    }
+
     /// Whether it acts on a body of `[[forces]]`.
     pub fn is_of_a_body(self) -> bool {
         matches!(self, Self::Force | Self::Torque)
@@ -308,7 +324,9 @@ impl Functional {
             DIRECTED.contains(&kind.name()) || is_homogeneity && self.compare == Some(Compared::Component);
         let takes_direction = is_component || is_homogeneity && self.compare.is_none();
         if !section.has("region") && kind != ObjectiveKind::Energy && kind.coils() == 0 {
-            section.missing(&["region"], "region = \"observation\"");
+            let is_of_a_body = !kind.is_of_the_field() || kind == ObjectiveKind::Loss;
+            let example = if is_of_a_body { "region = \"plate\"" } else { "region = \"observation\"" };
+            section.missing(&["region"], example);
         }
         let example = ["", "coils = [\"coil\"]", "coils = [\"one\", \"other\"]"][kind.coils()];
         if let Some(named) = &self.coils
@@ -339,6 +357,8 @@ impl Functional {
             ("direction", is_component.then_some("direction = [0, 0, 1]"), takes_direction),
             ("compare", None, is_homogeneity),
             ("follow", None, OBSERVES.contains(&kind.name())),
+            ("frequency", None, kind.is_of_the_field()),
+            ("load", None, kind.is_of_the_field()),
         ] {
             match (section.has(key), example) {
                 (true, _) if !wanted => {

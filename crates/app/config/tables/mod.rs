@@ -37,7 +37,7 @@ pub use coil::{
 };
 pub use config::Config;
 pub use constraint::{Constraint, Limit, ValueBound};
-pub use constraint_kind::{BodyKind, ThicknessKind};
+pub use constraint_kind::ThicknessKind;
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
 pub use functional::{Compared, Follow, Functional, ObjectiveKind, Weighting};

@@ -10,7 +10,7 @@ use crate::config::table::{Group, table};
 use crate::config::value::choice::choice;
 
 /// The keys that belong to a term.
-const OF_A_TERM: [&str; 11] = [
+const OF_A_TERM: [&str; 12] = [
     "kind",
     "region",
     "coils",
@@ -19,6 +19,7 @@ const OF_A_TERM: [&str; 11] = [
     "target",
     "compare",
     "direction",
+    "follow",
     "frequency",
     "load",
     "weight",
@@ -161,6 +162,11 @@ impl Objective {
             (Combination::WorstCase, Goal::Minimise) => Some("the largest"),
             (Combination::WorstCase, Goal::Maximise) => Some("the least"),
         }
+    }
+
+    /// Whether the field has a say in it; a volume or mass alone is of the shape.
+    pub fn is_of_the_field(&self) -> bool {
+        self.terms().iter().any(|term| term.functional.kind.is_of_the_field())
     }
 
     /// The unit of its value in SI, where all its terms have the same.

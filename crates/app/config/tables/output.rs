@@ -24,8 +24,8 @@ table! {
     /// the size of the box, the far cells, materials, conditions, elements and their order, and the model of every region: an
     /// error of these is in both ratios.
     /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
-    /// its triangles. Constraints are measured anew at both shapes; where the elements of the run are cut instead, those on the
-    /// field are. A run that is interrupted or ends with `max_time` is not checked; a signal during the check ends with 130 or 143
+    /// its triangles. Constraints are measured anew at both shapes; where the elements of the run are cut instead, only those
+    /// on the field are: cutting changes no volume and no thickness. A run that is interrupted or ends with `max_time` is not checked; a signal during the check ends with 130 or 143
     /// and the `status` `interrupted`, beside the `stop_reason` of the search, and `fluxmorph resume` makes up for it; a check
     /// that fails is a warning, and changes neither the status nor the rest of the result, which is on the disk before.
     ///
@@ -48,8 +48,8 @@ table! {
         /// `run`: after the optimisation the mesh is generated anew with every cell that moves or is observed divided in so many
         /// parts along each axis (a fraction is rounded up), and the initial and the best shape are analysed on it, their
         /// constraints too. What an optimiser gained from the errors of one mesh is lost on another. 0: no check. With the
-        /// default the check costs two analyses without gradients on three to five times the elements. Of a mesh from a file or
-        /// of the generator `block` every element is cut at both shapes, into at least so many parts on average.
+        /// default the check costs two analyses without gradients on three to five times the elements. A mesh from a file or of the
+        /// generator `block` is cut instead, at both shapes, into at least so many times the elements.
         verify_refinement: f64 = zero_or(Range::closed(1.0, MOST_PARTS)) => 2.0;
         /// Whether a run ends with `report.html`. Default `true`: it is what one looks at first.
         report: bool = FLAG => true;

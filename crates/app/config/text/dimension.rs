@@ -73,7 +73,8 @@ dimensions! {
         decimal("A", 0), decimal("mA", -3), decimal("kA", 3), decimal("MA", 6), decimal("AT", 0), decimal("kAT", 3);
     /// A magnetic flux density [T].
     FluxDensity = "a flux density", in "T", such as "5 mT":
-        decimal("T", 0), decimal("mT", -3), decimal("G", -4);
+        decimal("T", 0), decimal("mT", -3), decimal("uT", -6), decimal("\u{b5}T", -6), decimal("\u{3bc}T", -6),
+        decimal("nT", -9), decimal("G", -4);
     /// An angle [rad].
     Angle = "an angle", in "rad", such as "30 deg":
         scaled("deg", std::f64::consts::PI / 180.0), decimal("rad", 0);

@@ -109,7 +109,13 @@ fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text));
     by_case
         .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
-        .or_else(|| nearest(text, known.iter().copied()))
+        .or_else(|| nearest(text, known.iter().copied()).filter(|unit| !has_another_prefix(text, unit)))
+}
+
+/// Whether two units differ by the letter before them, which stands for a power of ten: none of these is a slip of the other.
+fn has_another_prefix(a: &str, b: &str) -> bool {
+    let rest = |unit: &str| unit.chars().skip(1).collect::<String>();
+    [rest(a) == rest(b), rest(a) == b, rest(b) == a].contains(&true)
 }
 
 /// Units by their full names.

@@ -47,6 +47,8 @@ pub struct Row {
     pub ratio: Option<f64>,
     /// The same on a freshly generated mesh.
     pub verified_ratio: Option<f64>,
+    /// Names of the constraints that the best design violates.
+    pub violated: Vec<String>,
     /// The criteria at the best design, in SI; empty where there are none, or no result.
     pub criteria: Vec<f64>,
     /// Worst quality (Eq. 4) of the mesh of the best design.
@@ -60,9 +62,6 @@ pub struct Row {
     /// Evaluation and ratio, as they came.
     #[serde(skip)]
     pub(super) curve: Vec<[f64; 2]>,
-    /// Whether all constraints are kept.
-    #[serde(skip)]
-    is_feasible: bool,
     /// Which way the objective is better.
     #[serde(skip)]
     goal: Option<Goal>,
@@ -101,7 +100,7 @@ impl Comparison {
     fn compare(&mut self) {
         self.best = self.find_best();
         let points: Vec<(usize, [f64; 2])> =
-            self.points().filter(|(row, _)| self.combinations[*row].is_feasible).collect();
+            self.points().filter(|(row, _)| self.combinations[*row].violated.is_empty()).collect();
         let sign = |k: usize| if self.criteria[k].smaller_is_better { 1.0 } else { -1.0 };
         self.front =
             if points.is_empty() { Vec::new() } else { front::non_dominated(&points, [sign(0), sign(1)]) };
@@ -132,6 +131,7 @@ impl Comparison {
                 Value::Null if column == "status" => "not_begun".to_owned(),
                 Value::Null => String::new(),
                 Value::String(text) => csv_text(text),
+                Value::Array(_) => csv_text(&row.violated.join(" ")),
                 other => other.to_string(),
             };
             let cells = row.values.iter().map(|value| csv_text(value)).chain(COLUMNS.map(cell));
@@ -150,7 +150,7 @@ impl Comparison {
             return None;
         }
         let known = |(index, row): (usize, &Row)| Some((index, row.ratio.filter(|ratio| ratio.is_finite())?));
-        let sound = self.combinations.iter().enumerate().filter(|(_, row)| row.is_feasible);
+        let sound = self.combinations.iter().enumerate().filter(|(_, row)| row.violated.is_empty());
         let better = |a: f64, b: f64| match goal {
             Goal::Minimise => a < b,
             Goal::Maximise => a > b,
@@ -166,7 +166,7 @@ impl Comparison {
 }
 
 /// Columns of `sweep.csv` after those of the keys.
-const COLUMNS: [&str; 11] = [
+const COLUMNS: [&str; 12] = [
     "status",
     "stop_reason",
     "evaluations",
@@ -174,6 +174,7 @@ const COLUMNS: [&str; 11] = [
     "objective_best",
     "ratio",
     "verified_ratio",
+    "violated",
     "worst_quality",
     "seconds",
     "peak_memory_bytes",
@@ -210,7 +211,7 @@ impl Row {
             worst_quality: of_result(|result| Some(result.mesh.worst_quality_final)),
             seconds: of_result(|result| result.timings_s.get("total").copied()),
             peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
-            is_feasible: result.as_ref().is_some_and(|r| r.constraints.iter().all(|c| c.satisfied)),
+            violated: result.as_ref().map_or(Vec::new(), RunResult::violated),
             is_reported: is_file(layout, &run.report()),
             curve,
             ..blank

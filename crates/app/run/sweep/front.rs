@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::Setting;
-use crate::config::{BodyKind, Combination, Config, Constraint, Limit, Objective, Term, ValueBound};
+use crate::config::{Combination, Config, Constraint, Limit, Objective, Term, ValueBound};
 use crate::files::RunResult;
 
 /// What runs are compared by.
@@ -89,9 +89,7 @@ impl Criterion {
         let is_upper =
             |bound: &ValueBound| matches!(bound, ValueBound::AtMost(_) | ValueBound::AtMostRatio(_));
         let (unit, smaller_is_better) = match &constraint.limit {
-            Limit::Field { functional, bound } => (functional.dimension().si_unit(), is_upper(bound)),
-            Limit::Body { kind: BodyKind::Mass, bound, .. } => ("kg", is_upper(bound)),
-            Limit::Body { kind: BodyKind::Volume, bound, .. } => ("m³", is_upper(bound)),
+            Limit::Functional { bound, .. } => (constraint.limit.si_unit(), is_upper(bound)),
             Limit::Thickness { minimum: Some(_), maximum: Some(_), .. } => return None,
             Limit::Thickness { minimum, .. } => ("m", minimum.is_none()),
         };

@@ -101,8 +101,17 @@ impl Row {
         matches!(self.status, Some(RunStatus::Converged | RunStatus::Stopped))
     }
 
-    /// How far it is, in words.
+    /// How far it is, in words, with the constraints that its best design violates.
     pub fn describe(&self) -> String {
+        let ended = self.how_it_ended();
+        if self.violated.is_empty() {
+            ended
+        } else {
+            format!("{ended}, violates {}", self.violated.join(", "))
+        }
+    }
+
+    fn how_it_ended(&self) -> String {
         match (self.status, self.stop_reason) {
             (None, _) => "not begun".to_owned(),
             (Some(RunStatus::Converged), _) => "converged".to_owned(),
@@ -122,7 +131,7 @@ const HEAD: [&str; 10] = [
     "run",
     "status",
     "F / F₀",
-    "on a fresh mesh",
+    "on a finer mesh",
     "F initial",
     "F best",
     "evaluations",
@@ -177,7 +186,7 @@ fn cells(row: &Row) -> Vec<Markup> {
         row.evaluations.map_or("–".to_owned(), |count| count.to_string()),
         shown(row.worst_quality),
         row.seconds.map_or("–".to_owned(), duration),
-        memory.map_or("–".to_owned(), |bytes| format!("{} MB", bytes.div_ceil(1_000_000))),
+        memory.map_or("–".to_owned(), |bytes| format!("{} MiB", bytes.div_ceil(1 << 20))),
     ];
     let text = |text: &String| html! { (text) };
     row.values.iter().map(text).chain([run]).chain(texts.iter().map(text)).collect()

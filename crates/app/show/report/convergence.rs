@@ -62,7 +62,10 @@ pub(super) fn figures(data: &RunData) -> Markup {
         let under = body.state.as_ref().map_or(String::new(), |state| format!(", {state}"));
         all.push(("force", series(&format!("force on {}{under} [N]", body.name), &size)));
     }
-    all.push(("gradient", series("norm of the gradient ‖dF/dp‖ [F/m]", &|row| Some(row.gradient_norm))));
+    all.push((
+        "gradient",
+        series("norm of the gradient ‖dF/dp‖ [unit of F per m]", &|row| Some(row.gradient_norm)),
+    ));
     all.push(("quality", series("worst quality of an element (Eq. 4)", &|row| Some(row.worst_quality))));
     all.push((
         "step",

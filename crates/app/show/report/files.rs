@@ -50,11 +50,12 @@ pub(super) fn files(data: &RunData, links: &str) -> Markup {
 fn describe(file: &str) -> &'static str {
     match file {
         "fields.pvd" => "the series of fields, for ParaView and pyvista",
+        "error.vtu" => "where the mesh makes the error of the objective",
         "optimum.msh" => "the mesh of this design, for Gmsh",
         "optimum_refined.msh" => "the same with finer elements",
         "history.csv" => "a row for each evaluation",
         "result.json" => "all numbers of the result",
-        "resolved.toml" => "the configuration with every default",
+        "resolved.toml" => "the configuration with its defaults",
         "config.toml" => "the configuration as given",
         file if file.ends_with(".stl") => "a surface of this design, for CAD",
         _ => "",
@@ -73,7 +74,7 @@ fn continuation(data: &RunData) -> Option<(&'static str, String)> {
     match result.stop_reason {
         StopReason::Interrupted | StopReason::MaxTime => Some(("All evaluations are saved:", resume)),
         _ if result.status == RunStatus::Interrupted => {
-            Some(("To run the check on a fresh mesh that is missing:", resume))
+            Some(("To run the check on a finer mesh that is missing:", resume))
         }
         StopReason::MaxEvaluations => Some((
             "The search stopped at its limit of evaluations; to continue with more:",

@@ -10,8 +10,10 @@ use super::plane::bounds;
 use super::ticks::{duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
-use crate::config::{MeshConfig, Objective};
-use crate::files::{Accuracy, CrossCheck, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict};
+use crate::config::Objective;
+use crate::files::{
+    Accuracy, CrossCheck, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict, VerificationMesh,
+};
 
 /// Title, status, what was done in a sentence, and key figures.
 pub(super) fn head(data: &RunData) -> Markup {
@@ -84,7 +86,7 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
         });
         cards.push(("objective F / F₀", number(ratio, 4), remark));
     }
-    cards.extend(objective.map(|objective| fresh_mesh_card(data, objective)));
+    cards.extend(objective.map(|objective| finer_mesh_card(data, objective)));
     let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
     cards.extend(objective.zip(accuracy).and_then(|(objective, accuracy)| gain_card(objective, accuracy)));
     let (evaluations, iterations) = match (&data.result, data.history.last()) {
@@ -104,9 +106,9 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         Verdict::NotConfirmed => "NOT CONFIRMED",
     };
     let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
-    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", number(objective.ratio, 4), number(bar, 1)));
+    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", number(objective.ratio, 4), number(bar, 2)));
     let other = accuracy.cross_check.as_ref().map(|check| {
-        let CrossCheck { elements, order, ratio, by_estimate } = check;
+        let CrossCheck { elements, order, ratio, by_estimate, .. } = check;
         let source = if *by_estimate { ", by the estimate" } else { "" };
         format!("{} by {elements} elements of order {order}{source}", number(*ratio, 4))
     });
@@ -124,24 +126,31 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
 }
 
 /// The gain on a mesh that was not optimised on.
-fn fresh_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
-    let (value, remark) = match (objective.verified_ratio, &objective.verification, &data.config.mesh) {
-        (Some(ratio), Some(v), _) => {
+fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
+    let (value, remark) = match (objective.verified_ratio, &objective.verification) {
+        (Some(ratio), Some(v)) => {
             let (parts, tets) = (trim_zeros(v.refinement, 3), group_digits(v.tets));
             let violated = v.constraints.iter().filter(|constraint| !constraint.satisfied).count();
             let violated =
                 if violated == 0 { String::new() } else { format!(", {violated} constraints violated") };
-            let remark =
-                format!("cells over the device in {parts} parts each way, {tets} tetrahedra{violated}");
+            let remark = match v.mesh {
+                VerificationMesh::Fresh => {
+                    format!("cells over the device in {parts} parts each way, {tets} tetrahedra{violated}")
+                }
+                VerificationMesh::Cut => {
+                    format!("both shapes on the elements of the run, cut into {tets} tetrahedra{violated}")
+                }
+            };
             (number(ratio, 4), remark)
         }
-        (Some(ratio), None, _) => (number(ratio, 4), "the initial shape is the best".to_owned()),
-        (None, _, MeshConfig::File { .. }) => {
-            ("not checked".to_owned(), "the mesh is from a file: solve both shapes on another one".to_owned())
+        (Some(ratio), None) => (number(ratio, 4), "the initial shape is the best".to_owned()),
+        (None, ..) if data.config.output.verify_refinement == 0.0 => {
+            ("not checked".to_owned(), "output.verify_refinement is 0".to_owned())
         }
         _ => ("not checked".to_owned(), "see the messages at the end of the run".to_owned()),
     };
-    ("on a fresh mesh", value, remark)
+    let is_cut = objective.verification.as_ref().is_some_and(|v| v.mesh == VerificationMesh::Cut);
+    (if is_cut { "on cut elements" } else { "on a fresh mesh" }, value, remark)
 }
 
 /// Mean |B| over what is observed, before and after, where the fields are there.

@@ -10,7 +10,7 @@ use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline};
-use crate::config::{BodyKind, Constraint, Limit, Objective, RegionModel};
+use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
 
@@ -52,7 +52,7 @@ fn columns<'a>(rows: &'a [Evaluation], objective: &'a str) -> Vec<(&'a str, Cell
         column("iteration", |row| row.iteration.to_string()),
         (objective, Box::new(|row| number(row.objective, 6))),
         column("F / F₀", |row| number(row.ratio, 4)),
-        column("‖dF/dp‖ [F/m]", |row| number(row.gradient_norm, 3)),
+        column("‖dF/dp‖ [unit of F per m]", |row| number(row.gradient_norm, 3)),
         column("step [mm]", |row| number(1e3 * row.step_norm, 3)),
         column("worst quality", |row| number(row.worst_quality, 3)),
     ];
@@ -189,14 +189,11 @@ fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Mark
 
 /// The unit that a constraint is shown in, and its number in one of SI.
 fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64) {
-    let is_own = |own: &&Constraint| {
-        let side = name.strip_prefix(own.name.as_str());
-        side.is_some_and(|side| ["", "_minimum", "_maximum"].contains(&side))
-    };
-    match constraints.iter().find(is_own).map(|constraint| &constraint.limit) {
-        Some(Limit::Field { functional, .. }) => (functional.dimension().si_unit(), 1.0),
-        Some(Limit::Body { kind: BodyKind::Volume, .. }) => ("cm³", 1e6),
-        Some(Limit::Body { kind: BodyKind::Mass, .. }) => ("kg", 1.0),
+    match constraints.iter().find(|own| own.is_called(name)).map(|own| &own.limit) {
+        Some(limit @ Limit::Functional { functional, .. }) => match functional.kind {
+            ObjectiveKind::Volume => ("cm³", 1e6),
+            _ => (limit.si_unit(), 1.0),
+        },
         Some(Limit::Thickness { .. }) => ("mm", 1e3),
         None => ("in SI", 1.0),
     }
@@ -317,7 +314,11 @@ pub(super) fn skin(outline: &Outline) -> Markup {
             a.region.clone(),
             model.to_owned(),
             number(1e3 * a.skin_depth, 3),
-            format!("{median} (least {least})"),
+            if audited.model == RegionModel::Volume {
+                format!("{median} (least {least})")
+            } else {
+                "none inside".to_owned()
+            },
             number(a.thickness_in_skin_depths, 3),
         ]
     };

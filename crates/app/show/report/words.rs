@@ -34,7 +34,7 @@ pub(super) fn objective(config: &Config) -> Option<String> {
     })
 }
 
-/// A functional of the field.
+/// A functional.
 pub(super) fn functional(functional: &Functional) -> String {
     let region = functional.region.as_deref().unwrap_or("the whole mesh");
     let sum = |integrand: &str| match functional.weighting {
@@ -64,7 +64,10 @@ pub(super) fn functional(functional: &Functional) -> String {
         ObjectiveKind::MultipoleContent => {
             format!("the relative content of {} in {region}", harmonics(functional))
         }
-        kind => format!("the {} of {}", kind.name().replace('_', " "), coils(functional)),
+        kind => {
+            let of = functional.region.clone().unwrap_or_else(|| coils(functional));
+            format!("the {} of {of}", kind.name().replace('_', " "))
+        }
     };
     let what = match functional.follow {
         None => what,
@@ -147,13 +150,9 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
         }
     };
     match &constraint.limit {
-        Limit::Field { functional: measured, bound } => {
+        Limit::Functional { functional: measured, bound } => {
             let unit = format!(" {}", measured.dimension().si_unit());
             format!("{} {}", functional(measured), within(bound, &unit))
-        }
-        Limit::Body { kind, region, bound } => {
-            let unit = format!(" {}", kind.dimension().si_unit());
-            format!("the {} of {region} {}", kind.name(), within(bound, &unit))
         }
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];

@@ -12,7 +12,7 @@
 
 use fluxmorph_remesh::{Moved, RemeshError};
 
-use super::GeometricError;
+use super::NoThickness;
 use super::wall_thickness::{Wall, WallThickness};
 use crate::problem::Shape;
 
@@ -39,9 +39,9 @@ pub struct ThicknessBound {
 
 impl ThicknessBound {
     /// # Errors
-    /// [`GeometricError::NoThickness`] where the shape has none.
-    pub fn new(shape: &Shape, bound: ThicknessLimit) -> Result<Self, GeometricError> {
-        let thickness = shape.thickness().ok_or(GeometricError::NoThickness)?;
+    /// [`NoThickness`] where the shape has none.
+    pub fn new(shape: &Shape, bound: ThicknessLimit) -> Result<Self, NoThickness> {
+        let thickness = shape.thickness().ok_or(NoThickness)?;
         let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0; a limit of zero is held as one of a micrometre.
         let count = thickness.at_nodes().count().max(2) as f64;

@@ -149,7 +149,8 @@ impl State<'_> {
     fn error_of(&mut self, terms: &[&Term], by_element: Option<&mut Vec<f64>>) -> Result<f64, Error> {
         let mesh = &self.analysis.mesh;
         let solution = &self.analysis.solutions[self.index];
-        let own = || terms.iter().filter(|term| term.states.contains(&self.index));
+        let is_own = |term: &&&Term| term.states.contains(&self.index) && term.functional.is_of_field();
+        let own = || terms.iter().filter(is_own);
         if own().next().is_none() {
             return Ok(0.0);
         }

@@ -5,7 +5,7 @@
 //! `observation` holds what is a function of B in cells, `homogeneity` its deviation from its own mean,
 //! `integral` the integrals of densities over regions that may move, `force` the virtual work around a body, `terminal` what is a
 //! function of current and flux linkage of a coil, `inductance` what is one of the inductances, `multipole` what is one of terms of
-//! an expansion, `deviation` where the field misses what a quality asks for. Weighted sums, bounds and several frequencies are the optimiser's business.
+//! an expansion, `deviation` where the field misses what a quality asks for, `volume` what is a function of the shape alone. Weighted sums, bounds and several frequencies are the optimiser's business.
 
 mod deviation;
 mod force;
@@ -15,6 +15,7 @@ mod integral;
 mod multipole;
 mod observation;
 mod terminal;
+mod volume;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
@@ -31,8 +32,9 @@ pub use integral::Integral;
 pub use multipole::{MirrorPlane, MultipoleFunctional, Multipoles, OfTerms};
 pub use observation::{Follow, Observation, Observed, Weighting};
 pub use terminal::{AtTerminals, TerminalFunctional};
+pub use volume::Volume;
 
-/// A real quantity of one field solution.
+/// A real quantity of one field solution, or of the shape that it is on.
 #[derive(Clone, Debug)]
 pub enum Functional {
     /// A function of B in cells.
@@ -47,6 +49,8 @@ pub enum Functional {
     Inductance(InductanceFunctional),
     /// A function of terms of an expansion of B.
     Multipole(Box<MultipoleFunctional>),
+    /// A volume or mass: of the shape, whatever the field.
+    Volume(Volume),
 }
 
 /// Value of a functional, and what its gradient needs.
@@ -132,6 +136,11 @@ impl Functional {
         Ok(Self::Multipole(Box::new(MultipoleFunctional::new(multipoles, of)?)))
     }
 
+    /// Whether the field has a say in it.
+    pub fn is_of_field(&self) -> bool {
+        !matches!(self, Self::Volume(_))
+    }
+
     /// Places of the windings whose responses to 1 A the state must have ([`FieldModel::respond`]).
     pub fn windings(&self) -> &[usize] {
         match self {
@@ -206,6 +215,7 @@ impl Functional {
             Self::Terminal(terminal) => terminal.evaluate(model, mesh, solution),
             Self::Inductance(inductance) => inductance.evaluate(model, solution)?,
             Self::Multipole(multipole) => multipole.evaluate(model, mesh, solution)?,
+            Self::Volume(volume) => volume.evaluate(mesh),
         };
         if !result.value.is_finite() {
             return Err(SolverError::NotFinite { what: "objective", value: result.value });

@@ -15,7 +15,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
 use crate::circuit::{Border, SolidRows, Solids, Windings};
-use crate::coil::Coil;
+use crate::coil::{Coil, RegionCurrent};
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
@@ -233,6 +233,14 @@ impl FieldModel {
     /// Elements that a coil meets, with its window.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.all_sources().flat_map(Sources::coil_elements)
+    }
+
+    /// The coil whose region an element is in, whatever its current. An analytic coil has no faces in the mesh.
+    pub(crate) fn coil_at(&self, element: ElementId) -> Option<usize> {
+        self.coils().iter().position(|coil| {
+            let current = coil.shape.region_current().map(RegionCurrent::current_density);
+            current.is_some_and(|current| current.binary_search_by_key(&element, |(e, _)| *e).is_ok())
+        })
     }
 
     /// An element with a node that `moves` although a coil does not allow it: a winding is fixed in space, and in its window all

@@ -5,7 +5,8 @@
 //! regular, and it stays so beside a
 //! symmetry plane or a material's face, where all elements lie on one side and a mean of their `B` would not
 //! (polynomial-preserving recovery; Zhang and Naga, SIAM J. Sci. Comput. 26 (2005) 1192). Across a material boundary
-//! the true field jumps, so only elements of the probed element's material take part.
+//! the true field jumps, and at the face of a winding its slope does, so only elements of the probed element's material and coil
+//! take part.
 //!
 //! A recovered value is linear in the field: [`RecoveredPoint`] holds its weights, for values and for derivatives.
 //!
@@ -133,14 +134,14 @@ impl RecoveredPoint {
     }
 }
 
-/// Whether elements have the material of one: a magnet's face is one even where its permeability is that of air, and that of open
-/// space is one of the map.
+/// Whether elements have the material of one and are of the same coil: a magnet's face is one even where its permeability is that of
+/// air, that of open space is one of the map, and at that of a winding the slope of `B` jumps.
 fn has_the_material_of(model: &FieldModel, element: ElementId) -> impl Fn(ElementId) -> bool {
     let topology = model.topology();
     let material = move |e: ElementId| {
         let linear = model.materials()[topology.region_of()[e.index()].index()];
         let is_open = model.form().stretch_of(e).is_some();
-        (linear, model.remanence_of(e), model.curve_of(e), is_open)
+        (linear, model.remanence_of(e), model.curve_of(e), is_open, model.coil_at(e))
     };
     let own = material(element);
     move |e| material(e) == own

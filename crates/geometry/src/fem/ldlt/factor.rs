@@ -259,7 +259,7 @@ impl<T: PanelScalar> Factorisation<'_, T> {
         let (mut diagonal, below) = block.split_at_row_mut(width);
         let lost = |column: usize, pivot: T| {
             let unknown = self.analysis.order[panel.start + column];
-            self.failed(format!("the pivot of unknown {unknown} is {pivot:?}: the matrix is singular"))
+            self.failed(format!("the pivot of unknown {unknown} is {pivot}: the matrix is singular"))
         };
         let TileScratch { product, packing, .. } = &mut workspace.tile;
         dense::factor_diagonal(diagonal.rb_mut(), product, packing)

@@ -9,6 +9,7 @@ use super::lanes::Lanes;
 pub trait PanelScalar:
     ComplexField
     + Lanes
+    + std::fmt::Display
     + std::ops::Add<Output = Self>
     + std::ops::Sub<Output = Self>
     + std::ops::Mul<Output = Self>

@@ -1,4 +1,4 @@
-//! Volume of a region on the moved mesh, or its mass.
+//! Volume of a region on the moved mesh, or its mass: a function of the shape alone, which no field has a say in.
 //!
 //! Of a meshed region: the sum of its tetrahedra, `∂V_e/∂x_a = V_e ∇N_a`. Of a region that an impedance surface replaces
 //! only the exposed surface `S` is left. With a field `q` of `div q = 1` whose normal component vanishes on the outer
@@ -13,15 +13,14 @@
 
 use fluxmorph_geometry::tet4::{Point, Tet4, area_vector, centroid, cross, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
-use fluxmorph_remesh::{Moved, RemeshError};
 
-use super::GeometricError;
-use crate::problem::Shape;
+use super::FunctionalValue;
+use crate::error::SolverError;
 
 /// Largest component of a unit normal across its axis for a plane: coordinates in files carry 6 or more digits.
 const PLANE_TOLERANCE: f64 = 1e-6;
 
-/// Volume [m³] of a region as a function of the design, or its mass [kg].
+/// Volume [m³] of a region, or its mass [kg].
 #[derive(Clone, Debug)]
 pub struct Volume {
     extent: Extent,
@@ -47,24 +46,25 @@ impl Volume {
     /// `full_mesh` has the region and the coordinates of `reference`.
     ///
     /// # Errors
-    /// [`GeometricError::Mesh`] for an unknown name, [`GeometricError::NoElements`], [`GeometricError::Boxed`].
+    /// [`SolverError::Mesh`] for an unknown name, [`SolverError::EmptyRegion`], [`SolverError::Boxed`].
     pub fn new(
         reference: &Mesh,
         full_mesh: &Mesh,
         region_name: &str,
         impedance_surface: Option<&[[NodeId; 3]]>,
-    ) -> Result<Self, GeometricError> {
+    ) -> Result<Self, SolverError> {
         let mesh = if impedance_surface.is_some() { full_mesh } else { reference };
         let region = mesh.topology().region(region_name)?;
         let elements = mesh.topology().elements_of(region);
         if elements.is_empty() {
-            return Err(GeometricError::NoElements { region: region_name.to_owned() });
+            let expected = "name a region that is meshed, whose volume is defined";
+            return Err(SolverError::EmptyRegion { region: region_name.to_owned(), expected });
         }
         let extent = match impedance_surface {
             None => Extent::Meshed(elements),
             Some(triangles) => {
                 let flux = FluxField::new(full_mesh, region)
-                    .ok_or_else(|| GeometricError::Boxed { region: region_name.to_owned() })?;
+                    .ok_or_else(|| SolverError::Boxed { region: region_name.to_owned() })?;
                 let triangles = triangles.to_vec();
                 let volume: f64 = elements.iter().map(|&e| tet4::volume(full_mesh.vertices(e))).sum();
                 Extent::Exposed { constant: volume + flux.through(reference, &triangles), triangles, flux }
@@ -87,17 +87,13 @@ impl Volume {
         self.factor * volume
     }
 
-    /// Value on a moved mesh and its derivative with respect to every design variable [m², or kg/m].
-    ///
-    /// # Errors
-    /// [`RemeshError::NotConverged`].
-    pub fn evaluate(&self, moved: &Moved, shape: &Shape) -> Result<(f64, Vec<f64>), RemeshError> {
-        let nodal = self.node_derivative(&moved.mesh);
-        Ok((self.value(&moved.mesh), shape.surface().gradient(&moved.pull_back(&nodal)?)))
+    pub(super) fn evaluate(&self, mesh: &Mesh) -> FunctionalValue {
+        let explicit = Some(self.node_derivative(mesh));
+        FunctionalValue { value: self.value(mesh), explicit, ..FunctionalValue::default() }
     }
 
-    /// Derivative with respect to every node's position, shape `(n_nodes, 3)`.
-    fn node_derivative(&self, mesh: &Mesh) -> Vec<Point> {
+    /// Derivative with respect to every node's position [m², or kg/m], shape `(n_nodes, 3)`.
+    pub fn node_derivative(&self, mesh: &Mesh) -> Vec<Point> {
         let mut nodal = vec![[0.0; 3]; mesh.points().len()];
         let mut add = |node: NodeId, g: Point, factor: f64| {
             for (sum, g) in nodal[node.index()].iter_mut().zip(g) {
