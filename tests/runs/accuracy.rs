@@ -56,6 +56,27 @@ fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
     assert!((value + error - coarse - estimated).abs() < estimated.abs(), "{value} {coarse}");
 }
 
+/// A mass has no error of the field, its constraint has: what the fresh mesh divides is what that observes.
+#[test]
+fn the_field_of_a_lightest_device_is_what_is_checked() {
+    let home = folder();
+    let out = home.path().join("out");
+    let said = finish(&mut shipped("shield_least_mass", &[]).command("run", &out)).completed().stderr;
+    assert!(
+        said.contains("(estimated), satisfied") && !said.contains("gain  ") && !said.contains("error bar"),
+        "{said}"
+    );
+    let result = read_json(&out.join("result.json"));
+    assert!(result.get("accuracy").is_none(), "{}", result["accuracy"]);
+    assert!(result["constraints"][0]["error_estimate"].is_number());
+    let [found, limited] = ["shield_least_mass", "shield_mass_limit"].map(|name| {
+        let out = home.path().join(name);
+        finish(&mut shipped(name, &["--max-evaluations", "2"]).command("run", &out));
+        read_json(&out.join("result.json"))["objective"]["verification"].clone()
+    });
+    assert_eq!((&found["mesh"], &found["tets"]), (&"fresh".into(), &limited["tets"]));
+}
+
 #[test]
 fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let home = folder();
@@ -69,6 +90,7 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
     let result = read_json(&out.join("result.json"));
     assert!(count(&result, "/objective/verification/tets") > 3 * count(&result, "/mesh/tets") / 2);
     assert!(result["accuracy"]["verdict"].is_string());
+    assert_eq!(result["objective"]["verification"]["mesh"], "cut");
     // A constraint on the field has an error bar, and is measured on the finer elements with a bound from there.
     let [coarse, finer] = ["/constraints/0", "/objective/verification/constraints/0"].map(|key| {
         let own = result.pointer(key).unwrap_or_else(|| panic!("{key} in {result}"));

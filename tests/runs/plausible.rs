@@ -172,7 +172,9 @@ fn a_current_along_a_wall_that_mirrors_it_reversed_is_asked_about() {
 fn the_resolved_configuration_of_a_run_is_not_warned_of() {
     let home = folder();
     let out = home.path().join("out");
-    let out_text = out.to_str().expect("UTF-8");
+    // A path that leads upwards is not in it.
+    let upwards = home.path().join("out/../out");
+    let out_text = upwards.to_str().expect("UTF-8");
     finish(command(&[&"solve", &quick()]).args(["--out", out_text])).exits_with(0);
     let checked = |more: &[&str]| {
         let mut checked = command(&[&"check", &out.join("resolved.toml"), &"--json"]);
@@ -211,11 +213,28 @@ fn surfaces_that_move_otherwise_than_they_are_said_to_are_asked_about() {
         found.contains("nodes of `plate_bottom` in remesh.fixed belong to the design and move with it"),
         "{found}"
     );
+    // Of the side the design has the lower edge, which its rim may hold.
+    let side = ["remesh.slide=[\"x_min\", \"y_min\"]", "remesh.fixed=[\"plate_side\"]"];
+    assert!(check(&side).contains("nodes of `plate_side` in remesh.fixed"));
+    assert!(!check(&[&side[..], &["design.rim=fixed"]].concat()).contains("in remesh.fixed"));
     let said = "`remesh|air` in remesh.free is a face of `air` beyond what moves: its elements there are dragged along";
     assert!(check(&["remesh.free=[\"remesh|air\"]"]).contains(said));
     // The other side of the plate moves too.
     let free = [&MESHED[..], &["remesh.free=[\"plate_top\"]"]].concat();
     assert!(!check(&free).contains("dragged along"));
+}
+
+/// What is as light as it can be is at its bounds, unless the field has to do something.
+#[test]
+fn the_lightest_device_of_all_is_asked_about() {
+    let said = "no constraint is on the field: no field has a say in the optimum";
+    let least = repository("configs/shield_least_mass.toml");
+    let warnings = |overrides: &[&str]| {
+        let mut checked = command(&[&"check", &least, &"--json"]);
+        texts(&finish(checked.args(set(overrides))).exits_with(0).json()["warnings"])
+    };
+    assert!(!warnings(&[]).contains(said));
+    assert!(warnings(&["constraints=[]"]).contains(said));
 }
 
 #[test]

@@ -9,6 +9,7 @@ use fluxmorph_optimizer::problem::Problem;
 
 use super::mesh::named_interfaces;
 use super::open;
+use super::references::functionals;
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 
@@ -65,12 +66,12 @@ impl DividedMesh {
     }
 }
 
-/// The box around everything that moves and everything that the objective is taken over.
+/// The box around everything that moves and everything that objective and constraints take of the field.
 fn device(config: &Config, problem: &Problem) -> Option<[Point; 2]> {
     let topology = problem.original().topology();
     let mut elements = problem.moving_elements().to_vec();
-    let terms = config.objective.iter().flat_map(|objective| objective.terms());
-    for region in terms.filter_map(|term| term.functional.region.as_deref()) {
+    let measured = functionals(config).into_iter().filter(|(_, own)| own.kind.is_of_field());
+    for region in measured.filter_map(|(_, own)| own.region.as_deref()) {
         elements.extend(topology.region(region).map(|id| topology.elements_of(id)).unwrap_or_default());
     }
     let corners = elements.iter().flat_map(|&e| problem.original().vertices(e));

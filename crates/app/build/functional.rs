@@ -41,7 +41,7 @@ pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -
     faults.extend(coil_faults(config, source));
     faults.extend(super::multipole::faults(config, source));
     faults.extend(mass_faults(config, source, topology));
-    let is_of_a_region = |f: &config::Functional| f.kind.is_of_a_region() && f.kind.is_of_the_field();
+    let is_of_a_region = |f: &config::Functional| f.kind.is_of_a_region() && f.kind.is_of_field();
     for (path, functional) in functionals(config).into_iter().filter(|(_, f)| is_of_a_region(f)) {
         let Some(region) = functional.region.as_deref().filter(known) else { continue };
         let model = config.regions.get(region).map(|entry| entry.model);
@@ -73,9 +73,11 @@ fn mass_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<
         if density(config, region).is_some() {
             return None;
         }
-        let message = format!("the mass of `{region}` is asked for, but its material has no density");
+        let entry = config.regions.get(region);
+        let what = if entry.is_some() { "its material has no density" } else { "it has no material" };
+        let message = format!("the mass of `{region}` is asked for, but {what}");
         let fault = source.diagnostic(&format!("{path}.kind"), message);
-        Some(match config.regions.get(region) {
+        Some(match entry {
             Some(entry) => fault.help(format!(
                 "add a line like: density = \"7850 kg/m3\" to [materials.{}], or take the volume",
                 entry.material
@@ -197,7 +199,7 @@ fn term(
 ) -> Result<Term, Error> {
     let cases = config.load_cases();
     let mut taken: Vec<usize> = (0..states.len()).filter(|&k| functional.is_taken_under(&cases[k])).collect();
-    if !functional.kind.is_of_the_field() {
+    if !functional.kind.is_of_field() {
         // All have the same.
         taken.truncate(1);
     }
@@ -379,8 +381,7 @@ pub(super) fn constraints(
             constraints.push(Constraint { name, quantity, limit });
         };
         match &written.limit {
-            Written::Functional { functional, .. }
-                if !functional.kind.is_of_the_field() && shape.is_none() => {}
+            Written::Functional { functional, .. } if !functional.kind.is_of_field() && shape.is_none() => {}
             Written::Functional { functional, bound } => {
                 let term = term(config, functional, meshes, states)?;
                 let quantity = match term.functional {
@@ -420,28 +421,41 @@ pub(super) fn constraints(
     Ok(constraints)
 }
 
-/// Volumes and masses of meshed regions of which no element has a node that may move.
+/// Volumes and masses of regions of which no node may move; of the objective where it has nothing else.
 pub(super) fn bodies_at_rest(
     config: &Config,
     source: &SourceMap,
     mesh: &Mesh,
-    shape: &Shape,
+    (shape, model): (&Shape, &FieldModel),
 ) -> Vec<Diagnostic> {
     let topology = mesh.topology();
-    let bodies = functionals(config).into_iter().filter(|(_, own)| !own.kind.is_of_the_field());
+    let map = shape.motion().map();
+    let moves =
+        |n: NodeId| shape.surface().nodes().binary_search(&n).is_ok() || (0..3).any(|d| map.is_unknown(n, d));
+    let bodies = functionals(config).into_iter().filter(|(_, own)| !own.kind.is_of_field());
     let at_rest = |(path, own): (String, &config::Functional)| {
         let name = own.region.as_deref()?;
-        let region = topology.region(name).ok()?;
-        let is_of_it = |e: &ElementId| topology.region_of()[e.index()] == region;
-        // One that is replaced by its surface has no elements here.
-        if !topology.elements().any(|e| is_of_it(&e)) || shape.motion().moving().iter().any(is_of_it) {
+        // One that is replaced by its surface has that alone here.
+        let is_moved = match model.conductors().iter().find(|conductor| conductor.name == name) {
+            Some(conductor) => conductor.surface.iter().flatten().any(|&n| moves(n)),
+            None => {
+                let region = topology.region(name).ok()?;
+                let elements = topology.elements_of(region);
+                elements.iter().flat_map(|&e| topology.tet(e)).any(moves)
+            }
+        };
+        if is_moved {
             return None;
         }
         let message = format!("nothing of `{name}` moves with the design: its {} stays", own.kind.name());
         let fault = source.diagnostic(&format!("{path}.region"), message);
         Some(fault.expected("a region that the design changes"))
     };
-    bodies.filter_map(at_rest).collect()
+    let faults: Vec<Diagnostic> = bodies.filter_map(at_rest).collect();
+    let of_objective = |fault: &Diagnostic| fault.path.starts_with("objective");
+    let terms = config.objective.as_ref().map_or(0, |objective| objective.terms().len());
+    let is_constant = faults.iter().filter(|fault| of_objective(fault)).count() == terms;
+    faults.into_iter().filter(|fault| is_constant || !of_objective(fault)).collect()
 }
 
 fn limit(bound: ValueBound) -> Limit {

@@ -221,7 +221,7 @@ fn problem_on(
             progress.stage(Stage::Elasticity);
             let observed = functional::fixed_elements(config, [&full_mesh, &mesh], &states)?;
             let shape = shape::shape(inputs, config, body, &states, &observed)?;
-            source.check(functional::bodies_at_rest(config, source, &mesh, &shape))?;
+            source.check(functional::bodies_at_rest(config, source, &mesh, (&shape, &states[0])))?;
             if group.is_none() {
                 check_initial_design(source, &shape)?;
             }
@@ -235,7 +235,7 @@ fn problem_on(
         warnings
             .push("[[constraints]] on a body have no meaning without [design]: they are left out".to_owned());
     }
-    let is_of_shape = |own: &Objective| !own.is_of_the_field();
+    let is_of_shape = |own: &Objective| !own.is_of_field();
     if config.objective.as_ref().is_some_and(is_of_shape)
         && constraints.iter().all(|own| !own.quantity.is_of_field())
     {

@@ -1,7 +1,7 @@
 //! Where a configuration names surfaces, regions and functionals: each name with the key path at which it stands. Whether
 //! the mesh has them is `names`' business.
 
-use crate::config::{self, CoilPath, CoilShape, Config, Limit as Written, Target};
+use crate::config::{self, CoilPath, CoilShape, Config, Target};
 
 /// Every surface that the configuration names, with the path of its key.
 pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
@@ -53,10 +53,10 @@ pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
         let terms = objective.terms().iter().enumerate();
         terms.map(|(k, term)| (objective.path(k), &term.functional))
     });
-    let constraints = config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
-        let Written::Functional { functional, .. } = &constraint.limit else { return None };
-        Some((format!("constraints[{k}]"), functional))
-    });
+    let constraints =
+        config.constraints.iter().enumerate().filter_map(|(k, constraint)| {
+            Some((format!("constraints[{k}]"), constraint.limit.functional()?))
+        });
     terms.chain(constraints).collect()
 }
 

@@ -75,7 +75,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
-    warnings.extend(held_warning(inputs.remesh, mesh, surface.nodes()));
+    warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
@@ -92,7 +92,12 @@ fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId])
     let is_part = |f: &&Facet| f.nodes.iter().all(|n| nodes.binary_search(n).is_ok());
     let facets: Vec<&Facet> = topology.facets().iter().filter(is_part).collect();
     let surface = design.surface.join("`, `");
-    if !facets.is_empty() && facets.iter().all(|f| f.outside.is_none()) {
+    if facets.is_empty() {
+        return Some(format!(
+            "the design surface `{surface}` lies inside a region: both of its sides are alike to the field, and moving it changes none"
+        ));
+    }
+    if facets.iter().all(|f| f.outside.is_none()) {
         return Some(format!(
             "the design surface `{surface}` is at the outside of the mesh: it is the wall of the model that moves, with its condition"
         ));
@@ -113,7 +118,7 @@ fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId])
         )
     };
     let is_alike = |f: &&Facet| f.outside.is_some_and(|other| matter(f.inside) == matter(other));
-    (!facets.is_empty() && facets.iter().all(is_alike)).then(|| {
+    facets.iter().all(is_alike).then(|| {
         format!(
             "both sides of the design surface `{surface}` are alike to the field: moving it changes none; check [regions] and the \
              relative_permeability of [materials]"
@@ -122,11 +127,15 @@ fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId])
 }
 
 /// Nodes of the design on surfaces that are said to stay.
-fn held_warning(remesh: &Remesh, mesh: &Mesh, nodes: &[NodeId]) -> Vec<String> {
+fn held_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
+    let moves = |node: &NodeId| {
+        let row = surface.nodes().binary_search(node).ok();
+        row.is_some_and(|row| surface.directions()[row] != [0.0; 3] && !surface.rows()[row].is_empty())
+    };
     let of = |name: &String| {
         let faces = mesh.topology().surface(name).ok()?;
         let own: BTreeSet<NodeId> = faces.iter().flatten().copied().collect();
-        let shared = own.iter().filter(|n| nodes.binary_search(n).is_ok()).count();
+        let shared = own.iter().filter(|n| moves(n)).count();
         (shared > 0).then(|| {
             format!(
                 "{shared} nodes of `{name}` in remesh.fixed belong to the design and move with it; design.rim = \"fixed\" holds the \

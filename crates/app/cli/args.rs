@@ -2,7 +2,7 @@
 
 mod sweep;
 
-use std::path::{Component, Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -10,7 +10,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use super::template::Template;
 use super::{examples, exit};
 use crate::build::{memory_limit, steels, with_names};
-use crate::config::{Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, Steel, parse_quantity};
+use crate::config::{
+    Config, Dimension, MOST_EVALUATIONS, OutputNamedBy, SourceMap, Steel, parse_quantity,
+    without_upward_steps,
+};
 use crate::error::Error;
 use crate::files::OverwritePolicy;
 
@@ -327,8 +330,7 @@ impl CommonArgs {
             memory_limit::check_mesh(&config, &source)?;
         }
         if let Some(out) = &self.out {
-            config.output.directory =
-                without_upward_steps(&std::path::absolute(out).unwrap_or_else(|_| out.clone()));
+            config.output.directory = without_upward_steps(out);
         }
         Ok((config, source))
     }
@@ -337,20 +339,6 @@ impl CommonArgs {
     pub fn overwrite_policy(&self) -> OverwritePolicy {
         self.work.overwrite_policy()
     }
-}
-
-/// An absolute path without `..`, which a configuration that is written there may not name; links before one are followed.
-fn without_upward_steps(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for component in path.components() {
-        if component == Component::ParentDir {
-            plain = plain.canonicalize().unwrap_or(plain);
-            plain.pop();
-        } else {
-            plain.push(component);
-        }
-    }
-    plain
 }
 
 impl WorkArgs {

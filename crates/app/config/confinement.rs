@@ -71,6 +71,21 @@ impl SourceMap {
     }
 }
 
+/// A path from the root without `..`, which a configuration that is written there may not name; links before one are followed.
+pub fn without_upward_steps(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let mut plain = PathBuf::new();
+    for component in path.components() {
+        if component == Component::ParentDir {
+            plain = plain.canonicalize().unwrap_or(plain);
+            plain.pop();
+        } else {
+            plain.push(component);
+        }
+    }
+    plain
+}
+
 /// What an escape is, and what to do.
 fn explained(key: &str, escape: &Escape) -> (String, String) {
     let why = match escape {

@@ -20,7 +20,7 @@ mod tables;
 mod text;
 mod value;
 
-pub use confinement::OutputNamedBy;
+pub use confinement::{OutputNamedBy, without_upward_steps};
 pub use error::{ConfigError, DiagnosticReport, Subject};
 pub use load::resolved_toml;
 pub use required::{Morphing, Optimisation};

@@ -79,7 +79,9 @@ impl Session<'_> {
     ) -> Option<[ErrorEstimate; 2]> {
         let is_wanted =
             self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
-        if self.is_cut_short(stop_reason) || !is_wanted {
+        let is_of_field = self.has_field_objective()
+            || self.setup.problem.constraints().iter().any(|own| own.quantity.is_of_field());
+        if self.is_cut_short(stop_reason) || !is_wanted || !is_of_field {
             return None;
         }
         let (best, mut estimator) = (&best.analysis, self.estimator());
@@ -105,7 +107,8 @@ impl Session<'_> {
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
         let shape = self.cut_shape(objective, meshes);
-        let is_said = errors.is_some() || shape.is_some();
+        let is_cut = |found: &Verification| found.mesh == VerificationMesh::Cut;
+        let is_said = errors.is_some() || objective.verification.as_ref().is_some_and(is_cut);
         let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
         let mut accuracy = Accuracy { facets, ..Accuracy::default() };
         if !self.has_field_objective() {
@@ -137,6 +140,19 @@ impl Session<'_> {
             _ if is_checked => self.by_other_elements(objective, meshes, observer),
             _ => None,
         };
+        self.judge(&mut accuracy, (objective, corrected), keeps_all, observer);
+        (accuracy != Accuracy::default()).then_some(accuracy)
+    }
+
+    /// Judges the gain of a run by the other values that are known of its objective, of which `corrected` are those without the
+    /// estimated errors.
+    fn judge(
+        &self,
+        accuracy: &mut Accuracy,
+        (objective, corrected): (&ObjectiveResult, Option<[f64; 2]>),
+        keeps_all: bool,
+        observer: &mut dyn Observer,
+    ) {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.values);
         let verified = objective.verification.as_ref().map(|found| [found.initial, found.best]);
         let others: Vec<[f64; 2]> = [verified, corrected, cross_check].into_iter().flatten().collect();
@@ -147,7 +163,7 @@ impl Session<'_> {
             accuracy.judge([objective.initial, objective.best], &others);
         }
         if accuracy.verdict == Some(Verdict::NotConfirmed) {
-            let cure = match analysis.order {
+            let cure = match self.config.analysis.order {
                 ElementOrder::Linear => "refine the mesh, or take analysis.order = 2",
                 ElementOrder::Quadratic => "refine the mesh",
             };
@@ -156,7 +172,6 @@ impl Session<'_> {
                  without the estimated errors; {cure}"
             ));
         }
-        (accuracy != Accuracy::default()).then_some(accuracy)
     }
 
     /// The ratio by elements that the estimate knows nothing of; where there is none the reason is reported.
@@ -183,7 +198,7 @@ impl Session<'_> {
 
     /// Whether the objective has errors of the field; those of a volume or mass are its constraints'.
     pub(super) fn has_field_objective(&self) -> bool {
-        self.config.objective.as_ref().is_some_and(Objective::is_of_the_field)
+        self.config.objective.as_ref().is_some_and(Objective::is_of_field)
     }
 
     /// The best shape, where a control grid gives it between the nodes too and the check kept its facets: a mesh that is generated anew

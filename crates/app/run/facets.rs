@@ -58,18 +58,20 @@ pub(super) fn curved_facets(mesh: &Mesh) -> Option<CurvedFacets> {
         let sum = own.fold([0.0; 3], |sum: Point, f| std::array::from_fn(|d| sum[d] + f.area[d]));
         sum.map(|c| c / norm(sum))
     };
-    let mut worst: Option<(f64, [NodeId; 2], &Face)> = None;
+    // The outside counts where nothing inside is curved.
+    let mut worst: Option<((bool, f64), [NodeId; 2], &Face)> = None;
     for face in &faces {
         let normals = face.nodes.map(|n| normal(n, face));
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
             let along = sub(mesh.point(face.nodes[b]), mesh.point(face.nodes[a]));
             let off = dot(sub(normals[b], normals[a]), along).abs() / 8.0;
-            if off > FLAT * norm(along) && worst.is_none_or(|(most, ..)| off > most) {
-                worst = Some((off, [face.nodes[a], face.nodes[b]], face));
+            let rank = (face.between.1.is_some(), off);
+            if off > FLAT * norm(along) && worst.is_none_or(|(most, ..)| rank > most) {
+                worst = Some((rank, [face.nodes[a], face.nodes[b]], face));
             }
         }
     }
-    worst.map(|(off_m, ends, face)| {
+    worst.map(|((_, off_m), ends, face)| {
         let name = |region: usize| topology.region_names()[region].as_str();
         let (own, other) = face.between;
         let [a, b] = ends.map(|n| mesh.point(n));
@@ -106,10 +108,11 @@ mod tests {
         let parameters = SphereParameters { radius: 0.05, divisions: 6, ..SphereParameters::default() };
         let mesh = sphere(&parameters).expect("a ball");
         let found = curved_facets(&mesh).expect("it is curved");
-        // The outer sphere is the larger one.
-        assert_eq!(found.surface, "air|outside");
-        let radius = parameters.outer_radius;
-        let surface = mesh.topology().surface("outer").expect("the outer sphere");
+        // The outer sphere is the larger one, and only the outside.
+        assert_eq!(found.surface, "sphere|air");
+        let radius = parameters.radius;
+        let [ball, air] = ["sphere", "air"].map(|name| mesh.topology().region(name).expect("it has both"));
+        let surface = mesh.topology().interface(ball, air);
         let edges = surface.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
         let middle = |(a, b)| radius - norm(centroid([mesh.point(a), mesh.point(b)]));
         let height = edges.map(middle).fold(0.0, f64::max);

@@ -14,7 +14,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, S
 use fluxmorph_remesh::{Moved, StepToInversion};
 
 use crate::build::{Mode, Setup, memory_limit, remaining_nodes, set_up_on, with_cells_written_down};
-use crate::config::{Config, Limit, SourceMap};
+use crate::config::{Config, Functional, SourceMap};
 use crate::error::Error;
 
 /// A mesh that was cut, with the configuration of the field alone.
@@ -171,7 +171,8 @@ pub(super) fn both<S>(
 /// A configuration without what moves, and without constraints on that.
 fn field_alone(config: &Config) -> Config {
     let mut alone = Config { design: None, remesh: None, morph: None, ..config.clone() };
-    alone.constraints.retain(|constraint| matches!(&constraint.limit, Limit::Functional { functional, .. } if functional.kind.is_of_the_field()));
+    let is_of_field = |own: &Functional| own.kind.is_of_field();
+    alone.constraints.retain(|constraint| constraint.limit.functional().is_some_and(is_of_field));
     looked_at_once(alone)
 }
 

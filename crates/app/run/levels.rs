@@ -235,6 +235,10 @@ impl Session<'_> {
         let in_full = remaining_elements(self.config, full);
         let marked: Vec<ElementId> =
             estimate.marked(1.0 - levels.tolerance / bar).into_iter().map(|e| in_full[e.index()]).collect();
+        if marked.is_empty() {
+            observer.warning(&format!("{said}, and no element has a share in it: the tolerance is not kept"));
+            return Ok(false);
+        }
         let tets = full.tets().len();
         match self.refined(&levels.mesh, &marked) {
             Ok((mesh, setup)) => {

@@ -230,7 +230,9 @@ impl Session<'_> {
         if let Some([at_initial, at_best]) = &errors {
             let of_run = (&self.setup.problem, &optimised.bounds[..]);
             enter_errors(&mut result.constraints, of_run, (Some(at_initial), at_best), observer);
-            recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
+            if at_best.by_element.iter().any(|error| *error != 0.0) {
+                recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
+            }
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;

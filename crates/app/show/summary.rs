@@ -19,6 +19,8 @@ pub(super) struct Named {
     name: String,
     /// Behind a value, with a blank before it; empty where terms of several units are added.
     unit: String,
+    /// Whether no field has a say in it, and no other mesh an opinion.
+    is_of_shape: bool,
     /// What is limited.
     constraints: Vec<Constraint>,
 }
@@ -42,7 +44,12 @@ impl Named {
         };
         let name = printable(&name).into_owned();
         let unit = objective.si_unit().filter(|unit| *unit != "1");
-        Self { name, unit: unit.map_or_else(String::new, |unit| format!(" {unit}")), constraints: Vec::new() }
+        Self {
+            name,
+            unit: unit.map_or_else(String::new, |unit| format!(" {unit}")),
+            is_of_shape: !objective.is_of_field(),
+            constraints: Vec::new(),
+        }
     }
 
     fn limit_of(&self, constraint: &str) -> Option<&Limit> {
@@ -156,7 +163,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
     rows.extend(homogeneity(objective));
-    if let Some(found) = &objective.verification {
+    if let Some(found) = objective.verification.as_ref().filter(|_| !named.is_of_shape) {
         let name = match found.mesh {
             VerificationMesh::Fresh => "F/F0 on a fresh mesh",
             VerificationMesh::Cut => "F/F0 on cut elements",
@@ -255,21 +262,19 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
 
 fn constraint_row(constraint: &ConstraintResult, named: &Named, styles: &Styles) -> Row {
     let ConstraintResult { name, value, bound, satisfied, error_estimate } = constraint;
-    let bar = error_estimate.map(|error| format!(" ± {:.1e}", SAFETY * error.abs()));
+    let unit = named.unit_of(name);
+    let bar = error_estimate.map(|error| format!(" ± {:.1e}{unit} (estimated)", SAFETY * error.abs()));
     // The errors of a value and of a bound that is a share of the initial one cancel in part.
     let [of_value, of_both] = match bar {
         None => [String::new(), String::new()],
-        Some(bar) if named.has_shared_bound(name) => {
-            [String::new(), format!(", difference{bar}{} (estimated)", named.unit_of(name))]
-        }
-        Some(bar) => [format!("{bar} (estimated)"), String::new()],
+        Some(bar) if named.has_shared_bound(name) => [String::new(), format!(", difference{bar}")],
+        Some(bar) => [bar, String::new()],
     };
     let verdict = if *satisfied { "satisfied".to_owned() } else { styled(styles.bad, "VIOLATED") };
-    let unit = named.unit_of(name);
     (
         "constraint",
         format!(
-            "{}: {value:.6e}{of_value}{unit}, bound {bound:.6e}{unit}{of_both}, {verdict}",
+            "{}: {value:.6e}{unit}{of_value}, bound {bound:.6e}{unit}{of_both}, {verdict}",
             printable(name)
         ),
     )

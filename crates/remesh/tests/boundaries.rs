@@ -1,5 +1,7 @@
 //! Who moves, slides and stays: on the shield in both models, and at the corners of the rules.
 
+use std::collections::BTreeSet;
+
 use crate::support::{self, Point, hollow_shield, meshed_shield, nodes_where, unit_cells, whole};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use fluxmorph_remesh::{
@@ -176,4 +178,10 @@ fn an_oblique_surface_cannot_slide_and_is_named() {
         s.boundaries = vec![Boundary::of_surface(mesh.topology(), "z_max", BoundaryKind::Slide).unwrap()];
     });
     assert!(matches!(&err, RemeshError::SlideNormal { surface, .. } if surface == "z_max"), "{err}");
+    // What the design prescribes need not slide.
+    let boundaries = vec![Boundary::of_surface(mesh.topology(), "z_max", BoundaryKind::Slide).unwrap()];
+    let nodes: BTreeSet<NodeId> = boundaries[0].triangles.iter().flatten().copied().collect();
+    let design_nodes = nodes.into_iter().collect();
+    let setup = RemeshSetup { subregions: whole(&mesh), boundaries, design_nodes, ..RemeshSetup::default() };
+    assert!(ElasticMap::new(&mesh, setup).is_ok());
 }

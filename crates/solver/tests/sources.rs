@@ -168,6 +168,7 @@ fn no_value_at_a_point_is_mixed_with_those_across_the_face_of_a_winding() {
     let at_face = 0.5 * VACUUM_PERMEABILITY * density * thickness;
     let points = [0.003, 0.017, 0.0199, 0.022, 0.027, 0.033, 0.041, 0.055].map(|x| [x, 0.018, 0.023]);
     for (family, order) in [
+        (ElementFamily::Nodal, Order::Linear),
         (ElementFamily::Nodal, Order::Quadratic),
         (ElementFamily::Edge, Order::Linear),
         (ElementFamily::Edge, Order::Quadratic),

@@ -45,3 +45,27 @@ fn both_terms_are_alike_where_the_worst_is_least() {
     let [least, most] = found.iter().fold([f64::INFINITY, 0.0], |[l, m], v| [v.min(l), v.max(m)]);
     assert!(most < 1.02 * least, "{found:?}");
 }
+
+/// A mass among the terms is one member, whatever the number of frequencies, and has no adjoint.
+#[test]
+fn a_term_of_the_shape_is_one_member_of_a_worst_case() {
+    let terms = r#"combine = "worst_case"
+[[objective.terms]]
+kind = "flux_density_squared"
+region = "observation"
+weight = 250
+[[objective.terms]]
+kind = "volume"
+region = "plate"
+weight = 2000
+"#;
+    let objective = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
+    let changes = [(objective, terms), ("frequency = \"60 Hz\"", "frequencies = [\"60 Hz\", \"200 Hz\"]")];
+    let problem = setup_of(&changed(&read_text(&quick()), &changes)).problem;
+    let start = analysed(&problem, &initial(&problem));
+    let members: Vec<f64> = start.members.iter().map(|member| member.value).collect();
+    assert_eq!(members.len(), 3, "one a frequency, and the volume");
+    // 120 x 240 x 10 mm.
+    assert!((members[2] - 2000.0 * 2.88e-4).abs() < 1e-12, "{members:?}");
+    assert_eq!(problem.objective().expect("an objective").terms[2].label.frequency, None);
+}

@@ -5,7 +5,7 @@ use fluxmorph_optimizer::problem::{Derivatives, SolverCache};
 use serde::Serialize;
 
 use crate::build::{Mode, set_up};
-use crate::config::{Accuracy, Config, SourceMap};
+use crate::config::{Accuracy, Config, Objective, SourceMap};
 use crate::error::Error;
 use crate::files::relative_bar;
 use crate::run::estimate::Estimator;
@@ -21,8 +21,20 @@ pub(super) struct EstimateSummary {
     pub(super) error_estimate: Option<f64>,
     /// Twice that, relative to the objective.
     pub(super) error_bar_relative: Option<f64>,
+    /// The constraints on the field.
+    pub(super) constraints: Vec<ConstraintError>,
     /// Why there is no estimate.
     pub(super) notices: Vec<String>,
+}
+
+/// A constraint on the field at the initial design.
+#[derive(Debug, Serialize)]
+pub(super) struct ConstraintError {
+    pub(super) name: String,
+    /// In SI.
+    pub(super) value: f64,
+    /// What the true value has more, as estimated.
+    pub(super) error_estimate: f64,
 }
 
 /// Keeps what is said, and passes the rest on.
@@ -64,8 +76,25 @@ pub(super) fn of_initial_design(
     if analysis.objective.is_none() {
         notices.push("there is no [objective] whose error could be estimated".to_owned());
     }
-    let error = estimated.map(|estimate| estimate.objective);
+    let is_of_field = config.objective.as_ref().is_some_and(Objective::is_of_field);
+    if analysis.objective.is_some() && !is_of_field {
+        notices.push("the objective is of the shape alone, and has no error of the field".to_owned());
+    }
+    let constraints = estimated.iter().flat_map(|estimate| &estimate.constraints);
+    let constraints = constraints.map(|&(k, error)| ConstraintError {
+        name: setup.problem.constraints()[k].name.clone(),
+        value: analysis.constraints[k].value,
+        error_estimate: error,
+    });
+    let constraints = constraints.collect();
+    let error = estimated.map(|estimate| estimate.objective).filter(|_| is_of_field);
     let error_bar_relative =
         analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
-    Ok(EstimateSummary { objective: analysis.objective, error_estimate: error, error_bar_relative, notices })
+    Ok(EstimateSummary {
+        objective: analysis.objective,
+        error_estimate: error,
+        error_bar_relative,
+        constraints,
+        notices,
+    })
 }

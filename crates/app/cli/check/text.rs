@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use super::estimate::EstimateSummary;
+use super::estimate::{ConstraintError, EstimateSummary};
 use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
 use crate::config::{
     CoilShape, Constraint, Corner, DesignDirection, Limit, Material, RegionModel, RemeshExtent, ValueBound,
     WrittenCurve,
 };
-use crate::files::shell_word;
+use crate::files::{SAFETY, shell_word};
 use crate::show::text_table::{Align, Table};
 
 /// Names stand in a column of this width: the longest is `design variables`.
@@ -25,7 +25,7 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
     row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
     row("output", summary.output_directory.clone());
     if let Some(found) = &summary.estimate {
-        estimate(found, summary.objective_unit, &mut row);
+        estimate(found, summary.objective_unit, summary.constraints, &mut row);
     }
     text += &region_table(summary).text();
     text += &material_table(summary).text();
@@ -49,7 +49,12 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
 }
 
 /// The objective of the initial design with its error bar, or why there is none.
-fn estimate(found: &EstimateSummary, unit: Option<&str>, row: &mut impl FnMut(&str, String)) {
+fn estimate(
+    found: &EstimateSummary,
+    unit: Option<&str>,
+    constraints: &[Constraint],
+    row: &mut impl FnMut(&str, String),
+) {
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     if let (Some(value), Some(error), Some(bar)) =
         (found.objective, found.error_estimate, found.error_bar_relative)
@@ -58,6 +63,18 @@ fn estimate(found: &EstimateSummary, unit: Option<&str>, row: &mut impl FnMut(&s
         row(
             "initial design",
             format!("F = {value:.6e}{unit} ± {bar:.2} %, estimated error {error:+.1e}{unit}"),
+        );
+    }
+    for ConstraintError { name, value, error_estimate } in &found.constraints {
+        let own = constraints.iter().find(|own| own.is_called(name));
+        let unit = own.map(|own| own.limit.si_unit()).filter(|unit| *unit != "1");
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let bar = SAFETY * error_estimate.abs();
+        row(
+            "initial design",
+            format!(
+                "{name} = {value:.6e}{unit} ± {bar:.1e}{unit}, estimated error {error_estimate:+.1e}{unit}"
+            ),
         );
     }
     found.notices.iter().for_each(|notice| row("initial design", notice.clone()));
@@ -198,11 +215,12 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 
 /// A constraint in words.
 fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
-    let unit = constraint.limit.si_unit();
+    let unit = Some(constraint.limit.si_unit()).filter(|unit| *unit != "1");
+    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     let value = |bound: &ValueBound| match bound {
-        ValueBound::AtMost(upper) => format!("at most {upper:e} {unit}"),
+        ValueBound::AtMost(upper) => format!("at most {upper:e}{unit}"),
         ValueBound::AtMostRatio(ratio) => format!("at most {ratio} times that of the initial design"),
-        ValueBound::AtLeast(lower) => format!("at least {lower:e} {unit}"),
+        ValueBound::AtLeast(lower) => format!("at least {lower:e}{unit}"),
         ValueBound::AtLeastRatio(ratio) => format!("at least {ratio} times that of the initial design"),
     };
     let bounds = match &constraint.limit {

@@ -167,7 +167,7 @@ impl Config {
     fn check_functionals(&self, root: &Section<'_>, is_known: bool) {
         let cases = if is_known { self.load_cases() } else { Vec::new() };
         if let Some(objective) = &self.objective {
-            if !objective.is_of_the_field()
+            if !objective.is_of_field()
                 && self.accuracy.tolerance.is_some()
                 && let Some(section) = root.inner("accuracy")
             {

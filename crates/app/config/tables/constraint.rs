@@ -241,13 +241,21 @@ impl Group for Limit {
             return Self::Thickness { kind: ThicknessKind::Thickness, minimum: None, maximum: None };
         };
         match kind {
-            Kind::Functional(kind) => Self::functional(kind, written, section),
+            Kind::Functional(kind) => Self::of_functional(kind, written, section),
             Kind::Thickness(_) => Self::thickness(&written, section),
         }
     }
 }
 
 impl Limit {
+    /// The functional that is limited; `None` for a thickness.
+    pub fn functional(&self) -> Option<&Functional> {
+        match self {
+            Self::Functional { functional, .. } => Some(functional),
+            Self::Thickness { .. } => None,
+        }
+    }
+
     /// Unit of what is limited in SI; `1` for a ratio.
     pub fn si_unit(&self) -> &'static str {
         match self {
@@ -256,7 +264,7 @@ impl Limit {
         }
     }
 
-    fn functional(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
+    fn of_functional(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {
         let ratios = written.ratios();
         let LimitKeys {
             region,

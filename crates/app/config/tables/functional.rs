@@ -305,7 +305,7 @@ impl ObjectiveKind {
     }
 
     /// Whether the field has a say in it.
-    pub fn is_of_the_field(self) -> bool {
+    pub fn is_of_field(self) -> bool {
         !matches!(self, Self::Volume | Self::Mass)
     }
 
@@ -324,7 +324,7 @@ impl Functional {
             DIRECTED.contains(&kind.name()) || is_homogeneity && self.compare == Some(Compared::Component);
         let takes_direction = is_component || is_homogeneity && self.compare.is_none();
         if !section.has("region") && kind != ObjectiveKind::Energy && kind.coils() == 0 {
-            let is_of_a_body = !kind.is_of_the_field() || kind == ObjectiveKind::Loss;
+            let is_of_a_body = !kind.is_of_field() || kind == ObjectiveKind::Loss;
             let example = if is_of_a_body { "region = \"plate\"" } else { "region = \"observation\"" };
             section.missing(&["region"], example);
         }
@@ -357,8 +357,8 @@ impl Functional {
             ("direction", is_component.then_some("direction = [0, 0, 1]"), takes_direction),
             ("compare", None, is_homogeneity),
             ("follow", None, OBSERVES.contains(&kind.name())),
-            ("frequency", None, kind.is_of_the_field()),
-            ("load", None, kind.is_of_the_field()),
+            ("frequency", None, kind.is_of_field()),
+            ("load", None, kind.is_of_field()),
         ] {
             match (section.has(key), example) {
                 (true, _) if !wanted => {

@@ -41,7 +41,7 @@ table! {
         knee: Option<KneeWord> = WORD;
         /// Electric conductivity [S/m]. A material conducts only when it is told to.
         conductivity: f64 = quantity(Conductivity, NOT_NEGATIVE) => 0.0;
-        /// Mass density [kg/m³]; needed where `[[constraints]]` limit a mass.
+        /// Mass density [kg/m³]; needed for a mass in `[objective]` or `[[constraints]]`.
         density: Option<f64> = quantity(MassDensity, POSITIVE);
     }
     unused = Material::anisotropic;

@@ -42,7 +42,7 @@ table! {
         /// Which way is better. Most objectives are errors, fields or losses.
         goal: Goal = WORD => Goal::Minimise;
         /// What the terms make together. In a worst case a term without `frequency` and `load` is one under each load, at each
-        /// frequency; with the algorithms `mma`,
+        /// frequency, but for volumes and masses; with the algorithms `mma`,
         /// `ccsaq` and `slsqp`.
         combine: Combination = WORD => Combination::Sum;
         /// What is combined.
@@ -165,8 +165,8 @@ impl Objective {
     }
 
     /// Whether the field has a say in it; a volume or mass alone is of the shape.
-    pub fn is_of_the_field(&self) -> bool {
-        self.terms().iter().any(|term| term.functional.kind.is_of_the_field())
+    pub fn is_of_field(&self) -> bool {
+        self.terms().iter().any(|term| term.functional.kind.is_of_field())
     }
 
     /// The unit of its value in SI, where all its terms have the same.

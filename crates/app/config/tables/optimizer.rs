@@ -25,8 +25,10 @@ table! {
     /// max_time = "2 h"
     /// ```
     pub struct Optimizer: Default {
-        /// Method of NLopt. The default keeps to the bounds, needs no line search and suits many variables. With
-        /// `[[constraints]]`: `mma`, `ccsaq` or `slsqp`.
+        /// Method of NLopt. The default keeps to the bounds, needs no line search and suits many variables of which most end at
+        /// their bounds. Where a deviation is made small that can nearly vanish (`target_field`, `homogeneity`, `multipole_content`)
+        /// and nothing is constrained, `lbfgs` finds a fraction of what the default does. With `[[constraints]]`: `mma`, `ccsaq` or
+        /// `slsqp`, of which the last is the one for such deviations.
         algorithm: Algorithm = WORD => Settings::DEFAULT.algorithm;
         /// Most evaluations of the objective with its gradient.
         max_evaluations: usize = integer(1, MOST_EVALUATIONS) => Settings::DEFAULT.max_evaluations;

@@ -106,7 +106,9 @@ pub(in crate::config) fn is_number_with_unit(text: &str) -> bool {
 fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let by_name =
         SPELLED_OUT.iter().filter(|(name, _)| text.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit);
-    let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text));
+    // A milli for a mega is none.
+    let by_case =
+        known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text) && unit.get(1..) != text.get(1..));
     by_case
         .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
         .or_else(|| nearest(text, known.iter().copied()).filter(|unit| !has_another_prefix(text, unit)))

@@ -131,8 +131,11 @@ fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
         (Some(ratio), Some(v)) => {
             let (parts, tets) = (trim_zeros(v.refinement, 3), group_digits(v.tets));
             let violated = v.constraints.iter().filter(|constraint| !constraint.satisfied).count();
-            let violated =
-                if violated == 0 { String::new() } else { format!(", {violated} constraints violated") };
+            let violated = match violated {
+                0 => String::new(),
+                1 => ", a constraint violated".to_owned(),
+                count => format!(", {count} constraints violated"),
+            };
             let remark = match v.mesh {
                 VerificationMesh::Fresh => {
                     format!("cells over the device in {parts} parts each way, {tets} tetrahedra{violated}")

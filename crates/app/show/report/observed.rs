@@ -1,16 +1,26 @@
-//! What the objective is taken over: its regions, their elements, and the mean field in them.
+//! What the objective takes of the field, or the constraints where it takes nothing: its regions, their elements, and the mean field
+//! in them.
 
 use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::tet4::volume;
 
 use super::data::{RunData, Snapshot};
 use crate::build::Outline;
+use crate::config::Functional;
 
-/// Names of the regions of the objective, each once.
+/// Names of these regions, each once.
 pub(super) fn region_names(data: &RunData) -> Vec<&str> {
     let terms = data.config.objective.iter().flat_map(|objective| objective.terms());
+    let of_objective = unique(terms.map(|term| &term.functional));
+    if !of_objective.is_empty() {
+        return of_objective;
+    }
+    unique(data.config.constraints.iter().filter_map(|constraint| constraint.limit.functional()))
+}
+
+fn unique<'a>(functionals: impl Iterator<Item = &'a Functional>) -> Vec<&'a str> {
     let mut names: Vec<&str> = Vec::new();
-    for name in terms.filter_map(|term| term.functional.region.as_deref()) {
+    for name in functionals.filter(|own| own.kind.is_of_field()).filter_map(|own| own.region.as_deref()) {
         if !names.contains(&name) {
             names.push(name);
         }

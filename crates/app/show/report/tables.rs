@@ -215,6 +215,7 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
             },
             match (&t.load, t.frequency) {
                 (Some(load), _) => load.clone(),
+                (None, None) if ["volume", "mass"].contains(&t.kind.as_str()) => "–".to_owned(),
                 (None, frequency) => frequency.map_or("all".to_owned(), hertz),
             },
             trim_zeros(t.weight, 6),
