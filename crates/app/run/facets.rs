@@ -109,7 +109,7 @@ mod tests {
         let mesh = sphere(&parameters).expect("a ball");
         let found = curved_facets(&mesh).expect("it is curved");
         // The outer sphere is the larger one, and only the outside.
-        assert_eq!(found.surface, "sphere|air");
+        assert_eq!(found.surface, "air|sphere");
         let radius = parameters.radius;
         let [ball, air] = ["sphere", "air"].map(|name| mesh.topology().region(name).expect("it has both"));
         let surface = mesh.topology().interface(ball, air);

@@ -106,9 +106,8 @@ pub(in crate::config) fn is_number_with_unit(text: &str) -> bool {
 fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let by_name =
         SPELLED_OUT.iter().filter(|(name, _)| text.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit);
-    // A milli for a mega is none.
-    let by_case =
-        known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text) && unit.get(1..) != text.get(1..));
+    let is_prefix = |unit: &str| unit.starts_with(['m', 'M']) && unit.get(1..) == text.get(1..);
+    let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text) && !is_prefix(unit));
     by_case
         .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
         .or_else(|| nearest(text, known.iter().copied()).filter(|unit| !has_another_prefix(text, unit)))
@@ -249,6 +248,7 @@ mod tests {
             ("60 Hz", Length, "is a frequency, not a length"),
             ("60 hz", Frequency, "did you mean \"60 Hz\"?"),
             ("10 MM", Length, "did you mean \"10 mm\"?"),
+            ("5 MT", FluxDensity, "not a unit of flux density; write it like"),
             ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
             ("10", Length, "write its unit behind it, like \"10 mm\""),
             ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
