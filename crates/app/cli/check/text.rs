@@ -232,7 +232,7 @@ fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
             sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
         }
     };
-    let initial = initial.map_or(String::new(), |value| format!(", {value:.4e} {unit} initially"));
+    let initial = initial.map_or(String::new(), |value| format!(", {value:.4e}{unit} initially"));
     format!("{} {bounds}{initial}", constraint.name)
 }
 
