@@ -14,6 +14,7 @@ use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use super::entries::material;
 use super::references::{functionals, regions};
+use super::shape::may_move;
 use crate::config::{
     self, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, RegionModel, SourceMap,
     ValueBound,
@@ -358,8 +359,8 @@ pub(super) fn fixed_elements(
     meshes: [&Mesh; 2],
     states: &[FieldModel],
 ) -> Result<Vec<(String, Vec<ElementId>)>, Error> {
-    functionals(config)
-        .into_iter()
+    let of_field = functionals(config).into_iter().filter(|(_, functional)| functional.kind.is_of_field());
+    of_field
         .map(|(path, functional)| {
             let elements = term(config, functional, meshes, states)?.functional.fixed_elements().collect();
             Ok((format!("{path}.region"), elements))
@@ -429,9 +430,7 @@ pub(super) fn bodies_at_rest(
     (shape, model): (&Shape, &FieldModel),
 ) -> Vec<Diagnostic> {
     let topology = mesh.topology();
-    let map = shape.motion().map();
-    let moves =
-        |n: NodeId| shape.surface().nodes().binary_search(&n).is_ok() || (0..3).any(|d| map.is_unknown(n, d));
+    let moves = |node: NodeId| may_move(shape.surface(), shape.motion().map(), node);
     let bodies = functionals(config).into_iter().filter(|(_, own)| !own.kind.is_of_field());
     let at_rest = |(path, own): (String, &config::Functional)| {
         let name = own.region.as_deref()?;

@@ -51,6 +51,7 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::problem::{Problem, Progress, Shape, Stage};
 use fluxmorph_solver::FieldModel;
@@ -207,12 +208,7 @@ fn problem_on(
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
-        let message = "nothing excites a field, it is zero everywhere";
-        let advice = "add [[coils]], a magnet's remanence or an applied field";
-        if mode != Mode::Analysis && config.objective.is_some() {
-            return Err(source.error(vec![source.diagnostic("objective", message).help(advice)]).into());
-        }
-        warnings.push(format!("{message}; {advice}"));
+        warnings.push(unexcited(config, source, mode)?);
     }
     let objective = functional::objective(config, [&full_mesh, &mesh], &states)?;
     let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
@@ -235,23 +231,7 @@ fn problem_on(
         warnings
             .push("[[constraints]] on a body have no meaning without [design]: they are left out".to_owned());
     }
-    let is_of_shape = |own: &Objective| !own.is_of_field();
-    if config.objective.as_ref().is_some_and(is_of_shape)
-        && constraints.iter().all(|own| !own.quantity.is_of_field())
-    {
-        warnings.push(
-            "the objective is of the shape alone and no constraint is on the field: no field has a say in the optimum; bound \
-             what the device has to do in [[constraints]]"
-                .to_owned(),
-        );
-    }
-    if config.accuracy.tolerance.is_some()
-        && config.analysis.order == ElementOrder::Quadratic
-        && mode != Mode::Analysis
-    {
-        warnings
-            .push("accuracy.tolerance needs analysis.order = 1: the mesh of a run is not refined".to_owned());
-    }
+    warnings.extend(optimisation_warnings(config, &constraints, mode));
     let bodies = functional::bodies(config, &mesh, &states)?;
     let problem =
         Problem::new(mesh, states, objective, constraints, shape).shared_out(share).with_bodies(bodies);
@@ -282,6 +262,42 @@ fn look_at_mesh(
     }
     warnings.extend(soundness::layer_warnings(config, mesh));
     Ok(open)
+}
+
+/// What is said where nothing excites a field.
+///
+/// # Errors
+/// Where an objective is to be changed by it.
+fn unexcited(config: &Config, source: &SourceMap, mode: Mode) -> Result<String, Error> {
+    let message = "nothing excites a field, it is zero everywhere";
+    let advice = "add [[coils]], a magnet's remanence or an applied field";
+    if mode != Mode::Analysis && config.objective.is_some() {
+        return Err(source.error(vec![source.diagnostic("objective", message).help(advice)]).into());
+    }
+    Ok(format!("{message}; {advice}"))
+}
+
+/// What is rarely meant by objective and constraints, and by a tolerance.
+fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let is_of_shape = |own: &Objective| !own.is_of_field();
+    if config.objective.as_ref().is_some_and(is_of_shape)
+        && constraints.iter().all(|own| !own.quantity.is_of_field())
+    {
+        warnings.push(
+            "the objective is of the shape alone and no constraint is on the field: no field has a say in the optimum; bound \
+             what the device has to do in [[constraints]]"
+                .to_owned(),
+        );
+    }
+    if config.accuracy.tolerance.is_some()
+        && config.analysis.order == ElementOrder::Quadratic
+        && mode != Mode::Analysis
+    {
+        warnings
+            .push("accuracy.tolerance needs analysis.order = 1: the mesh of a run is not refined".to_owned());
+    }
+    warnings
 }
 
 /// Refuses an initial design of which the mesh carries a part alone. One process looks: several ranks move the mesh when all are set

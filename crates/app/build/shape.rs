@@ -270,7 +270,7 @@ fn vanishing_faults(
 }
 
 /// Whether a node is a design node or has a component that the elastic map decides.
-fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
+pub(super) fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
     surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
 }
 

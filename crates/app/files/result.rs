@@ -211,6 +211,13 @@ pub struct Verification {
     pub constraints: Vec<ConstraintResult>,
 }
 
+impl ObjectiveResult {
+    /// Whether its ratio was computed again on the elements of the run, cut.
+    pub fn is_verified_on_cut_elements(&self) -> bool {
+        self.verification.as_ref().is_some_and(|found| found.mesh == VerificationMesh::Cut)
+    }
+}
+
 /// The mesh of a verification.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

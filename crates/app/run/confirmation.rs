@@ -20,7 +20,7 @@ use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, Sou
 use crate::error::Error;
 use crate::files::{
     Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict,
-    Verification, VerificationMesh, relative_bar,
+    relative_bar,
 };
 use crate::show::Observer;
 
@@ -107,8 +107,7 @@ impl Session<'_> {
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
         let shape = self.cut_shape(objective, meshes);
-        let is_cut = |found: &Verification| found.mesh == VerificationMesh::Cut;
-        let is_said = errors.is_some() || objective.verification.as_ref().is_some_and(is_cut);
+        let is_said = errors.is_some() || objective.is_verified_on_cut_elements();
         let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
         let mut accuracy = Accuracy { facets, ..Accuracy::default() };
         if !self.has_field_objective() {
@@ -205,8 +204,7 @@ impl Session<'_> {
     /// has other ones.
     fn cut_shape<'a>(&self, objective: &ObjectiveResult, meshes: &'a ShapeMeshes) -> Option<&'a Mesh> {
         let has_grid = self.config.design.as_ref().is_some_and(|design| design.grid.is_some());
-        let is_cut = |found: &Verification| found.mesh == VerificationMesh::Cut;
-        (has_grid && objective.verification.as_ref().is_some_and(is_cut)).then_some(&meshes.solved[1])
+        (has_grid && objective.is_verified_on_cut_elements()).then_some(&meshes.solved[1])
     }
 
     /// What no estimate and no refinement has of the geometry, initially and at a `shape`, which is reported.

@@ -63,10 +63,9 @@ impl Named {
         matches!(self.limit_of(constraint), Some(Limit::Functional { bound, .. }) if is_share(bound))
     }
 
-    /// The unit of a constraint, with a blank before it.
+    /// The unit of a constraint, behind a value.
     fn unit_of(&self, constraint: &str) -> String {
-        let unit = self.limit_of(constraint).map(Limit::si_unit).filter(|unit| *unit != "1");
-        unit.map_or_else(String::new, |unit| format!(" {unit}"))
+        self.limit_of(constraint).map_or_else(String::new, |limit| limit.dimension().behind_value())
     }
 }
 

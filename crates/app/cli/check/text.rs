@@ -67,8 +67,7 @@ fn estimate(
     }
     for ConstraintError { name, value, error_estimate } in &found.constraints {
         let own = constraints.iter().find(|own| own.is_called(name));
-        let unit = own.map(|own| own.limit.si_unit()).filter(|unit| *unit != "1");
-        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let unit = own.map_or(String::new(), |own| own.limit.dimension().behind_value());
         let bar = SAFETY * error_estimate.abs();
         row(
             "initial design",
@@ -215,8 +214,7 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 
 /// A constraint in words.
 fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
-    let unit = Some(constraint.limit.si_unit()).filter(|unit| *unit != "1");
-    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    let unit = constraint.limit.dimension().behind_value();
     let value = |bound: &ValueBound| match bound {
         ValueBound::AtMost(upper) => format!("at most {upper:e}{unit}"),
         ValueBound::AtMostRatio(ratio) => format!("at most {ratio} times that of the initial design"),

@@ -223,9 +223,7 @@ impl Constraint {
         }
         self.name = Column::of(&words.join("_"));
     }
-}
 
-impl Constraint {
     /// Whether a constraint of the results is this one, or one of both of a thickness.
     pub fn is_called(&self, name: &str) -> bool {
         let side = name.strip_prefix(self.name.as_str());
@@ -256,12 +254,9 @@ impl Limit {
         }
     }
 
-    /// Unit of what is limited in SI; `1` for a ratio.
-    pub fn si_unit(&self) -> &'static str {
-        match self {
-            Self::Functional { functional, .. } => functional.dimension().si_unit(),
-            Self::Thickness { .. } => "m",
-        }
+    /// Unit of what is limited.
+    pub fn dimension(&self) -> Dimension {
+        self.functional().map_or(Dimension::Length, Functional::dimension)
     }
 
     fn of_functional(kind: ObjectiveKind, written: LimitKeys, section: &Section<'_>) -> Self {

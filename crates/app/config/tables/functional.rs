@@ -306,7 +306,7 @@ impl ObjectiveKind {
 
     /// Whether the field has a say in it.
     pub fn is_of_field(self) -> bool {
-        !matches!(self, Self::Volume | Self::Mass)
+        !OF_THE_SHAPE.contains(&self.name())
     }
 
     /// Whether it acts on a body of `[[forces]]`.

@@ -25,8 +25,8 @@ table! {
     /// error of these is in both ratios.
     /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
     /// its triangles. Constraints are measured anew at both shapes; where the elements of the run are cut instead, only those
-    /// on the field are: cutting changes no volume and no thickness. A run that is interrupted or ends with `max_time` is not checked; a signal during the check ends with 130 or 143
-    /// and the `status` `interrupted`, beside the `stop_reason` of the search, and `fluxmorph resume` makes up for it; a check
+    /// on the field are: cutting changes no volume and no thickness. A run that is interrupted or ends with `max_time` is not
+    /// checked; a signal during the check ends with 130 or 143 and the `status` `interrupted`, beside the `stop_reason` of the search, and `fluxmorph resume` makes up for it; a check
     /// that fails is a warning, and changes neither the status nor the rest of the result, which is on the disk before.
     ///
     /// ```toml

@@ -46,6 +46,11 @@ macro_rules! dimensions {
                 match self { $(Self::$dimension => $si_unit),+ }
             }
 
+            /// What stands behind a value: a blank and the SI unit, nothing of a ratio.
+            pub fn behind_value(self) -> String {
+                if self == Self::Ratio { String::new() } else { format!(" {}", self.si_unit()) }
+            }
+
             /// A text that would be accepted, for messages.
             pub fn example(self) -> &'static str {
                 match self { $(Self::$dimension => $example),+ }

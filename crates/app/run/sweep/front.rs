@@ -89,7 +89,7 @@ impl Criterion {
         let is_upper =
             |bound: &ValueBound| matches!(bound, ValueBound::AtMost(_) | ValueBound::AtMostRatio(_));
         let (unit, smaller_is_better) = match &constraint.limit {
-            Limit::Functional { bound, .. } => (constraint.limit.si_unit(), is_upper(bound)),
+            Limit::Functional { bound, .. } => (constraint.limit.dimension().si_unit(), is_upper(bound)),
             Limit::Thickness { minimum: Some(_), maximum: Some(_), .. } => return None,
             Limit::Thickness { minimum, .. } => ("m", minimum.is_none()),
         };

@@ -152,8 +152,11 @@ fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
         }
         _ => ("not checked".to_owned(), "see the messages at the end of the run".to_owned()),
     };
-    let is_cut = objective.verification.as_ref().is_some_and(|v| v.mesh == VerificationMesh::Cut);
-    (if is_cut { "on cut elements" } else { "on a fresh mesh" }, value, remark)
+    (
+        if objective.is_verified_on_cut_elements() { "on cut elements" } else { "on a fresh mesh" },
+        value,
+        remark,
+    )
 }
 
 /// Mean |B| over what is observed, before and after, where the fields are there.

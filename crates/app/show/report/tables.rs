@@ -190,9 +190,9 @@ fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Mark
 /// The unit that a constraint is shown in, and its number in one of SI.
 fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64) {
     match constraints.iter().find(|own| own.is_called(name)).map(|own| &own.limit) {
-        Some(limit @ Limit::Functional { functional, .. }) => match functional.kind {
+        Some(Limit::Functional { functional, .. }) => match functional.kind {
             ObjectiveKind::Volume => ("cm³", 1e6),
-            _ => (limit.si_unit(), 1.0),
+            _ => (functional.dimension().si_unit(), 1.0),
         },
         Some(Limit::Thickness { .. }) => ("mm", 1e3),
         None => ("in SI", 1.0),
@@ -200,12 +200,9 @@ fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64
 }
 
 fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
-    let unit = |kind: &str| {
-        let own = objective.into_iter().flat_map(Objective::terms);
-        let mut functionals = own.map(|term| &term.functional).filter(|own| own.kind.name() == kind);
-        functionals.next().map_or("in SI", |functional| functional.dimension().si_unit())
-    };
     let row = |t: &TermResult| {
+        let own = objective.into_iter().flat_map(Objective::terms).map(|term| &term.functional);
+        let own = own.into_iter().find(|own| own.kind.name() == t.kind);
         vec![
             t.kind.replace('_', " "),
             match (&t.region, &t.coils[..]) {
@@ -215,11 +212,11 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
             },
             match (&t.load, t.frequency) {
                 (Some(load), _) => load.clone(),
-                (None, None) if ["volume", "mass"].contains(&t.kind.as_str()) => "–".to_owned(),
+                (None, None) if own.is_some_and(|own| !own.kind.is_of_field()) => "–".to_owned(),
                 (None, frequency) => frequency.map_or("all".to_owned(), hertz),
             },
             trim_zeros(t.weight, 6),
-            format!("{} {}", number(t.value, 6), unit(&t.kind)),
+            format!("{} {}", number(t.value, 6), own.map_or("in SI", |own| own.dimension().si_unit())),
             number(t.weight * t.value, 6),
         ]
     };

@@ -151,8 +151,7 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
     };
     match &constraint.limit {
         Limit::Functional { functional: measured, bound } => {
-            let unit = format!(" {}", measured.dimension().si_unit());
-            format!("{} {}", functional(measured), within(bound, &unit))
+            format!("{} {}", functional(measured), within(bound, &measured.dimension().behind_value()))
         }
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];
