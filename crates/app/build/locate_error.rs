@@ -7,7 +7,7 @@ use fluxmorph_geometry::MeshError;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_remesh::RemeshError;
 use fluxmorph_solver::coil::{PlaneFault, RegionFault};
-use fluxmorph_solver::{NewtonFailure, NonConvergence, SolverError};
+use fluxmorph_solver::{NewtonFailure, NonConvergence, PointsOf, SolverError};
 
 use super::references::{regions, surface_names};
 use crate::config::{CoilShape, Config, ConfigError, Diagnostic, RemeshExtent, SourceMap};
@@ -193,9 +193,15 @@ impl Blame<'_> {
                 self.at(&format!("materials.{name}.{key}"), error)
             }
             SolverError::SolidOnRanks { coil } => self.at(&format!("{}.conductor", self.coil(coil)?), error),
-            SolverError::ProbeOutside { probe, .. } => {
-                let index = self.config.probes.iter().position(|own| own.name == *probe)?;
+            SolverError::PointOutside { wanted_by: PointsOf::Probe(name), .. } => {
+                let index = self.config.probes.iter().position(|own| own.name == *name)?;
                 self.at(&format!("probes[{index}].points"), error)
+            }
+            SolverError::PointOutside { wanted_by: PointsOf::Expansion(name), .. } => {
+                let index = self.config.multipoles.iter().position(|own| own.name == *name)?;
+                Some(self.at(&format!("multipoles[{index}].radius"), error)?.expected(
+                    "all of the circle or ball in the mesh, or in its image behind a symmetry plane through the centre",
+                ))
             }
             SolverError::Mesh(error) => self.mesh(error),
             _ => None,

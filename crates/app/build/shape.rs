@@ -370,9 +370,10 @@ fn held_node_fault(
         let fault = inputs.source.diagnostic("remesh", message);
         return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
     }
-    let leaves = |node: NodeId, axis: usize| match surface.nodes().binary_search(&node) {
-        Ok(i) => surface.directions()[i][axis] != 0.0,
-        Err(_) => map.is_unknown(node, axis),
+    let designed = |node: NodeId| surface.nodes().binary_search(&node).ok();
+    let leaves = |node: NodeId, axis: usize| match designed(node) {
+        Some(i) => surface.directions()[i][axis] != 0.0,
+        None => map.is_unknown(node, axis),
     };
     let (node, axis) = unknowns.plane_nodes().find_map(|(node, axes)| {
         (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
@@ -383,5 +384,8 @@ fn held_node_fault(
         millimetres(inputs.mesh.point(node))
     );
     let fault = inputs.source.diagnostic("remesh", message);
-    Some(fault.expected("the plane listed in remesh.slide, or a design.direction along it"))
+    Some(fault.expected(match designed(node) {
+        Some(_) => "a design.direction along the plane, or a design.surface that ends before it",
+        None => "the plane listed in remesh.slide, or a remesh region that ends before it",
+    }))
 }

@@ -14,7 +14,9 @@ use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::linear::Method;
 use fluxmorph_solver::multipole::Harmonic;
-use fluxmorph_solver::{FieldModel, FieldSolution, Functional, SolverError, recovery, saturation};
+use fluxmorph_solver::{
+    FieldModel, FieldSolution, Functional, PointsOf, SolverError, recovery, saturation,
+};
 
 use super::Session;
 use super::confirmation::InitialField;
@@ -209,8 +211,9 @@ impl Session<'_> {
                     // It was inside before the mesh moved: the result of a whole run is worth more than this point.
                     None => {
                         if index == 0 {
-                            let ([lower, upper], probe) = (mesh.bounding_box(), probe.name.clone());
-                            let error = SolverError::ProbeOutside { probe, point, lower, upper };
+                            let ([lower, upper], wanted_by) =
+                                (mesh.bounding_box(), PointsOf::Probe(probe.name.clone()));
+                            let error = SolverError::PointOutside { wanted_by, point, lower, upper };
                             observer.warning(&format!("{error}: its field is left out"));
                         }
                         None

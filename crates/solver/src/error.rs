@@ -183,13 +183,13 @@ pub enum SolverError {
         place: [f64; 3],
         by: String,
     },
-    /// A probe lies outside the mesh.
+    /// The field is wanted at a point outside the mesh.
     #[error(
-        "the point {} of the probe `{probe}` lies outside the mesh, whose box is {} to {}",
+        "the point {} of {wanted_by} lies outside the mesh, whose box is {} to {}",
         millimetres(*point), millimetres(*lower), millimetres(*upper)
     )]
-    ProbeOutside {
-        probe: String,
+    PointOutside {
+        wanted_by: PointsOf,
         /// The point [m].
         point: [f64; 3],
         /// Lower corner of the mesh [m].
@@ -204,6 +204,17 @@ impl SolverError {
     pub(crate) fn parameter(what: impl Into<String>, value: impl ToString, expected: &str) -> Self {
         Self::Parameter { what: what.into(), value: value.to_string(), expected: expected.to_owned() }
     }
+}
+
+/// What takes the field at points, by its name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PointsOf {
+    /// A probe.
+    #[error("the probe `{0}`")]
+    Probe(String),
+    /// The expansion of a field in multipoles.
+    #[error("the expansion `{0}`")]
+    Expansion(String),
 }
 
 /// What a linear system that is not solved looks like, and what may help.

@@ -55,7 +55,7 @@ pub use bh::BhCurve;
 pub use boundary::{Boundary, UniformField};
 pub use circuit::Winding;
 pub use elements::{ElementFamily, Order};
-pub use error::{NewtonFailure, NonConvergence, SolverError};
+pub use error::{NewtonFailure, NonConvergence, PointsOf, SolverError};
 pub use functional::{Functional, FunctionalValue, RigidMotion};
 pub use linear::{LinearSolver, LinearSolverReport};
 pub use load_case::{Drive, LoadCase, frequency_label};

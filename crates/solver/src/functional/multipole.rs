@@ -12,7 +12,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::{Follow, FunctionalValue};
 use crate::element::Complex3;
-use crate::error::SolverError;
+use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
 use crate::recovery::{BlendedPoint, FixedPlaces, RecoveredPoint};
@@ -116,7 +116,7 @@ impl Multipoles {
     /// points outside the mesh are sought beyond the planes.
     ///
     /// # Errors
-    /// [`SolverError::ProbeOutside`] for the first point that no element holds, and no element the image of.
+    /// [`SolverError::PointOutside`] for the first point that no element holds, and no element the image of.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -148,8 +148,8 @@ impl Multipoles {
             let hit = (0..count).find_map(|i| Some((i, found[k * count + i]?.0)));
             let Some((image, element)) = hit else {
                 let [lower, upper] = mesh.bounding_box();
-                let (probe, point) = (name.to_owned(), expansion.points[k]);
-                return Err(SolverError::ProbeOutside { probe, point, lower, upper });
+                let (wanted_by, point) = (PointsOf::Expansion(name.to_owned()), expansion.points[k]);
+                return Err(SolverError::PointOutside { wanted_by, point, lower, upper });
             };
             places.push((own[image].0, element));
             factors.push(own[image].1);

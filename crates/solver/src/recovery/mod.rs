@@ -28,7 +28,7 @@ use crate::element::Complex3;
 use crate::element::quadrature::Node;
 use crate::element::tabulated::Rule;
 use crate::elements::{ElementFamily, Order};
-use crate::error::SolverError;
+use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 use fit::Fit;
@@ -226,7 +226,7 @@ fn of_flux_densities(
 /// The recovered flux density [T] at the points of a probe.
 ///
 /// # Errors
-/// [`SolverError::ProbeOutside`] for the first point that no element holds.
+/// [`SolverError::PointOutside`] for the first point that no element holds.
 pub fn probe(
     solution: &FieldSolution,
     model: &FieldModel,
@@ -236,7 +236,7 @@ pub fn probe(
 ) -> Result<Vec<Complex3>, SolverError> {
     let outside = |point: Point| {
         let [lower, upper] = mesh.bounding_box();
-        SolverError::ProbeOutside { probe: name.to_owned(), point, lower, upper }
+        SolverError::PointOutside { wanted_by: PointsOf::Probe(name.to_owned()), point, lower, upper }
     };
     let located = locate(mesh, points).into_iter().zip(points);
     let elements = located
