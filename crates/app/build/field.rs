@@ -22,7 +22,7 @@ use super::entries::material;
 use super::locate_error::DiagnosticSink;
 use super::{loads, open};
 use crate::config::{
-    self, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
+    self, Config, Diagnostic, FactorReuse, Objective, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
     SolverMethod, SourceMap,
 };
 use crate::error::Error;
@@ -191,7 +191,10 @@ fn field_model(
         boundaries.extend(of(&field.surfaces, Boundary::UniformField(applied)));
     }
     boundaries.extend(open::condition(config));
-    let linear_solver = linear_solver(&config.analysis.linear_solver);
+    let linear_solver = LinearSolverSettings {
+        solutions: solutions(config, load_case.frequency),
+        ..linear_solver(&config.analysis.linear_solver)
+    };
     let setup = FieldModelSetup {
         penalty: config.analysis.penalty,
         family: family(config),
@@ -210,6 +213,18 @@ fn field_model(
         ..FieldModelSetup::default()
     };
     Ok(FieldModel::new(mesh, load_case.applied_to(&setup))?)
+}
+
+/// Solutions that a design takes with the matrix of one frequency: of every load case the state and the adjoints of objective and
+/// constraints, and what a volt at a coil drives.
+fn solutions(config: &Config, frequency: f64) -> usize {
+    let cases = config.load_cases();
+    let loads = cases.iter().filter(|case| case.frequency == frequency).count();
+    let constraints = config.constraints.iter().filter_map(|constraint| constraint.limit.functional());
+    let constraints = constraints.filter(|functional| functional.kind.is_of_field()).count();
+    let objective = usize::from(config.objective.as_ref().is_some_and(Objective::is_of_field));
+    let voltages = config.coils.iter().filter(|coil| cases.iter().any(|case| case.feed(coil).by_voltage));
+    loads * (1 + objective + constraints) + voltages.count()
 }
 
 /// How the linear systems are solved.

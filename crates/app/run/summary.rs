@@ -14,9 +14,7 @@ use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::linear::Method;
 use fluxmorph_solver::multipole::Harmonic;
-use fluxmorph_solver::{
-    FieldModel, FieldSolution, Functional, PointsOf, SolverError, recovery, saturation,
-};
+use fluxmorph_solver::{FieldModel, FieldSolution, Functional, PointsOf, SolverError, recovery, saturation};
 
 use super::Session;
 use super::confirmation::InitialField;

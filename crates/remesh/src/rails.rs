@@ -16,6 +16,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::scalar::ordered_sum;
 use fluxmorph_geometry::tet4::{Point, dot};
+use rayon::prelude::*;
 
 use crate::barrier::{KNEE, density};
 use crate::deform::ElasticMap;
@@ -57,6 +58,17 @@ impl Element {
         std::array::from_fn(|d| (0..4).map(|a| values[a] * self.gradients[a][d]).sum())
     }
 
+    /// `∂E/∂u` of its nodes, of this element alone.
+    fn forces(&self, u: &[f64], axis: usize, stretch: f64) -> [f64; 4] {
+        let gradient = self.gradient(u);
+        let slope = density(stretch).slope;
+        self.gradients.map(|own| {
+            let along = own[axis];
+            let sideways = dot(own, gradient) - along * gradient[axis];
+            self.weight * (slope * along + SIDEWAYS * sideways)
+        })
+    }
+
     /// `w [ψ'' ∂_d N ∂_d Nᵀ + ε ∇_⊥ N·∇_⊥ N]` for a curvature `ψ''`.
     fn tangent(&self, axis: usize, curvature: f64) -> Scalars {
         let entry = |a: usize, b: usize| {
@@ -82,7 +94,7 @@ impl Rails {
 
     /// `J` of every element of the body.
     fn stretches_along(&self, u: &[f64]) -> Vec<f64> {
-        self.elements.iter().map(|element| 1.0 + element.gradient(u)[self.axis]).collect()
+        self.elements.par_iter().map(|element| 1.0 + element.gradient(u)[self.axis]).collect()
     }
 
     fn energy(&self, u: &[f64]) -> f64 {
@@ -97,14 +109,12 @@ impl Rails {
 
     /// `∂E/∂u` at every node.
     fn residual(&self, u: &[f64], stretches: &[f64]) -> Vec<f64> {
+        let of = |(element, &stretch): (&Element, &f64)| element.forces(u, self.axis, stretch);
+        let forces: Vec<[f64; 4]> = self.elements.par_iter().zip(stretches).map(of).collect();
         let mut residual = vec![0.0; u.len()];
-        for (element, &stretch) in self.elements.iter().zip(stretches) {
-            let gradient = element.gradient(u);
-            let slope = density(stretch).slope;
-            for (node, own) in element.nodes.iter().zip(&element.gradients) {
-                let along = own[self.axis];
-                let sideways = dot(*own, gradient) - along * gradient[self.axis];
-                residual[node.index()] += element.weight * (slope * along + SIDEWAYS * sideways);
+        for (element, forces) in self.elements.iter().zip(forces) {
+            for (node, force) in element.nodes.iter().zip(forces) {
+                residual[node.index()] += force;
             }
         }
         residual
@@ -132,7 +142,7 @@ impl EnergyLaw for Rails {
         let mut u: Vec<f64> = self.rest.linear(design)?.iter().map(|u| u[self.axis]).collect();
         for steps in 1..=MAX_STEPS {
             let stretches = self.stretches_along(&u);
-            let curvatures: Vec<f64> = stretches.iter().map(|&j| density(j).curvature).collect();
+            let curvatures: Vec<f64> = stretches.par_iter().map(|&j| density(j).curvature).collect();
             let tangent = self.rest.with_stiffness(|position| {
                 self.elements[position].tangent(self.axis, curvatures[position])
             })?;

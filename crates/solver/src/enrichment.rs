@@ -153,6 +153,7 @@ impl FieldModel {
             // No fallback: a factor of second order would cost more than the estimate is worth.
             factor_bytes: 0,
             reuse: Reuse::Never,
+            ..self.setup().linear_solver
         };
         Self::new(mesh, FieldModelSetup { order: Order::Quadratic, linear_solver, ..self.setup().clone() })
     }

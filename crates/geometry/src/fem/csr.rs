@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::fem::scalar::{Scalar, c64};
+use crate::fem::scalar::{Scalar, c32, c64};
 
 /// Rows per parallel task of a product.
 const ROWS_PER_TASK: usize = 1024;
@@ -56,16 +56,28 @@ impl RowProduct<f64> for c64 {
 impl RowProduct<c64> for c64 {
     #[inline]
     fn row_product(values: &[c64], columns: &[u32], x: &[c64]) -> c64 {
-        // The products with Re a and with Im a are summed apart: pairs of equal operations, no exchange of parts within
-        // the loop, and half as long a chain of additions.
-        let (mut by_re, mut by_im) = ([0.0; 2], [0.0; 2]);
-        for (a, &c) in values.iter().zip(columns) {
-            let x = x[c as usize];
-            by_re = [by_re[0] + a.re * x.re, by_re[1] + a.re * x.im];
-            by_im = [by_im[0] + a.im * x.re, by_im[1] + a.im * x.im];
-        }
-        c64::new(by_re[0] - by_im[1], by_re[1] + by_im[0])
+        complex_row_product(values, columns, x, |a| a)
     }
+}
+
+impl RowProduct<c32> for c64 {
+    #[inline]
+    fn row_product(values: &[c32], columns: &[u32], x: &[c64]) -> c64 {
+        complex_row_product(values, columns, x, |a| c64::new(f64::from(a.re), f64::from(a.im)))
+    }
+}
+
+/// The products with Re a and with Im a are summed apart: pairs of equal operations, no exchange of parts within the loop, and
+/// half as long a chain of additions.
+#[inline]
+fn complex_row_product<A: Copy>(values: &[A], columns: &[u32], x: &[c64], double: impl Fn(A) -> c64) -> c64 {
+    let (mut by_re, mut by_im) = ([0.0; 2], [0.0; 2]);
+    for (&a, &c) in values.iter().zip(columns) {
+        let (a, x) = (double(a), x[c as usize]);
+        by_re = [by_re[0] + a.re * x.re, by_re[1] + a.re * x.im];
+        by_im = [by_im[0] + a.im * x.re, by_im[1] + a.im * x.im];
+    }
+    c64::new(by_re[0] - by_im[1], by_re[1] + by_im[0])
 }
 
 /// A sparse matrix in compressed rows.

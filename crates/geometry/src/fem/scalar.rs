@@ -57,6 +57,18 @@ impl Scalar for c64 {
     }
 }
 
+impl Scalar for c32 {
+    #[inline]
+    fn norm_squared(self) -> f64 {
+        f64::from(self.norm_sqr())
+    }
+
+    #[inline]
+    fn add_real(&mut self, real: f64) {
+        self.re += real as f32;
+    }
+}
+
 /// Terms per chunk of a sum: chunks are summed in parallel and combined in order.
 const CHUNK: usize = 4096;
 

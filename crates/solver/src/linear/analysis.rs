@@ -94,9 +94,7 @@ impl SystemAnalysis {
     /// The cheapest method that fits; without a factor or two levels, the incomplete factor.
     fn cheapest(&mut self, pattern: &SystemPattern<'_>) -> Result<Method, SolverError> {
         let unknowns = pattern.structure.row_count();
-        // A factor that is kept, in part or for other designs, may be cheaper far beyond that.
-        let is_new = self.changes.is_none() && self.settings.reuse == Reuse::Never;
-        let is_large = unknowns >= factors_up_to(self.field, self.elements, is_new);
+        let is_large = unknowns >= self.factors_up_to();
         let mut factor = if is_large { None } else { self.cheapest_factor()? };
         if let Some((method, _)) = factor.filter(|_| unknowns < two_levels_from(self.field, self.elements)) {
             return Ok(method);
@@ -114,6 +112,22 @@ impl SystemAnalysis {
             factor = self.cheapest_factor()?;
         }
         Ok(factor.map_or(Method::Incomplete, |(method, _)| method))
+    }
+
+    /// Unknowns from which a factor is not looked at where two levels fit: its symbolic part takes longer than a design, or seconds,
+    /// and its memory is twice that of two levels and more.
+    fn factors_up_to(&self) -> usize {
+        let is_new = self.settings.reuse == Reuse::Never;
+        match (self.field, self.elements) {
+            // Without a factor that serves other designs. Of a state and its adjoint on 18 000 and 36 000 unknowns of a meshed plate two
+            // levels take two thirds of the time even where a part is kept, and as long as the factor where there are two of each.
+            (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) if is_new => {
+                if self.settings.solutions <= FEW_SOLUTIONS { 12_000 } else { 100_000 }
+            }
+            (_, (_, Order::Linear)) => 200_000,
+            (_, (ElementFamily::Nodal, Order::Quadratic)) => 400_000,
+            (_, (ElementFamily::Edge, Order::Quadratic)) => usize::MAX,
+        }
     }
 
     /// The method that solutions begin with.
@@ -174,12 +188,12 @@ impl SystemAnalysis {
     /// # Errors
     /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
     pub fn work_of_design(&self) -> Result<f64, MeshError> {
-        Ok(self.costs(self.method)?.of_design(self.service(self.method)))
+        Ok(self.costs(self.method)?.of_design(self.service(self.method), self.settings.solutions))
     }
 
     /// The same in a run, in which what is kept of a factor is made once.
     fn cost_of_design(&self, method: Method) -> Result<f64, MeshError> {
-        Ok(self.costs_by(method, of_a_design)?.of_design(self.service(method)))
+        Ok(self.costs_by(method, of_a_design)?.of_design(self.service(method), self.settings.solutions))
     }
 
     fn service(&self, method: Method) -> Service {
@@ -293,6 +307,9 @@ fn of_a_design(analysis: &LdltAnalysis) -> f64 {
     changing + (all - changing) / DESIGNS
 }
 
+/// A state with one or two adjoints.
+const FEW_SOLUTIONS: usize = 3;
+
 /// Designs that a run has, about: the shipped ones have 5 to 20.
 const DESIGNS: f64 = 10.0;
 
@@ -315,18 +332,6 @@ fn two_levels(
     let matrix = (pattern.reference)();
     let prolongation = (pattern.prolongation)(&matrix)?;
     Ok(TwoLevelAnalysis::new(&matrix, prolongation, elements)?)
-}
-
-/// Unknowns from which a factor is not looked at where two levels fit: its symbolic part alone takes seconds, and its memory is
-/// twice that of two levels and more.
-const fn factors_up_to(field: FieldKind, elements: (ElementFamily, Order), is_new: bool) -> usize {
-    match (field, elements) {
-        // Every design with a factor of its own: as cheap by two levels behind an impedance surface, for a third with a meshed plate.
-        (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) if is_new => 100_000,
-        (_, (_, Order::Linear)) => 200_000,
-        (_, (ElementFamily::Nodal, Order::Quadratic)) => 400_000,
-        (_, (ElementFamily::Edge, Order::Quadratic)) => usize::MAX,
-    }
 }
 
 /// Unknowns from which two levels are compared with a factor, which takes their analysis: below, a factor is cheaper, or as good

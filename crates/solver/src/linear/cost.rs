@@ -87,9 +87,9 @@ impl Costs {
         }
     }
 
-    /// These, with a further product with the matrix in every iteration.
-    pub(crate) fn with_product(self, sizes: &Sizes) -> Self {
-        Self { iteration: self.iteration + sizes.product(), ..self }
+    /// These, with a further product in every iteration, with a matrix of so many entries in single precision.
+    pub(crate) fn with_product(self, entries: usize) -> Self {
+        Self { iteration: self.iteration + (entries * SINGLE_ENTRY) as f64 * BYTE, ..self }
     }
 
     /// The sum of both.
@@ -97,9 +97,9 @@ impl Costs {
         Self { factor: self.factor + other.factor, iteration: self.iteration + other.iteration }
     }
 
-    /// Mean cost of a design with state and adjoint.
-    pub(crate) fn of_design(&self, service: Service) -> f64 {
-        self.factor / service.designs + 2.0 * service.iterations * self.iteration
+    /// Mean cost of a design with so many solutions.
+    pub(crate) fn of_design(&self, service: Service, solutions: usize) -> f64 {
+        self.factor / service.designs + solutions as f64 * service.iterations * self.iteration
     }
 }
 
@@ -245,7 +245,7 @@ mod tests {
         let step = |method, sizes: &Sizes| {
             let iterations = typical_iterations(method, FieldKind::Harmonic, elements, 1);
             let service = Service::typical(method, Reuse::WhileItPays, iterations, FieldKind::Harmonic);
-            Costs::complete(method, sizes).of_design(service)
+            Costs::complete(method, sizes).of_design(service, 2)
         };
         let small = Sizes { matrix_entries: 600_000, factor_entries: 8_000_000, multiplications: 3e9 };
         assert!(step(Method::DirectSingle, &small) < step(Method::RealFactorSingle, &small));

@@ -120,6 +120,8 @@ pub struct LinearSolverSettings {
     pub factor_bytes: usize,
     /// Whether a factor may serve several designs.
     pub reuse: Reuse,
+    /// Solutions with the matrix of a design, states and adjoints: what the work of a factor is divided by. Default 2.
+    pub solutions: usize,
 }
 
 impl Default for LinearSolverSettings {
@@ -132,6 +134,7 @@ impl Default for LinearSolverSettings {
             most_work: f64::INFINITY,
             factor_bytes: 4 << 30,
             reuse: Reuse::default(),
+            solutions: 2,
         }
     }
 }

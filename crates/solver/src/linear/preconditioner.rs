@@ -49,11 +49,11 @@ impl Preconditioner {
         Ok(Self { method, costs: analysis.costs(method)?, action })
     }
 
-    /// `z = M⁻¹ r` in an iteration with the matrix `fine`.
-    pub(super) fn apply(&self, fine: &CsrMatrix<c64>, r: &[c64], z: &mut [c64]) {
+    /// `z = M⁻¹ r`.
+    pub(super) fn apply(&self, r: &[c64], z: &mut [c64]) {
         match &self.action {
             Action::Factor(factor) => factor.apply(r, z),
-            Action::TwoLevel(levels) => levels.apply(fine, r, z),
+            Action::TwoLevel(levels) => levels.apply(r, z),
         }
     }
 

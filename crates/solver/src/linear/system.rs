@@ -307,7 +307,7 @@ impl LocalSystem {
                 &self.matrix,
                 right_side,
                 x,
-                |r, z| preconditioner.apply(&self.matrix, r, z),
+                |r, z| preconditioner.apply(r, z),
                 target,
                 most - done,
                 |count, now| {

@@ -1,9 +1,9 @@
-//! A transfer between two levels: prolongation, restriction, and the Galerkin product `Pᵀ K P`.
+//! A transfer between two levels: prolongation, restriction, the Galerkin product `Pᵀ K P`, and the half of it `Pᵀ K`.
 
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{CsrMatrix, c64};
+use fluxmorph_geometry::fem::{CsrMatrix, Scalar, c32, c64};
 use fluxmorph_geometry::parallel::Aggregates;
 use rayon::prelude::*;
 
@@ -85,12 +85,54 @@ impl Transfer {
 
     /// The structure of `Pᵀ K P` for a matrix with the structure `fine`.
     pub(crate) fn coarse_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
-        let (p, r) = (&self.prolongation.structure, &self.restriction.structure);
-        let columns_of = |seen: &mut Vec<u32>, row: usize| {
+        let p = &self.prolongation.structure;
+        self.product_structure(fine, self.coarse_count(), |g| &p.columns[p.row(g)])
+    }
+
+    /// The structure of `Pᵀ K`.
+    pub(crate) fn restricted_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
+        let own = itself(fine.column_count);
+        self.product_structure(fine, fine.column_count, |g| &own[g..=g])
+    }
+
+    /// `Pᵀ K P`, with the structure of [`Self::coarse_structure`]; every entry is summed in the order of the fine rows.
+    pub(crate) fn coarse_matrix(
+        &self,
+        structure: &Arc<CsrStructure>,
+        fine: &CsrMatrix<c64>,
+    ) -> CsrMatrix<c64> {
+        let p = &self.prolongation;
+        let parents = |g| {
+            let range = p.structure.row(g);
+            (&p.values[range.clone()], &p.structure.columns[range])
+        };
+        self.product(structure, fine, parents, |sum| sum)
+    }
+
+    /// `Pᵀ K` in single precision, with the structure of [`Self::restricted_structure`].
+    pub(crate) fn restricted_matrix(
+        &self,
+        structure: &Arc<CsrStructure>,
+        fine: &CsrMatrix<c64>,
+    ) -> CsrMatrix<c32> {
+        let own = itself(fine.structure.column_count);
+        let single = |sum: c64| c32::new(sum.re as f32, sum.im as f32);
+        self.product(structure, fine, |g| (&[1.0], &own[g..=g]), single)
+    }
+
+    /// The structure of `Pᵀ K Q`, with so many columns, for the columns of the rows of `Q`.
+    fn product_structure<'q>(
+        &self,
+        fine: &CsrStructure,
+        column_count: usize,
+        columns_of: impl Fn(usize) -> &'q [u32] + Sync,
+    ) -> Arc<CsrStructure> {
+        let r = &self.restriction.structure;
+        let columns_of_row = |seen: &mut Vec<u32>, row: usize| {
             let mut found = Vec::new();
             for &f in &r.columns[r.row(row)] {
                 for &g in &fine.columns[fine.row(f as usize)] {
-                    for &c in &p.columns[p.row(g as usize)] {
+                    for &c in columns_of(g as usize) {
                         if seen[c as usize] != row as u32 {
                             seen[c as usize] = row as u32;
                             found.push(c);
@@ -101,11 +143,10 @@ impl Transfer {
             found.sort_unstable();
             found
         };
-        let count = r.row_count();
-        let rows: Vec<Vec<u32>> = (0..count)
+        let rows: Vec<Vec<u32>> = (0..r.row_count())
             .into_par_iter()
             .with_min_len(ROWS)
-            .map_init(|| vec![u32::MAX; count], columns_of)
+            .map_init(|| vec![u32::MAX; column_count], columns_of_row)
             .collect();
         let mut row_starts = vec![0u32];
         let mut columns = Vec::with_capacity(rows.iter().map(Vec::len).sum());
@@ -113,45 +154,55 @@ impl Transfer {
             columns.extend(row);
             row_starts.push(columns.len() as u32);
         }
-        Arc::new(CsrStructure { column_count: count, row_starts, columns })
+        Arc::new(CsrStructure { column_count, row_starts, columns })
     }
 
-    /// `Pᵀ K P`, with the structure of [`Self::coarse_structure`]; every entry is summed in the order of the fine rows.
-    pub(crate) fn coarse_matrix(
+    /// `Pᵀ K Q` for the weights and columns of the rows of `Q`, stored as `store` says.
+    fn product<'q, T: Scalar>(
         &self,
         structure: &Arc<CsrStructure>,
         fine: &CsrMatrix<c64>,
-    ) -> CsrMatrix<c64> {
-        let (p, r) = (&self.prolongation, &self.restriction);
-        let mut coarse = CsrMatrix::zeros(structure);
-        let mut rest = coarse.values.as_mut_slice();
+        row_of: impl Fn(usize) -> (&'q [f64], &'q [u32]) + Sync,
+        store: impl Fn(c64) -> T + Sync,
+    ) -> CsrMatrix<T> {
+        let r = &self.restriction;
+        let mut product = CsrMatrix::zeros(structure);
+        let mut rest = product.values.as_mut_slice();
         let mut rows = Vec::with_capacity(structure.row_count());
         for row in 0..structure.row_count() {
             let (own, others) = rest.split_at_mut(structure.row(row).len());
             rest = others;
             rows.push(own);
         }
-        let add_row = |place: &mut Vec<u32>, (row, values): (usize, &mut [c64])| {
+        let fill_row = |(place, sums): &mut (Vec<u32>, Vec<c64>), (row, values): (usize, &mut [T])| {
             for (k, &c) in structure.columns[structure.row(row)].iter().enumerate() {
                 place[c as usize] = k as u32;
             }
+            sums.clear();
+            sums.resize(values.len(), c64::default());
             let terms = r.structure.row(row);
             for (&weight, &f) in r.values[terms.clone()].iter().zip(&r.structure.columns[terms]) {
                 for k in fine.structure.row(f as usize) {
                     let value = fine.values[k] * weight;
-                    let parents = p.structure.row(fine.structure.columns[k] as usize);
-                    for (&w, &c) in p.values[parents.clone()].iter().zip(&p.structure.columns[parents]) {
-                        values[place[c as usize] as usize] += value * w;
+                    let (weights, columns) = row_of(fine.structure.columns[k] as usize);
+                    for (&w, &c) in weights.iter().zip(columns) {
+                        sums[place[c as usize] as usize] += value * w;
                     }
                 }
             }
+            values.iter_mut().zip(sums).for_each(|(value, sum)| *value = store(*sum));
         };
         rows.into_par_iter()
             .enumerate()
             .with_min_len(ROWS)
-            .for_each_init(|| vec![0u32; structure.row_count()], add_row);
-        coarse
+            .for_each_init(|| (vec![0u32; structure.column_count], Vec::new()), fill_row);
+        product
     }
+}
+
+/// The columns of the rows of a unit matrix.
+fn itself(count: usize) -> Vec<u32> {
+    (0..count as u32).collect()
 }
 
 fn transpose(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {

@@ -10,7 +10,8 @@
 //!
 //! ("A-DEF2" of Tang, Nabben, Vuik and Erlangga, J. Sci. Comput. 39 (2009) 340). For a residual without a coarse part it is the
 //! balanced `Q r + (I − Q K) S (I − K Q) r`, which is complex symmetric, at little more than half the cost; the iteration
-//! keeps residuals free of it if it begins with [`TwoLevel::start`]. Unlike smoothing before and after, it does not ask that
+//! keeps residuals free of it if it begins with [`TwoLevel::start`]. All that it takes of `K S r` is `Pᵀ K S r`: with the incomplete
+//! factor the product `Pᵀ K`, a half of the coarse matrix, is kept in single precision, with less than half of the entries of `K`. Unlike smoothing before and after, it does not ask that
 //! `S` contracts, which an incomplete factor does not on flat elements.
 
 use std::sync::Arc;
@@ -20,7 +21,7 @@ use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, IncompleteAnalysis, LdltAnalysis, StrongSets, c32, c64, ordering};
 use rayon::prelude::*;
 
-use super::cost::{Costs, Sizes};
+use super::cost::{Costs, SINGLE_ENTRY, Sizes};
 use super::factor::{Precondition, Scaled, Unscaled};
 use super::gauss_seidel::{GaussSeidel, GaussSeidelAnalysis};
 use super::method::Method;
@@ -55,7 +56,8 @@ pub(super) struct TwoLevelAnalysis {
 
 #[derive(Debug)]
 enum SmootherAnalysis {
-    Incomplete(Arc<IncompleteAnalysis>),
+    /// With the structure of `Pᵀ K`.
+    Incomplete(Arc<IncompleteAnalysis>, Arc<CsrStructure>),
     GaussSeidel(Arc<GaussSeidelAnalysis>),
 }
 
@@ -77,7 +79,10 @@ impl TwoLevelAnalysis {
                 let sets = blocks(matrix, &transfer);
                 SmootherAnalysis::GaussSeidel(Arc::new(GaussSeidelAnalysis::new(&matrix.structure, &sets)?))
             }
-            _ => SmootherAnalysis::Incomplete(incomplete_analysis(matrix)),
+            _ => SmootherAnalysis::Incomplete(
+                incomplete_analysis(matrix),
+                transfer.restricted_structure(&matrix.structure),
+            ),
         };
         Ok(Arc::new(Self { transfer, structure, coarse, smoother }))
     }
@@ -91,7 +96,9 @@ impl TwoLevelAnalysis {
             multiplications: self.coarse.multiplications(),
         };
         let smoother = match &self.smoother {
-            SmootherAnalysis::Incomplete(_) => Costs::incomplete(&sizes).with_product(&sizes),
+            SmootherAnalysis::Incomplete(_, restricted) => {
+                Costs::incomplete(&sizes).with_product(restricted.columns.len())
+            }
             SmootherAnalysis::GaussSeidel(own) => Costs::gauss_seidel(&sizes, &own.sizes()),
         };
         smoother.and(Costs::complete(Method::DirectSingle, &coarse))
@@ -100,7 +107,9 @@ impl TwoLevelAnalysis {
     /// Memory of both factors and the transfer [bytes].
     pub(super) fn bytes(&self) -> usize {
         let smoother = match &self.smoother {
-            SmootherAnalysis::Incomplete(analysis) => analysis.bytes::<c32>(),
+            SmootherAnalysis::Incomplete(analysis, restricted) => {
+                analysis.bytes::<c32>() + restricted.columns.len() * SINGLE_ENTRY
+            }
             SmootherAnalysis::GaussSeidel(analysis) => analysis.bytes(),
         };
         self.coarse.factor_entries() * size_of::<c32>() + smoother + self.transfer.bytes()
@@ -144,7 +153,8 @@ pub(super) struct TwoLevel {
 
 #[derive(Debug)]
 enum Smoother {
-    Incomplete(Unscaled),
+    /// With `Pᵀ K`.
+    Incomplete(Unscaled, CsrMatrix<c32>),
     GaussSeidel(GaussSeidel),
 }
 
@@ -157,9 +167,10 @@ impl TwoLevel {
         let coarse = analysis.transfer.coarse_matrix(&analysis.structure, matrix);
         let coarse = Scaled::complete(&analysis.coarse, &coarse, None)?;
         let smoother = match &analysis.smoother {
-            SmootherAnalysis::Incomplete(incomplete) => {
-                Smoother::Incomplete(Unscaled::new(incomplete, matrix, DIAGONAL_FACTOR)?)
-            }
+            SmootherAnalysis::Incomplete(incomplete, restricted) => Smoother::Incomplete(
+                Unscaled::new(incomplete, matrix, DIAGONAL_FACTOR)?,
+                analysis.transfer.restricted_matrix(restricted, matrix),
+            ),
             SmootherAnalysis::GaussSeidel(own) => Smoother::GaussSeidel(GaussSeidel::new(own, matrix)?),
         };
         Ok(Self { analysis: Arc::clone(analysis), smoother, coarse })
@@ -168,7 +179,9 @@ impl TwoLevel {
     /// Memory of both factors [bytes].
     pub(super) fn bytes(&self) -> usize {
         let smoother = match &self.smoother {
-            Smoother::Incomplete(factor) => factor.bytes(),
+            Smoother::Incomplete(factor, restricted) => {
+                factor.bytes() + restricted.values.len() * SINGLE_ENTRY
+            }
             Smoother::GaussSeidel(own) => own.bytes(),
         };
         smoother + self.coarse.bytes()
@@ -177,36 +190,41 @@ impl TwoLevel {
     /// Moves `x` so that the residual `b − K x` has no coarse part: where a deflated iteration starts.
     pub(super) fn start(&self, matrix: &CsrMatrix<c64>, b: &[c64], x: &mut [c64]) {
         let mut rest = vec![c64::default(); b.len()];
-        residual(matrix, b, x, &mut rest);
-        self.correct(&rest, x);
+        matrix.mul(x, &mut rest);
+        subtract_from(b, &mut rest);
+        self.add_coarse_solution(&self.analysis.transfer.restrict(&rest), x);
     }
 
-    /// Overwrites `z` with `M⁻¹ r`; `matrix` is the one that is solved with.
-    pub(super) fn apply(&self, matrix: &CsrMatrix<c64>, r: &[c64], z: &mut [c64]) {
-        let mut rest = vec![c64::default(); r.len()];
-        match &self.smoother {
-            Smoother::Incomplete(factor) => {
-                factor.apply(r, z);
-                residual(matrix, r, z, &mut rest);
-            }
-            Smoother::GaussSeidel(own) => own.apply(r, z, &mut rest),
-        }
-        self.correct(&rest, z);
-    }
-
-    /// `z += Q r`.
-    fn correct(&self, r: &[c64], z: &mut [c64]) {
+    /// Overwrites `z` with `M⁻¹ r`.
+    pub(super) fn apply(&self, r: &[c64], z: &mut [c64]) {
         let transfer = &self.analysis.transfer;
-        let restricted = transfer.restrict(r);
-        let mut coarse = vec![c64::default(); restricted.len()];
-        self.coarse.apply(&restricted, &mut coarse);
-        transfer.add_prolongation(&coarse, z);
+        let rest = match &self.smoother {
+            Smoother::Incomplete(factor, restricted) => {
+                factor.apply(r, z);
+                let mut rest = vec![c64::default(); transfer.coarse_count()];
+                restricted.mul(z, &mut rest);
+                subtract_from(&transfer.restrict(r), &mut rest);
+                rest
+            }
+            Smoother::GaussSeidel(own) => {
+                let mut rest = vec![c64::default(); r.len()];
+                own.apply(r, z, &mut rest);
+                transfer.restrict(&rest)
+            }
+        };
+        self.add_coarse_solution(&rest, z);
+    }
+
+    /// `z += P (Pᵀ K P)⁻¹ r` for a coarse right side.
+    fn add_coarse_solution(&self, r: &[c64], z: &mut [c64]) {
+        let mut coarse = vec![c64::default(); r.len()];
+        self.coarse.apply(r, &mut coarse);
+        self.analysis.transfer.add_prolongation(&coarse, z);
     }
 }
 
-/// `rest = r − K z`.
-fn residual(matrix: &CsrMatrix<c64>, r: &[c64], z: &[c64], rest: &mut [c64]) {
-    matrix.mul(z, rest);
+/// `rest ← r − rest`.
+fn subtract_from(r: &[c64], rest: &mut [c64]) {
     rest.par_chunks_mut(ROWS).zip(r.par_chunks(ROWS)).for_each(|(rest, r)| {
         rest.iter_mut().zip(r).for_each(|(rest, r)| *rest = r - *rest);
     });
