@@ -5,7 +5,7 @@ use std::path::Path;
 use fluxmorph_geometry::tet4::{centroid, volume};
 
 use crate::support::device::{IN_A_MOVING_GAP, written};
-use crate::support::folder::{RunFolder, number, scalars, vectors};
+use crate::support::folder::{RunFolder, list, number, scalars, vectors};
 use crate::support::markup::elements;
 use crate::support::program::{finish, folder};
 
@@ -73,6 +73,25 @@ fn the_deviation_from_the_mean_has_its_sign_and_adds_up_to_the_homogeneity() {
     let rms = (all.iter().map(|(d, v, ..)| v * d * d).sum::<f64>() / total).sqrt() / mean;
     let expected = 1e-6 * number(&result, "/objective/rms_ppm");
     assert!((rms / expected - 1.0).abs() < 1e-9, "{rms} {expected}");
+}
+
+#[test]
+fn the_homogeneity_of_a_worst_case_is_that_of_the_worst_term() {
+    let home = folder();
+    let whole = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"volume\"";
+    let term = |region: &str| {
+        format!("[[objective.terms]]\nkind = \"homogeneity\"\ndirection = [0, 0, 1]\nregion = \"{region}\"\n")
+    };
+    let worst = format!("combine = \"worst_case\"\n{}{}", term("observation"), term("iron"));
+    let out = home.path().join("out");
+    let device = written("block", home.path(), &[AT_REST[0], AT_REST[1], (whole, &worst)]);
+    finish(&mut device.command("solve", &out)).completed();
+    let result = RunFolder(out).result();
+    let rms = 1e-6 * number(&result, "/objective/rms_ppm");
+    let value = number(&result, "/objective/best");
+    assert!((rms * rms / value - 1.0).abs() < 1e-9, "{rms} {value}");
+    let terms = list(&result, "/objective/terms").iter().map(|term| number(term, "/value"));
+    assert!(terms.clone().fold(0.0, f64::max) == value && terms.clone().next() != Some(value), "the second");
 }
 
 /// Little is left of a field that is nearly uniform in a small ball, and nothing is said of what lies outside.

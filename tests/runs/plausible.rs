@@ -50,6 +50,10 @@ fn steel_beyond_saturation_is_named_with_its_place() {
     for part in ["iron beyond saturation: |B| in `plate` reaches", "T at 60 Hz, at (", "beyond 2 T"] {
         assert!(found.contains(part), "no `{part}` in: {found}");
     }
+    // Of an impedance surface it is the field along it.
+    let surface = solve(&out, &[]);
+    assert!(surface.contains("iron beyond saturation: |B| in `plate` reaches"), "{surface}");
+    assert!(!solve(&out, &["coils[0].ampere_turns=\"100 A\""]).contains("saturation"));
     // Copper has no polarisation, whatever its field.
     let copper = [&MESHED[..], &["materials.steel.relative_permeability=1"]].concat();
     assert!(!solve(&out, &copper).contains("saturation"));
@@ -118,12 +122,38 @@ fn two_windings_at_one_place_are_warned_of() {
     let text = read_text(&quick());
     let start = text.find("[[coils]]").expect("a coil");
     let coil = &text[start..text.find("[boundaries]").expect("boundaries")];
-    let twice = text.replace(coil, &format!("{coil}{}", coil.replace("name = \"coil\"", "name = \"twin\"")));
-    let config = home.path().join("twice.toml");
-    std::fs::write(&config, twice).expect("written");
-    let json = finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json();
-    let found = texts(&json["warnings"]);
-    assert!(found.contains("`coil` and `twin` are the same winding at the same place"), "{found}");
+    let beside = |height: &str| {
+        let twin = coil.replace("name = \"coil\"", "name = \"twin\"").replace("\"60 mm\"]", height);
+        let config = home.path().join("twice.toml");
+        std::fs::write(&config, text.replace(coil, &format!("{coil}{twin}"))).expect("written");
+        texts(&finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json()["warnings"])
+    };
+    let same = beside("\"60 mm\"]");
+    assert!(same.contains("`coil` and `twin` are the same winding at the same place"), "{same}");
+    // Windings 40 mm high.
+    let overlapping = beside("\"80 mm\"]");
+    assert!(
+        overlapping.contains("the windings of the coils `coil` and `twin` overlap, at ("),
+        "{overlapping}"
+    );
+    assert_eq!(beside("\"120 mm\"]"), "");
+}
+
+#[test]
+fn a_frequency_at_which_the_field_is_a_wave_is_asked_about() {
+    // The mesh is 1.3 m from corner to corner.
+    assert!(check(&["analysis.frequency=\"100 MHz\""]).contains("a wave in air is 2.998 m long"));
+    assert!(!check(&["analysis.frequency=\"10 MHz\""]).contains("wave"));
+}
+
+#[test]
+fn a_curve_in_another_unit_is_asked_about() {
+    let with = |field: &str| {
+        let curve = format!("materials.steel.bh=[[{field}, 0.5], [4000, 1.8], [2e5, 2.36]]");
+        check(&[&MESHED[..], &["analysis.elements=edge", &curve]].concat())
+    };
+    assert!(with("0.1").contains("more than any material: is H in A/m?"));
+    assert!(!with("100").contains("is H in A/m?"));
 }
 
 #[test]
@@ -149,6 +179,8 @@ fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
     };
     let air = of("observation");
     assert!(air.contains("no force acts on the body `body`: nothing in `observation`"), "{air}");
+    // The air around it holds the winding, whose force it is.
+    assert!(!of("air").contains("no force acts"));
     let part = of("tip");
     assert!(part.contains("`body` is joined to the iron of `iron`"), "{part}");
     let alone = finish(&mut command(&[&"check", &repository("configs/actuator.toml"), &"--json"]));

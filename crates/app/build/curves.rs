@@ -9,6 +9,7 @@ use fluxmorph_geometry::io::open_regular;
 use fluxmorph_solver::BhCurve;
 use fluxmorph_solver::bh::{Analytic, Knee};
 
+use super::plausible::MOST_PERMEABILITY;
 use super::steels;
 use crate::config::{Config, Diagnostic, KneeWord, Material, SourceMap, WrittenCurve};
 use crate::error::Error;
@@ -75,12 +76,22 @@ impl Curves {
                 )
             })
         };
+        let steep = |(name, curve): (&String, &Arc<BhCurve>)| {
+            let permeability = curve.largest_permeability();
+            (permeability > MOST_PERMEABILITY).then(|| {
+                format!(
+                    "materials.{name}: the B–H curve has a relative permeability of {permeability:.1e}, more than any material: is H in \
+                     A/m?"
+                )
+            })
+        };
         let approximation = (!self.is_static && !self.curves.is_empty()).then(|| {
             "iron with a B–H curve above 0 Hz: each amplitude follows the curve, and of what alternates the fundamental alone is \
              computed (effective reluctivity); that is an approximation"
                 .to_owned()
         });
-        self.curves.iter().filter_map(warning).chain(approximation).collect()
+        let of_curves = self.curves.iter().flat_map(|own| [steep(own), warning(own)]);
+        of_curves.flatten().chain(approximation).collect()
     }
 }
 

@@ -40,6 +40,7 @@ pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
 pub use names::with_names;
 pub use outline::{Outline, OutlinedDesign, outline};
+pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
 pub use skin::Audited;
 pub(crate) use skin::result_warnings;
@@ -173,7 +174,7 @@ fn problem_on(
         let coils = coils.as_deref().unwrap_or_default();
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);
         sink.take(source.check(faults).map_err(Error::from))?;
-        warnings.extend(plausible::warnings(config, &full_mesh));
+        warnings.extend(plausible::warnings(config, &full_mesh, coils));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());

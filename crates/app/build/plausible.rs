@@ -31,13 +31,19 @@ const LEAST_PERMEABILITY: f64 = 0.9;
 const OF_METALS_IN_MS: RangeInclusive<f64> = 10.0..=65.0;
 
 /// Relative permeability that no material has: annealed permalloy has 10⁶.
-const MOST_PERMEABILITY: f64 = 2e6;
+pub(super) const MOST_PERMEABILITY: f64 = 2e6;
 
 /// Conductivity that no metal has at room temperature [S/m]: silver has 6.3e7.
 const MOST_CONDUCTIVITY: f64 = 7e7;
 
 /// Remanence that no magnet has [T]: neodymium has 1.5.
 const MOST_REMANENCE: f64 = 2.0;
+
+/// Speed of light [m/s].
+const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
+/// Part of a wave's length that a quasi-static field may take: a tenth of it changes phases by 36°.
+const LARGEST_PART_OF_A_WAVE: f64 = 0.1;
 
 /// Part of a unit vector along a plane, or across it, that is more than rounding.
 const INCLINED: f64 = 1e-3;
@@ -103,9 +109,11 @@ fn strands_in_iron(config: &Config, source: &SourceMap, i: usize) -> Option<Diag
     })
 }
 
-/// What is rarely meant.
-pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+/// What is rarely meant; `coils` are those of the configuration.
+pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
+    warnings.extend(wave_warning(config, mesh));
+    warnings.extend(overlap_warnings(config, mesh, coils));
     for (i, coil) in config.coils.iter().enumerate() {
         if let Some(twin) = config.coils[..i].iter().find(|earlier| earlier.shape == coil.shape) {
             warnings.push(format!(
@@ -151,9 +159,69 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         own.remanence.map(|remanence| magnet_warnings(config, mesh, (name, remanence))).unwrap_or_default()
     }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
-    warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, body)));
+    warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
     warnings.extend(unit_hint(config, mesh));
     warnings
+}
+
+/// What to say of a frequency at which the field would be a wave: neglected displacement currents are no longer small.
+fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
+    let frequency = config.frequencies().into_iter().fold(0.0, f64::max);
+    let (length, size) = (SPEED_OF_LIGHT / frequency, size(mesh));
+    (size > LARGEST_PART_OF_A_WAVE * length).then(|| {
+        format!(
+            "at {frequency:e} Hz a wave in air is {length:.3} m long, and the mesh is {size:.3} m from corner to corner: displacement \
+             currents, which are left out, are no longer small there"
+        )
+    })
+}
+
+/// What to say of analytic windings that take the same place.
+fn overlap_warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
+    let all: Vec<(usize, &Racetrack)> = windings(coils).collect();
+    let mut warnings = Vec::new();
+    for (k, &(i, first)) in all.iter().enumerate() {
+        for &(j, second) in &all[k + 1..] {
+            let both = |x: &Point| flows(first, x) && flows(second, x);
+            let vertices = |e: usize| mesh.vertices(ElementId::new(e));
+            let common =
+                (0..mesh.topology().tets().len()).find_map(|e| places(vertices(e)).into_iter().find(both));
+            // The same winding twice is said elsewhere.
+            if let Some(place) = common.filter(|_| config.coils[i].shape != config.coils[j].shape) {
+                warnings.push(format!(
+                    "the windings of the coils `{}` and `{}` overlap, at {}: two wires cannot be in one place",
+                    config.coils[i].name,
+                    config.coils[j].name,
+                    millimetres(place)
+                ));
+            }
+        }
+    }
+    warnings
+}
+
+/// The analytic windings, by the numbers of their coils.
+fn windings(coils: &[coil::Coil]) -> impl Iterator<Item = (usize, &Racetrack)> {
+    coils.iter().enumerate().filter_map(|(i, coil)| match &coil.shape {
+        coil::CoilShape::Racetrack(winding) => Some((i, winding)),
+        _ => None,
+    })
+}
+
+/// Whether a winding has current at a place.
+fn flows(winding: &Racetrack, x: &Point) -> bool {
+    norm(winding.current_density(*x)) > 0.0
+}
+
+/// Where the current of a winding flows in elements that are asked for.
+fn place_of_current(
+    mesh: &Mesh,
+    winding: &Racetrack,
+    is_wanted: impl Fn(ElementId) -> bool,
+) -> Option<(ElementId, Point)> {
+    mesh.topology().elements().filter(|&e| is_wanted(e)).find_map(|e| {
+        places(mesh.vertices(e)).into_iter().find(|x| flows(winding, x)).map(|place| (e, place))
+    })
 }
 
 /// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.
@@ -258,7 +326,7 @@ pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &M
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
-fn force_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<String> {
+fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &ForceBody) -> Option<String> {
     let topology = mesh.topology();
     let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
     let acts = |name: &String| {
@@ -268,7 +336,10 @@ fn force_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<Strin
         is_iron(name) || is_magnet || conducts || config.coils.iter().any(is_wound)
     };
     let (name, regions) = (&body.name, body.regions.join("`, `"));
-    if !body.regions.iter().any(acts) {
+    let is_own = |e: ElementId| body.regions.iter().any(|name| name == topology.region_name_at(e));
+    let holds_a_coil =
+        || windings(coils).any(|(_, winding)| place_of_current(mesh, winding, is_own).is_some());
+    if !body.regions.iter().any(acts) && !holds_a_coil() {
         return Some(format!(
             "no force acts on the body `{name}`: nothing in `{regions}` is magnetic or carries a current, and what is computed is \
              that on what lies beside it"
@@ -336,14 +407,9 @@ fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(Regio
         own.relative_permeability != 1.0 || replaced || (changes && own.conductivity > 0.0)
     };
     let matter: Vec<bool> = topology.region_names().iter().map(is_matter).collect();
-    let flows = |x: &Point| norm(winding.current_density(*x)) > 0.0;
-    (0..topology.tets().len()).map(|e| topology.region_of()[e]).enumerate().find_map(|(e, region)| {
-        if !matter[region.index()] {
-            return None;
-        }
-        let vertices = mesh.vertices(ElementId::new(e));
-        places(vertices).into_iter().find(flows).map(|place| (region, place))
-    })
+    let region = |e: ElementId| topology.region_of()[e.index()];
+    let (e, place) = place_of_current(mesh, winding, |e| matter[region(e).index()])?;
+    Some((region(e), place))
 }
 
 /// Places in an element at which it is looked at: inside it, for on its faces another material may begin.

@@ -48,7 +48,7 @@ pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
 }
 
 /// Every functional of the configuration with its key path: terms of the objective, then constraints.
-pub(super) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {
+pub(crate) fn functionals(config: &Config) -> Vec<(String, &config::Functional)> {
     let terms = config.objective.iter().flat_map(|objective| {
         let terms = objective.terms().iter().enumerate();
         terms.map(|(k, term)| (objective.path(k), &term.functional))

@@ -176,8 +176,8 @@ pub struct ObjectiveResult {
     pub terms: Vec<TermResult>,
 }
 
-/// How homogeneous the field is at the best design, at the first frequency of the term.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// How homogeneous the field is at the best design, at the first frequency of the term; of a worst case that of the worst one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HomogeneityResult {
     /// The mean of what is compared: of vectors, the modulus of their mean [T].
     pub mean_b_t: f64,
@@ -187,6 +187,9 @@ pub struct HomogeneityResult {
     pub initial_rms_ppm: Option<f64>,
     /// Largest less smallest value over the mean, in parts per million; of vectors, of their part along the mean.
     pub peak_to_peak_ppm: f64,
+    /// The load that it is of; `None` where there are no loads.
+    #[serde(default)]
+    pub under_load: Option<String>,
 }
 
 /// The gain of a run computed again on a mesh that the optimiser never saw.

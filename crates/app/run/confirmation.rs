@@ -13,7 +13,7 @@ use fluxmorph_remesh::Moved;
 
 use super::Session;
 use super::estimate::{Estimator, left_out};
-use super::facets::{curved_facets, described};
+use super::facets::{curved_facets, described, is_empty};
 use super::finer::{Cut, FinerProblem};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
@@ -213,7 +213,7 @@ impl Session<'_> {
         shape: Option<&Mesh>,
         observer: &mut dyn Observer,
     ) -> Option<CurvedFacets> {
-        let of_shape = shape.and_then(curved_facets);
+        let of_shape = shape.and_then(|mesh| curved_facets(mesh, |name| is_empty(self.config, name)));
         let off = |facets: &Option<CurvedFacets>| facets.as_ref().map_or(0.0, |facets| facets.off_m);
         let facets = if off(&of_shape) > off(&self.facets) { of_shape } else { self.facets.clone() }?;
         observer.notice(&described(&facets));

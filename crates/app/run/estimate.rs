@@ -93,7 +93,7 @@ impl<'a> Estimator<'a> {
                 if self.effort == Effort::Affordable =>
             {
                 left_out(
-                    "that would take iterations worth more than three evaluations; accuracy.estimate = true has the time",
+                    "it was given up after as much work as three evaluations take; accuracy.estimate = true goes on",
                     observer,
                 )
             }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
+use crate::build::functionals;
+use crate::config::{Coil, CoilShape, Config};
 use crate::files::CurvedFacets;
 
 /// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
@@ -32,16 +34,18 @@ fn is_smooth(a: &Face, b: &Face) -> bool {
     a.between == b.between && dot(a.area, b.area) > SMOOTH * norm(a.area) * norm(b.area)
 }
 
-/// The edge whose middle is farthest off the surface that its facets stand for; `None` where no surface is curved.
-pub(super) fn curved_facets(mesh: &Mesh) -> Option<CurvedFacets> {
+/// The edge whose middle is farthest off the surface that its facets stand for; `None` where no surface is curved. Between two
+/// regions that are `empty` there is none: nothing changes there.
+pub(super) fn curved_facets(mesh: &Mesh, empty: impl Fn(&str) -> bool) -> Option<CurvedFacets> {
     let topology = mesh.topology();
+    let empty: Vec<bool> = topology.region_names().iter().map(|name| empty(name)).collect();
     let region = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()].index();
     let of = |facet: &fluxmorph_geometry::topology::Facet| {
         let between = (region(facet.inside), facet.outside.map(region));
         let area = area_vector(facet.nodes.map(|n| mesh.point(n)));
         // One direction for both orders of the regions.
         match between {
-            (own, Some(other)) if own == other => None,
+            (own, Some(other)) if own == other || empty[own] && empty[other] => None,
             (own, Some(other)) if own > other => {
                 Some(Face { nodes: facet.nodes, between: (other, Some(own)), area: area.map(|c| -c) })
             }
@@ -83,6 +87,14 @@ pub(super) fn curved_facets(mesh: &Mesh) -> Option<CurvedFacets> {
     })
 }
 
+/// Whether a region is air in which nothing flows and nothing is measured.
+pub(super) fn is_empty(config: &Config, name: &str) -> bool {
+    let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == name);
+    !config.regions.contains_key(name)
+        && !config.coils.iter().any(is_wound)
+        && !functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
+}
+
 /// What no refinement takes away, in words.
 pub(super) fn described(found: &CurvedFacets) -> String {
     format!(
@@ -107,7 +119,7 @@ mod tests {
     fn the_facets_of_a_ball_are_off_it_by_the_height_of_their_arcs() {
         let parameters = SphereParameters { radius: 0.05, divisions: 6, ..SphereParameters::default() };
         let mesh = sphere(&parameters).expect("a ball");
-        let found = curved_facets(&mesh).expect("it is curved");
+        let found = curved_facets(&mesh, |_| false).expect("it is curved");
         // The outer sphere is the larger one, and only the outside.
         assert_eq!(found.surface, "air|sphere");
         let radius = parameters.radius;
@@ -119,9 +131,11 @@ mod tests {
         assert!((found.off_m / height - 1.0).abs() < 0.1, "{} {height}", found.off_m);
         assert!((radius - norm(found.at_m) - height).abs() < 0.2 * height);
         let finer = uniform(&mesh, RefineLimits::default()).expect("finer");
-        let kept = curved_facets(finer.mesh()).expect("it is curved");
+        let kept = curved_facets(finer.mesh(), |_| false).expect("it is curved");
         assert!(kept.off_m > 0.1 * height, "{} {height}", kept.off_m);
+        let outside = curved_facets(&mesh, |_| true).expect("it is a ball as a whole");
+        assert_eq!(outside.surface, "air|outside");
         let flat = block(&BlockParameters { size: [0.1; 3], cells: [3; 3] }).expect("a block");
-        assert_eq!(curved_facets(&flat), None);
+        assert_eq!(curved_facets(&flat, |_| false), None);
     }
 }

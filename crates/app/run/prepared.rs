@@ -5,7 +5,7 @@ use std::time::Instant;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 
-use super::facets::curved_facets;
+use super::facets::{curved_facets, is_empty};
 use super::{Options, Session, mesh_hash, table_hashes};
 use crate::build::{Mode, Setup, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
@@ -39,7 +39,7 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
-        let facets = curved_facets(&setup.full_mesh);
+        let facets = curved_facets(&setup.full_mesh, |name| is_empty(config, name));
         Ok(Self { setup, config, source, facets, options, clock })
     }
 

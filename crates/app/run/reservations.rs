@@ -5,10 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::{FieldModel, FieldSolution};
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
 use crate::build::{Setup, material, result_warnings};
 use crate::config::{Config, Goal};
@@ -22,13 +23,25 @@ const SATURATION: f64 = 2.0;
 const TOLERATED_SHARE: f64 = 1e-3;
 
 /// Iron that is driven beyond saturation.
+#[derive(Default)]
 struct Saturated {
     /// Highest flux density [T] and the middle of its element [m].
     highest: (f64, Point),
-    /// Volume beyond saturation [m³].
+    /// Volume beyond saturation [m³]; of an impedance surface area [m²].
     beyond: f64,
-    /// Volume of the region [m³].
+    /// Volume of the region, or area of its surface.
     whole: f64,
+}
+
+impl Saturated {
+    /// Adds a part of this size with a flux density [T], of which the iron has a `share`.
+    fn add(&mut self, size: f64, (flux_density, share): (f64, f64), middle: Point) {
+        self.whole += size;
+        self.beyond += if share * flux_density > SATURATION { size } else { 0.0 };
+        if flux_density > self.highest.0 {
+            self.highest = (flux_density, middle);
+        }
+    }
 }
 
 /// All that is to be said of the design of an analysis.
@@ -79,7 +92,7 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
         .collect()
 }
 
-/// Meshed iron beyond saturation, by region.
+/// Iron beyond saturation, by region.
 fn saturated(
     config: &Config,
     model: &FieldModel,
@@ -88,8 +101,8 @@ fn saturated(
 ) -> BTreeMap<String, Saturated> {
     let mesh = &analysis.mesh;
     let topology = mesh.topology();
-    // The polarisation is B (1 − 1/µ): what the region adds to the field of air. A material with a curve has µ = 1 here.
-    let share = |name: &String| 1.0 - 1.0 / material(config, name).relative_permeability;
+    // A material with a curve has µ = 1 here.
+    let share = |name: &String| polarised_share(material(config, name).relative_permeability);
     let shares: Vec<f64> = topology.region_names().iter().map(share).collect();
     let share_at = |e: &ElementId| shares[topology.region_of()[e.index()].index()];
     // With a B–H curve the polarisation is that of the steel.
@@ -97,19 +110,28 @@ fn saturated(
     let iron: Vec<ElementId> = topology.elements().filter(is_iron).collect();
     let mut found: BTreeMap<String, Saturated> = BTreeMap::new();
     for (&e, b) in iron.iter().zip(solution.flux_densities_of(model, mesh, &iron)) {
-        let magnitude = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-        let own = found.entry(topology.region_name_at(e).to_owned()).or_insert(Saturated {
-            highest: (0.0, [0.0; 3]),
-            beyond: 0.0,
-            whole: 0.0,
-        });
-        let size = volume(mesh.vertices(e));
-        own.whole += size;
-        own.beyond += if share_at(&e) * magnitude > SATURATION { size } else { 0.0 };
-        if magnitude > own.highest.0 {
-            own.highest = (magnitude, centroid(mesh.vertices(e)));
-        }
+        let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let own = found.entry(topology.region_name_at(e).to_owned()).or_default();
+        own.add(volume(mesh.vertices(e)), (size, share_at(&e)), centroid(mesh.vertices(e)));
+    }
+    for (index, nodes, loss) in solution.surface_losses(model, mesh) {
+        let conductor = &model.conductors()[index];
+        let SurfaceLaw::Impedance(material) = conductor.law else { continue };
+        let Some(depth) = material.skin_depth(model.angular_frequency()) else { continue };
+        let vertices = nodes.map(|n| mesh.point(n));
+        let area = norm(area_vector(vertices));
+        // The loss of a field H along the surface is ½|H|²/(σδ) an area.
+        let field = (2.0 * loss / area * material.conductivity * depth).sqrt();
+        let flux_density = VACUUM_PERMEABILITY * material.relative_permeability * field;
+        let share = polarised_share(material.relative_permeability);
+        let own = found.entry(conductor.name.clone()).or_default();
+        own.add(area, (flux_density, share), centroid(vertices));
     }
     found.retain(|_, own| own.beyond > TOLERATED_SHARE * own.whole);
     found
+}
+
+/// The polarisation is `B (1 − 1/µ)`: what the region adds to the field of air.
+fn polarised_share(relative_permeability: f64) -> f64 {
+    1.0 - 1.0 / relative_permeability
 }

@@ -8,7 +8,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::objective::{Combination, Term};
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Measured, Problem, Shape, Timings};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
@@ -337,21 +337,27 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
     terms.zip(&analysis.terms).map(of).collect()
 }
 
-/// How homogeneous the field of an analysis is, for the first term that asks; `initial` is the objective at the initial design.
+/// How homogeneous the field of an analysis is, for the first term that asks, of a worst case the one that is least so; `initial` is
+/// the objective at the initial design.
 pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) -> Option<HomogeneityResult> {
-    let terms = &problem.objective()?.terms;
-    let quality = |term: &Term| {
+    let objective = problem.objective()?;
+    let terms = &objective.terms;
+    let mut qualities = terms.iter().filter_map(|term| {
         let index = *term.states.first()?;
         let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
-        term.functional.field_quality(model, &analysis.mesh, solution)
-    };
-    let quality = terms.iter().find_map(quality)?;
+        Some((term.functional.field_quality(model, &analysis.mesh, solution)?, model))
+    });
+    let (quality, model) = match objective.combination {
+        Combination::Sum => qualities.next(),
+        Combination::WorstCase => qualities.max_by(|a, b| a.0.rms.total_cmp(&b.0.rms)),
+    }?;
     let is_alone = matches!(terms.as_slice(), [term] if term.weight == 1.0 && term.states.len() == 1);
     Some(HomogeneityResult {
         mean_b_t: quality.mean,
         rms_ppm: 1e6 * quality.rms,
         initial_rms_ppm: is_alone.then(|| 1e6 * initial.sqrt()),
         peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
+        under_load: model.setup().load_case.clone(),
     })
 }
 

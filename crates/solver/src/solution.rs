@@ -226,6 +226,20 @@ impl FieldSolution {
             .collect()
     }
 
+    /// Time-averaged loss [W] under every triangle of an impedance surface, with the number of the conductor and the triangle.
+    pub fn surface_losses(&self, model: &FieldModel, mesh: &Mesh) -> Vec<(usize, [NodeId; 3], f64)> {
+        let of = |(nodes, term): ([NodeId; 3], SurfaceTerm)| {
+            let SurfaceTerm::Impedance(coefficient, index) = term else { return None };
+            let vertices = nodes.map(|n| mesh.point(n));
+            let field = self.local(model, &model.space().triangle(nodes));
+            // ½ω²Re(1/Zs), and the real part ωRe(1/Zs) of the surface coefficient.
+            let factor = 0.5 * model.angular_frequency() * coefficient.re;
+            let loss = model.space().elements().surface_loss(vertices, factor, field.values()).value;
+            Some((index, nodes, loss))
+        };
+        model.surface().filter_map(of).collect()
+    }
+
     /// Time-averaged loss density [W/m³] of every element: `½σ|E|²` averaged exactly over the element.
     pub fn loss_densities(&self, model: &FieldModel, mesh: &Mesh) -> Vec<f64> {
         self.loss_densities_of(model, mesh, &all(model))
@@ -263,16 +277,7 @@ impl FieldSolution {
             .map(|r| (topology.region_names()[r].clone(), by_region[r]))
             .collect();
         let mut by_surface = vec![0.0; model.conductors().len()];
-        for (nodes, term) in model.surface() {
-            if let SurfaceTerm::Impedance(coefficient, index) = term {
-                let vertices = nodes.map(|n| mesh.point(n));
-                let field = self.local(model, &model.space().triangle(nodes));
-                // ½ω²Re(1/Zs), and the real part ωRe(1/Zs) of the surface coefficient.
-                let factor = 0.5 * model.angular_frequency() * coefficient.re;
-                by_surface[index] +=
-                    model.space().elements().surface_loss(vertices, factor, field.values()).value;
-            }
-        }
+        self.surface_losses(model, mesh).into_iter().for_each(|(index, _, loss)| by_surface[index] += loss);
         losses.extend(model.conductors().iter().zip(by_surface).map(|(c, loss)| (c.name.clone(), loss)));
         losses
     }

@@ -88,6 +88,25 @@ fn a_quality_that_no_step_keeps_ends_at_the_mesh_limit() {
     assert_eq!(notes.0.iter().filter(|note| note.contains("the search goes on within")).count(), 3);
 }
 
+/// The method comes to its bounds from outside, by a few millionths, in whatever many steps.
+#[test]
+fn a_design_that_gains_much_and_is_beyond_a_bound_by_little_is_told() {
+    let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 1.02 }]";
+    let (mut problem, settings) = quick(&[loss]);
+    let settings = Optimizer { algorithm: Algorithm::Slsqp, max_evaluations: 5, ..settings };
+    let mut notes = Notes::default();
+    let (optimised, rows) = optimised(&mut problem, &settings, &mut notes);
+    let said =
+        notes.0.iter().find(|note| note.contains("of the best design, and does not count")).expect("a note");
+    let near =
+        rows.iter().position(|row| row.objective < 0.99 * optimised.best.objective).expect("a better one");
+    assert!(said.starts_with(&format!("evaluation {near} has an objective")), "{said}");
+    assert!(
+        said.contains("beyond the bound of `loss_plate` by") && optimised.best.violation == 0.0,
+        "{said}"
+    );
+}
+
 /// The mesh that moves ends 15 mm below a face that would move by 20 mm.
 const LID: &str = "mesh.shield.remesh_z=[\"-25 mm\", \"30 mm\"]";
 

@@ -3,7 +3,10 @@
 //! An extruded layer splits the prism under a triangle into tetrahedra, of which one stands on the triangle with its apex
 //! behind one of the corners. Where the two ends of an extrusion are meshed unlike, the apex lies beside the triangle: the
 //! columns lean, elements are long across the surface, and a motion of the surface shears them. Columns that cross invert
-//! elements, which no [`crate::Mesh`] has.
+//! elements, which no [`crate::Mesh`] has. A prism that lies along the surface has its apex beside the triangle too, but behind
+//! another node of the surface.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ids::{ElementId, NodeId};
 use crate::mesh::Mesh;
@@ -33,6 +36,10 @@ pub struct Leaning {
 
 /// How much the layers on either side of a surface lean; `None` where they do so on a twentieth of it or less.
 pub fn leaning_layers(mesh: &Mesh, surface: &[[NodeId; 3]]) -> Option<Leaning> {
+    let mut around: BTreeMap<NodeId, BTreeSet<NodeId>> = BTreeMap::new();
+    for nodes in surface {
+        nodes.iter().for_each(|&node| around.entry(node).or_default().extend(nodes));
+    }
     let (mut area, mut leaning) = (0.0, 0.0);
     let mut worst: Option<Leaning> = None;
     for nodes in surface {
@@ -44,6 +51,10 @@ pub fn leaning_layers(mesh: &Mesh, surface: &[[NodeId; 3]]) -> Option<Leaning> {
             let Some(apex) = apex.map(|n| mesh.point(n)) else { continue };
             let (beside, height) = (distance_beside(corners, apex), height(corners, apex));
             if height > THIN * size.sqrt() || beside < height.max(BESIDE * size.sqrt()) {
+                continue;
+            }
+            let mut near = nodes.iter().flat_map(|node| &around[node]);
+            if near.any(|&node| is_behind(area_vector(corners), mesh.point(node), apex)) {
                 continue;
             }
             leaning += size;
@@ -59,6 +70,12 @@ pub fn leaning_layers(mesh: &Mesh, surface: &[[NodeId; 3]]) -> Option<Leaning> {
 fn elements_at(mesh: &Mesh, nodes: [NodeId; 3]) -> impl Iterator<Item = ElementId> + '_ {
     let holds = move |e: &ElementId| nodes.iter().all(|n| mesh.topology().tet(*e).contains(n));
     mesh.topology().elements_around(nodes[0]).iter().copied().filter(holds)
+}
+
+/// Whether a point lies behind a node rather than beside it, along a normal.
+fn is_behind(normal: Point, node: Point, point: Point) -> bool {
+    let step = sub(point, node);
+    2.0 * norm(cross(step, normal)) < dot(step, normal).abs()
 }
 
 /// Distance of a point from the plane of a triangle [m].

@@ -170,3 +170,19 @@ fn layers_lean_where_their_columns_do() {
     let found = leaning_layers(&leaning, &top(&leaning)).expect("by 0.4 m over 0.1 m");
     assert!(found.share > 0.4 && (found.height - 0.1).abs() < 1e-12 && found.lean > 0.2, "{found:?}");
 }
+
+/// The apex of the first tetrahedron lies behind the fourth corner of the surface's quadrangle.
+#[test]
+fn a_prism_along_the_surface_does_not_lean() {
+    let points = |y: f64| [[0.0, y, 0.1], [1.0, y, 0.1], [0.0, y, 0.0]];
+    let points: Vec<Point> = points(0.0).into_iter().chain(points(1.0)).collect();
+    let positive = |[a, b, c, d]: [usize; 4]| {
+        let volume = crate::tet4::volume([a, b, c, d].map(|n| points[n]));
+        if volume < 0.0 { [a, b, d, c] } else { [a, b, c, d] }.map(NodeId::new)
+    };
+    let tets = [[0, 1, 4, 5], [0, 3, 4, 5], [0, 1, 2, 5]].map(positive).to_vec();
+    let prism = mesh(points.clone(), tets, |_| 0);
+    let top = [[0, 1, 4], [0, 3, 4]].map(|face| face.map(NodeId::new));
+    assert_eq!(leaning_layers(&prism, &top), None);
+    assert!(leaning_layers(&prism, &top[..1]).is_some(), "without the node that the apex lies behind");
+}

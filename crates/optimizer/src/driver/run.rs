@@ -6,11 +6,24 @@ use std::time::Instant;
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::promised_gain::promised_gain;
 use super::stop::Stop;
-use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
+use super::{Best, Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
 use crate::problem::{Problem, Shape, SolverCache, Timings};
+
+/// Excess over a bound, relative to it, up to which a design is worth a word that gains what none within the bounds does: few bounds
+/// are meant more exactly, and few meshes are that exact.
+const NEAR: f64 = 1e-3;
+
+/// A design that is beyond a bound by little.
+#[derive(Clone, Copy, Debug)]
+struct NearMiss {
+    evaluation: usize,
+    objective: f64,
+    /// The constraint, and its excess relative to its bound.
+    worst: (usize, f64),
+}
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
@@ -42,6 +55,8 @@ pub(super) struct Run<'a> {
     timings: Timings,
     /// What the gradient promised at the first design.
     promised: Option<f64>,
+    /// Designs that only just keep no constraint too many.
+    near_misses: Vec<NearMiss>,
     /// Times the mesh has been refined.
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
@@ -83,6 +98,7 @@ impl<'a> Run<'a> {
             worst_residual: 0.0,
             timings: Timings::default(),
             promised: None,
+            near_misses: Vec::new(),
             level: 0,
             first_evaluation: 0,
             is_shared_out,
@@ -205,6 +221,12 @@ impl<'a> Run<'a> {
         }
         self.latest = Some(sample.clone());
         self.repeated = 0;
+        let excesses = sample.constraints[..self.constraint_count()].iter().map(|(excess, _)| *excess);
+        let worst = excesses.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some(worst) = worst.filter(|(_, excess)| (CONSTRAINT_TOLERANCE..=NEAR).contains(excess)) {
+            let (evaluation, objective) = (record.row.evaluation, record.row.objective);
+            self.near_misses.push(NearMiss { evaluation, objective, worst });
+        }
         if comparison.is_improved() {
             self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
@@ -245,6 +267,15 @@ impl<'a> Run<'a> {
         Ok(reason)
     }
 
+    /// The design nearest to its bounds of those that would have gained far more than their excess is worth on a best one within them.
+    fn missed_by(&self, best: &Best) -> Option<NearMiss> {
+        let gain =
+            |missed: &NearMiss| self.goal.sign() * (best.objective - missed.objective) / best.objective.abs();
+        let is_worth_it = |missed: &&NearMiss| gain(missed) > NEAR.max(100.0 * missed.worst.1);
+        let misses = self.near_misses.iter().filter(|_| best.violation == 0.0).filter(is_worth_it);
+        misses.min_by(|a, b| a.worst.1.total_cmp(&b.worst.1)).copied()
+    }
+
     /// The outcome, with the field of the best design.
     pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
         let is_cut = stop_reason == StopReason::Interrupted && (self.is_replaying() || self.best.is_none());
@@ -268,6 +299,18 @@ impl<'a> Run<'a> {
                 "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
                  design's bounds, or allow more evaluations",
                 names.join(", of ")
+            ));
+        }
+        if let Some(missed) = self.missed_by(&best) {
+            let (k, excess) = missed.worst;
+            self.warn(&format!(
+                "evaluation {} has an objective of {:.6e}, against {:.6e} of the best design, and does not count: it is beyond the \
+                 bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
+                 method of those that take constraints",
+                missed.evaluation,
+                missed.objective,
+                best.objective,
+                self.problem.constraints()[k].name
             ));
         }
         let is_infeasible = stop_reason.is_converged() && best.violation > 0.0;
