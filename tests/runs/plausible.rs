@@ -142,15 +142,18 @@ fn two_windings_at_one_place_are_warned_of() {
 #[test]
 fn a_frequency_at_which_the_field_is_a_wave_is_asked_about() {
     // The mesh is 1.3 m from corner to corner.
-    assert!(check(&["analysis.frequency=\"100 MHz\""]).contains("a wave in air is 2.998 m long"));
-    assert!(!check(&["analysis.frequency=\"10 MHz\""]).contains("wave"));
+    let at = |frequency| check(&["analysis.elements=edge", frequency]);
+    assert!(at("analysis.frequency=\"100 MHz\"").contains("a wave in air is 2.998 m long"));
+    assert!(!at("analysis.frequency=\"10 MHz\"").contains("wave"));
 }
 
 #[test]
 fn a_curve_in_another_unit_is_asked_about() {
     let with = |field: &str| {
-        let curve = format!("materials.steel.bh=[[{field}, 0.5], [4000, 1.8], [2e5, 2.36]]");
-        check(&[&MESHED[..], &["analysis.elements=edge", &curve]].concat())
+        let sheet = format!("materials.sheet.bh=[[{field}, 0.5], [4000, 1.8], [2e5, 2.36]]");
+        let conductivity = "materials.sheet.conductivity=\"1 MS/m\"";
+        let own = [&sheet, conductivity, "regions.plate.material=sheet", "analysis.elements=edge"];
+        check(&[&MESHED[..], &own].concat())
     };
     assert!(with("0.1").contains("more than any material: is H in A/m?"));
     assert!(!with("100").contains("is H in A/m?"));

@@ -208,6 +208,10 @@ fn problem_on(
     }
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
+    // That their points are in the mesh is no news for the end of a run.
+    for set in &config.multipoles {
+        multipole::multipoles(config, set, &mesh, &states[0])?;
+    }
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
         warnings.push(unexcited(config, source, mode)?);
     }

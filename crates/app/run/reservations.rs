@@ -12,7 +12,7 @@ use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
 use crate::build::{Setup, material, result_warnings};
-use crate::config::{Config, Goal};
+use crate::config::{Config, Goal, RegionModel};
 use crate::files::ObjectiveResult;
 
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
@@ -78,11 +78,13 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
             let beyond = saturated(config, model, solution, analysis);
             beyond.into_iter().map(move |(region, found)| {
                 let under = &under;
+                let is_surface = config.regions.get(&region).is_some_and(|own| own.model == RegionModel::Impedance);
+                let cure = if is_surface { "Mesh the region and give" } else { "Give" };
                 let (highest, place) = found.highest;
                 format!(
                     "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz{under}, at {}, and {:.1} % of it \
                      are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
-                     that of a material that does not exist. Give the material its curve (bh), lower the ampere-turns, or \
+                     that of a material that does not exist. {cure} the material its curve (bh), lower the ampere-turns, or \
                      give the iron more section",
                     millimetres(place),
                     100.0 * found.beyond / found.whole
