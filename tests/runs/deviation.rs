@@ -79,9 +79,11 @@ fn the_deviation_from_the_mean_has_its_sign_and_adds_up_to_the_homogeneity() {
 fn the_homogeneity_of_a_worst_case_is_that_of_the_worst_term() {
     let home = folder();
     let whole = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"volume\"";
-    let terms = ["[0, 0, 1]", "[1, 0, 1]"].map(|direction| {
+    // The weight makes a term the worst one whose field is the more homogeneous.
+    let terms = [("[0, 0, 1]", 1e6), ("[1, 0, 1]", 1.0)].map(|(direction, weight)| {
         format!(
-            "[[objective.terms]]\nkind = \"homogeneity\"\nregion = \"observation\"\ndirection = {direction}\n"
+            "[[objective.terms]]\nkind = \"homogeneity\"\nregion = \"observation\"\ndirection = {direction}\n\
+             weight = {weight}\n"
         )
     });
     let of = |first: usize| {
@@ -92,10 +94,10 @@ fn the_homogeneity_of_a_worst_case_is_that_of_the_worst_term() {
         let result = RunFolder(out).result();
         let rms = 1e-6 * number(&result, "/objective/rms_ppm");
         let value = number(&result, "/objective/best");
-        assert!((rms * rms / value - 1.0).abs() < 1e-9, "{rms} {value}");
+        assert!((1e6 * rms * rms / value - 1.0).abs() < 1e-9, "{rms} {value}");
         let own: Vec<f64> =
             list(&result, "/objective/terms").iter().map(|term| number(term, "/value")).collect();
-        assert!(own[0] != own[1] && own[0].max(own[1]) == value, "{own:?} {value}");
+        assert!(own[first] < own[1 - first], "{own:?}");
         value
     };
     assert_eq!(of(0), of(1));

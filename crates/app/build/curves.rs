@@ -80,8 +80,8 @@ impl Curves {
             let permeability = curve.largest_permeability();
             (permeability > MOST_PERMEABILITY).then(|| {
                 format!(
-                    "materials.{name}: the B–H curve has a relative permeability of {permeability:.1e}, more than any material: is H in \
-                     A/m?"
+                    "materials.{name}: the B–H curve has a relative permeability of {permeability:.1e}, more than any material: \
+                     is H in A/m?"
                 )
             })
         };

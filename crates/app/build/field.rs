@@ -22,8 +22,8 @@ use super::entries::material;
 use super::locate_error::DiagnosticSink;
 use super::{loads, open};
 use crate::config::{
-    self, Config, Diagnostic, FactorReuse, Objective, PetscKrylov, PetscSolver, PetscSubSolver, RegionModel,
-    SolverMethod, SourceMap,
+    self, Combination, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver,
+    RegionModel, SolverMethod, SourceMap,
 };
 use crate::error::Error;
 
@@ -215,16 +215,26 @@ fn field_model(
     Ok(FieldModel::new(mesh, load_case.applied_to(&setup))?)
 }
 
-/// Solutions that a design takes with the matrix of one frequency: of every load case the state and the adjoints of objective and
-/// constraints, and what a volt at a coil drives.
+/// Solutions that a design takes with one matrix: of every load case that shares it the state and the adjoints of objective and
+/// constraints, and what a volt at a coil drives. Along a B–H curve every load case has a matrix of its own.
 fn solutions(config: &Config, frequency: f64) -> usize {
-    let cases = config.load_cases();
-    let loads = cases.iter().filter(|case| case.frequency == frequency).count();
-    let constraints = config.constraints.iter().filter_map(|constraint| constraint.limit.functional());
-    let constraints = constraints.filter(|functional| functional.kind.is_of_field()).count();
-    let objective = usize::from(config.objective.as_ref().is_some_and(Objective::is_of_field));
+    let all = config.load_cases();
+    let mut cases: Vec<_> = all.iter().filter(|case| case.frequency == frequency).collect();
+    if config.saturating_region().is_some() {
+        cases.truncate(1);
+    }
+    let is_taken = |own: &config::Functional, case: &config::LoadCase<'_>| {
+        own.kind.is_of_field() && own.is_taken_under(case)
+    };
+    let adjoints = |case: &config::LoadCase<'_>| {
+        let terms = config.objective.iter().flat_map(|objective| objective.terms());
+        let terms = terms.filter(|term| is_taken(&term.functional, case)).count();
+        let is_worst = config.objective.as_ref().is_some_and(|own| own.combine == Combination::WorstCase);
+        let constraints = config.constraints.iter().filter_map(|constraint| constraint.limit.functional());
+        (if is_worst { terms } else { terms.min(1) }) + constraints.filter(|own| is_taken(own, case)).count()
+    };
     let voltages = config.coils.iter().filter(|coil| cases.iter().any(|case| case.feed(coil).by_voltage));
-    loads * (1 + objective + constraints) + voltages.count()
+    cases.iter().map(|case| 1 + adjoints(case)).sum::<usize>() + voltages.count()
 }
 
 /// How the linear systems are solved.
@@ -427,4 +437,25 @@ fn solid_fault(config: &Config, source: &SourceMap, coil: usize, region: &str) -
 fn remanences(config: &Config, topology: &Topology) -> Vec<[f64; 3]> {
     let of = |name: &String| config.regions.get(name).and_then(|region| region.remanence);
     topology.region_names().iter().map(|name| of(name).unwrap_or_default()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_solutions_of_a_matrix_are_those_of_all_that_share_it() {
+        let of = |overrides: &[&str], frequency: f64| {
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/shield_quick.toml");
+            let overrides: Vec<String> = overrides.iter().map(|own| (*own).to_owned()).collect();
+            let (config, _) = Config::from_file(&path, &overrides).expect("a sound configuration");
+            solutions(&config, frequency)
+        };
+        assert_eq!(of(&[], 60.0), 2, "state and adjoint");
+        let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2, load = \"b\" }]";
+        let loads =
+            "loads=[{ name = \"a\" }, { name = \"b\", amplitude = 2 }, { name = \"c\", frequency = 200 }]";
+        assert_eq!([60.0, 200.0].map(|frequency| of(&[loads], frequency)), [4, 2]);
+        assert_eq!(of(&[loads, loss], 60.0), 5, "its adjoint under one of two loads");
+    }
 }

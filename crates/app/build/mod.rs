@@ -127,10 +127,22 @@ pub fn set_up_watched(
     let mut setup = mesh::build(config, source)
         .and_then(|built| problem_on(built, config, source, mode, group, progress))
         .map_err(|error| locate_error::attribute_error(error, config, source))?;
+    if !(mode == Mode::Inspection && config.morph.is_some()) {
+        check_expansions(config, source, &setup.problem)?;
+    }
     let at_bounds =
         skin::bound_warnings(config, &setup.audits, &setup.problem, setup.designed_body.as_deref());
     setup.warnings.extend(at_bounds);
     Ok(setup)
+}
+
+/// Refuses expansions of which a point lies outside the mesh, which would fail when the run is over.
+fn check_expansions(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
+    let mut sink = DiagnosticSink::new(config, source, Vec::new());
+    for set in &config.multipoles {
+        sink.take(multipole::multipoles(config, set, problem.original(), &problem.states()[0]))?;
+    }
+    sink.check()
 }
 
 /// Sets up the problem of a configuration on a mesh that is not its own, but has its regions and surfaces; with the design
@@ -208,10 +220,6 @@ fn problem_on(
     }
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));
-    // That their points are in the mesh is no news for the end of a run.
-    for set in &config.multipoles {
-        multipole::multipoles(config, set, &mesh, &states[0])?;
-    }
     if states.iter().all(FieldModel::is_unexcited) && !motion_alone {
         warnings.push(unexcited(config, source, mode)?);
     }

@@ -39,6 +39,9 @@ const MOST_CONDUCTIVITY: f64 = 7e7;
 /// Remanence that no magnet has [T]: neodymium has 1.5.
 const MOST_REMANENCE: f64 = 2.0;
 
+/// Places along each direction at which two windings are looked at: as many as miss no overlap of a thirtieth of their common box.
+const GRID: usize = 30;
+
 /// Speed of light [m/s].
 const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
@@ -113,7 +116,7 @@ fn strands_in_iron(config: &Config, source: &SourceMap, i: usize) -> Option<Diag
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
     warnings.extend(wave_warning(config, mesh));
-    warnings.extend(overlap_warnings(config, mesh, coils));
+    warnings.extend(overlap_warnings(config, coils));
     for (i, coil) in config.coils.iter().enumerate() {
         if let Some(twin) = config.coils[..i].iter().find(|earlier| earlier.shape == coil.shape) {
             warnings.push(format!(
@@ -170,34 +173,45 @@ fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let (length, size) = (SPEED_OF_LIGHT / frequency, size(mesh));
     (size > LARGEST_PART_OF_A_WAVE * length).then(|| {
         format!(
-            "at {frequency:e} Hz a wave in air is {length:.3} m long, and the mesh is {size:.3} m from corner to corner: displacement \
-             currents, which are left out, are no longer small there"
+            "at {frequency:e} Hz a wave in air is {length:.3} m long, and the mesh is {size:.3} m from corner to corner: \
+             displacement currents, which are left out, are no longer small there"
         )
     })
 }
 
 /// What to say of analytic windings that take the same place.
-fn overlap_warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
+fn overlap_warnings(config: &Config, coils: &[coil::Coil]) -> Vec<String> {
     let all: Vec<(usize, &Racetrack)> = windings(coils).collect();
-    let mut warnings = Vec::new();
-    for (k, &(i, first)) in all.iter().enumerate() {
-        for &(j, second) in &all[k + 1..] {
-            let both = |x: &Point| flows(first, x) && flows(second, x);
-            let vertices = |e: usize| mesh.vertices(ElementId::new(e));
-            let common =
-                (0..mesh.topology().tets().len()).find_map(|e| places(vertices(e)).into_iter().find(both));
-            // The same winding twice is said elsewhere.
-            if let Some(place) = common.filter(|_| config.coils[i].shape != config.coils[j].shape) {
-                warnings.push(format!(
-                    "the windings of the coils `{}` and `{}` overlap, at {}: two wires cannot be in one place",
-                    config.coils[i].name,
-                    config.coils[j].name,
-                    millimetres(place)
-                ));
-            }
-        }
+    let pairs =
+        all.iter().enumerate().flat_map(|(k, first)| all[k + 1..].iter().map(move |second| (first, second)));
+    let warning = |((i, first), (j, second)): (&(usize, &Racetrack), &(usize, &Racetrack))| {
+        let [first_coil, second_coil] = [*i, *j].map(|index| &config.coils[index]);
+        // The same winding twice is said elsewhere.
+        let is_other = first_coil.shape != second_coil.shape;
+        let place = common_place(first, second).filter(|_| is_other)?;
+        Some(format!(
+            "the windings of the coils `{}` and `{}` overlap, at {}: two wires cannot be in one place",
+            first_coil.name,
+            second_coil.name,
+            millimetres(place)
+        ))
+    };
+    pairs.filter_map(warning).collect()
+}
+
+/// A place at which the current of both windings flows, of a grid over what their boxes have in common.
+fn common_place(first: &Racetrack, second: &Racetrack) -> Option<Point> {
+    let [a, b] = [first, second].map(Racetrack::bounding_box);
+    let low: Point = std::array::from_fn(|d| a[0][d].max(b[0][d]));
+    let high: Point = std::array::from_fn(|d| a[1][d].min(b[1][d]));
+    if (0..3).any(|d| low[d] >= high[d]) {
+        return None;
     }
-    warnings
+    let at = |k: [usize; 3]| -> Point {
+        std::array::from_fn(|d| low[d] + (high[d] - low[d]) * (k[d] as f64 + 0.5) / GRID as f64)
+    };
+    let all = (0..GRID.pow(3)).map(|k| at([k % GRID, k / GRID % GRID, k / GRID.pow(2)]));
+    all.into_iter().find(|x| flows(first, x) && flows(second, x))
 }
 
 /// The analytic windings, by the numbers of their coils.

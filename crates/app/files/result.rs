@@ -187,9 +187,9 @@ pub struct HomogeneityResult {
     pub initial_rms_ppm: Option<f64>,
     /// Largest less smallest value over the mean, in parts per million; of vectors, of their part along the mean.
     pub peak_to_peak_ppm: f64,
-    /// The load that it is of; `None` where there are no loads.
+    /// The frequency or load that it is of; `None` where there is one alone.
     #[serde(default)]
-    pub under_load: Option<String>,
+    pub state: Option<String>,
 }
 
 /// The gain of a run computed again on a mesh that the optimiser never saw.

@@ -29,7 +29,7 @@ struct Saturated {
     highest: (f64, Point),
     /// Volume beyond saturation [m³]; of an impedance surface area [m²].
     beyond: f64,
-    /// Volume of the region, or area of its surface.
+    /// Volume of the region [m³], or area of its surface [m²].
     whole: f64,
 }
 
@@ -79,11 +79,11 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
             beyond.into_iter().map(move |(region, found)| {
                 let under = &under;
                 let is_surface = config.regions.get(&region).is_some_and(|own| own.model == RegionModel::Impedance);
-                let cure = if is_surface { "Mesh the region and give" } else { "Give" };
+                let (part, cure) = if is_surface { ("its surface", "Mesh the region and give") } else { ("it", "Give") };
                 let (highest, place) = found.highest;
                 format!(
-                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz{under}, at {}, and {:.1} % of it \
-                     are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
+                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz{under}, at {}, and \
+                     {:.1} % of {part} are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
                      that of a material that does not exist. {cure} the material its curve (bh), lower the ampere-turns, or \
                      give the iron more section",
                     millimetres(place),
@@ -112,9 +112,9 @@ fn saturated(
     let iron: Vec<ElementId> = topology.elements().filter(is_iron).collect();
     let mut found: BTreeMap<String, Saturated> = BTreeMap::new();
     for (&e, b) in iron.iter().zip(solution.flux_densities_of(model, mesh, &iron)) {
-        let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let magnitude = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let own = found.entry(topology.region_name_at(e).to_owned()).or_default();
-        own.add(volume(mesh.vertices(e)), (size, share_at(&e)), centroid(mesh.vertices(e)));
+        own.add(volume(mesh.vertices(e)), (magnitude, share_at(&e)), centroid(mesh.vertices(e)));
     }
     for (index, nodes, loss) in solution.surface_losses(model, mesh) {
         let conductor = &model.conductors()[index];

@@ -337,27 +337,26 @@ pub(super) fn terms(problem: &Problem, analysis: &Analysis) -> Vec<TermResult> {
     terms.zip(&analysis.terms).map(of).collect()
 }
 
-/// How homogeneous the field of an analysis is, for the first term that asks, of a worst case the one that is least so; `initial` is
-/// the objective at the initial design.
+/// How homogeneous the field of an analysis is, for the first term that asks, of a worst case the worst of them; `initial` is the
+/// objective at the initial design.
 pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) -> Option<HomogeneityResult> {
     let objective = problem.objective()?;
     let terms = &objective.terms;
-    let mut qualities = terms.iter().filter_map(|term| {
+    let qualities = terms.iter().filter_map(|term| {
         let index = *term.states.first()?;
         let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
-        Some((term.functional.field_quality(model, &analysis.mesh, solution)?, model))
+        let quality = term.functional.field_quality(model, &analysis.mesh, solution)?;
+        Some((objective.goal.sign() * term.weight * quality.rms * quality.rms, quality, model))
     });
-    let (quality, model) = match objective.combination {
-        Combination::Sum => qualities.next(),
-        Combination::WorstCase => qualities.max_by(|a, b| a.0.rms.total_cmp(&b.0.rms)),
-    }?;
+    let worse = |a: &f64, b: &f64| objective.combination == Combination::WorstCase && b > a;
+    let (_, quality, model) = qualities.reduce(|a, b| if worse(&a.0, &b.0) { b } else { a })?;
     let is_alone = matches!(terms.as_slice(), [term] if term.weight == 1.0 && term.states.len() == 1);
     Some(HomogeneityResult {
         mean_b_t: quality.mean,
         rms_ppm: 1e6 * quality.rms,
         initial_rms_ppm: is_alone.then(|| 1e6 * initial.sqrt()),
         peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
-        under_load: model.setup().load_case.clone(),
+        state: (problem.states().len() > 1).then(|| model.label()),
     })
 }
 

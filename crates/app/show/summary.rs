@@ -231,13 +231,13 @@ fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
     let figures = objective.homogeneity.as_ref()?;
     let before = figures.initial_rms_ppm.filter(|initial| *initial != figures.rms_ppm);
     let before = before.map(|initial| format!(" (was {initial:.4})")).unwrap_or_default();
-    let under = figures.under_load.as_deref().map(|load| format!(", under the load {}", printable(load)));
+    let state = figures.state.as_deref().map(|state| format!(", {}", printable(state)));
     let text = format!(
         "{:.4} ppm rms{before}, {:.4} ppm peak to peak, of a mean of {:.6e} T{}",
         figures.rms_ppm,
         figures.peak_to_peak_ppm,
         figures.mean_b_t,
-        under.unwrap_or_default()
+        state.unwrap_or_default()
     );
     Some(("homogeneity", text))
 }

@@ -140,7 +140,7 @@ impl FieldModel {
         let most_work = match (effort, self.linear_solver()) {
             // Half for each of the two corrections.
             (Effort::Affordable, Some(own)) => {
-                0.5 * (MOST_EVALUATIONS * own.work_of_design()?).max(ALWAYS_AFFORDABLE)
+                0.5 * (MOST_EVALUATIONS * own.work_of(2)?).max(ALWAYS_AFFORDABLE)
             }
             _ => f64::INFINITY,
         };

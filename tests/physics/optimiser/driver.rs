@@ -90,7 +90,7 @@ fn a_quality_that_no_step_keeps_ends_at_the_mesh_limit() {
 
 /// The method comes to its bounds from outside, by a few millionths, in whatever many steps.
 #[test]
-fn a_design_that_gains_much_and_is_beyond_a_bound_by_little_is_told() {
+fn a_design_that_gains_much_and_is_beyond_a_bound_by_little_is_reported() {
     let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 1.02 }]";
     let (mut problem, settings) = quick(&[loss]);
     let settings = Optimizer { algorithm: Algorithm::Slsqp, max_evaluations: 5, ..settings };

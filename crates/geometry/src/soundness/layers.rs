@@ -4,7 +4,7 @@
 //! behind one of the corners. Where the two ends of an extrusion are meshed unlike, the apex lies beside the triangle: the
 //! columns lean, elements are long across the surface, and a motion of the surface shears them. Columns that cross invert
 //! elements, which no [`crate::Mesh`] has. A prism that lies along the surface has its apex beside the triangle too, but behind
-//! another node of the surface.
+//! another node of the surface, with an edge between them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -48,13 +48,16 @@ pub fn leaning_layers(mesh: &Mesh, surface: &[[NodeId; 3]]) -> Option<Leaning> {
         for element in elements_at(mesh, *nodes) {
             area += size;
             let apex = mesh.topology().tet(element).into_iter().find(|n| !nodes.contains(n));
-            let Some(apex) = apex.map(|n| mesh.point(n)) else { continue };
-            let (beside, height) = (distance_beside(corners, apex), height(corners, apex));
+            let Some(apex) = apex else { continue };
+            let place = mesh.point(apex);
+            let (beside, height) = (distance_beside(corners, place), height(corners, place));
             if height > THIN * size.sqrt() || beside < height.max(BESIDE * size.sqrt()) {
                 continue;
             }
             let mut near = nodes.iter().flat_map(|node| &around[node]);
-            if near.any(|&node| is_behind(area_vector(corners), mesh.point(node), apex)) {
+            let is_above =
+                |&&node: &&NodeId| is_behind(area_vector(corners), mesh.point(node), mesh.point(apex));
+            if near.find(is_above).is_some_and(|&node| is_joined(mesh, node, apex)) {
                 continue;
             }
             leaning += size;
@@ -70,6 +73,12 @@ pub fn leaning_layers(mesh: &Mesh, surface: &[[NodeId; 3]]) -> Option<Leaning> {
 fn elements_at(mesh: &Mesh, nodes: [NodeId; 3]) -> impl Iterator<Item = ElementId> + '_ {
     let holds = move |e: &ElementId| nodes.iter().all(|n| mesh.topology().tet(*e).contains(n));
     mesh.topology().elements_around(nodes[0]).iter().copied().filter(holds)
+}
+
+/// Whether two nodes are the ends of an edge.
+fn is_joined(mesh: &Mesh, a: NodeId, b: NodeId) -> bool {
+    let topology = mesh.topology();
+    topology.elements_around(a).iter().any(|&e| topology.tet(e).contains(&b))
 }
 
 /// Whether a point lies behind a node rather than beside it, along a normal.

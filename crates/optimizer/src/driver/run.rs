@@ -12,8 +12,8 @@ use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
 use crate::problem::{Problem, Shape, SolverCache, Timings};
 
-/// Excess over a bound, relative to it, up to which a design is worth a word that gains what none within the bounds does: few bounds
-/// are meant more exactly, and few meshes are that exact.
+/// Relative excess over a bound up to which a better design is reported: few bounds are meant more exactly, and few meshes are
+/// that exact.
 const NEAR: f64 = 1e-3;
 
 /// A design that is beyond a bound by little.
@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
     timings: Timings,
     /// What the gradient promised at the first design.
     promised: Option<f64>,
-    /// Designs that only just keep no constraint too many.
+    /// Designs beyond their worst bound by at most [`NEAR`].
     near_misses: Vec<NearMiss>,
     /// Times the mesh has been refined.
     pub(super) level: usize,
@@ -223,7 +223,10 @@ impl<'a> Run<'a> {
         self.repeated = 0;
         let excesses = sample.constraints[..self.constraint_count()].iter().map(|(excess, _)| *excess);
         let worst = excesses.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some(worst) = worst.filter(|(_, excess)| (CONSTRAINT_TOLERANCE..=NEAR).contains(excess)) {
+        // Not where the room of the mesh is what is missing.
+        let is_near =
+            |excess: f64| excess > CONSTRAINT_TOLERANCE && excess <= NEAR && excess == sample.violation();
+        if let Some(worst) = worst.filter(|(_, excess)| is_near(*excess)) {
             let (evaluation, objective) = (record.row.evaluation, record.row.objective);
             self.near_misses.push(NearMiss { evaluation, objective, worst });
         }
@@ -267,7 +270,7 @@ impl<'a> Run<'a> {
         Ok(reason)
     }
 
-    /// The design nearest to its bounds of those that would have gained far more than their excess is worth on a best one within them.
+    /// The design nearest to its bounds of those that gain far more on a best one within them than their excess.
     fn missed_by(&self, best: &Best) -> Option<NearMiss> {
         let gain =
             |missed: &NearMiss| self.goal.sign() * (best.objective - missed.objective) / best.objective.abs();
@@ -304,8 +307,8 @@ impl<'a> Run<'a> {
         if let Some(missed) = self.missed_by(&best) {
             let (k, excess) = missed.worst;
             self.warn(&format!(
-                "evaluation {} has an objective of {:.6e}, against {:.6e} of the best design, and does not count: it is beyond the \
-                 bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
+                "evaluation {} has an objective of {:.6e}, against {:.6e} of the best design, and does not count: it is \
+                 beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
                  method of those that take constraints",
                 missed.evaluation,
                 missed.objective,

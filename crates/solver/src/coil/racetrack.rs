@@ -175,6 +175,15 @@ impl Racetrack {
         [self.half_window[0] + self.width, self.half_window[1] + self.width, 0.5 * self.height]
     }
 
+    /// Lower and upper corner of the box along the coordinates that holds the coil [m].
+    pub fn bounding_box(&self) -> [Point; 2] {
+        let (extent, centre) = (self.extent(), self.frame.centre());
+        let unit = |k: usize| self.frame.vector(std::array::from_fn(|d| if d == k { 1.0 } else { 0.0 }));
+        let units = [unit(0), unit(1), unit(2)];
+        let half = |d: usize| (0..3).map(|k| units[k][d].abs() * extent[k]).sum::<f64>();
+        [-1.0, 1.0].map(|side| std::array::from_fn(|d| centre[d] + side * half(d)))
+    }
+
     /// The smaller of width and height [m]: the size of the winding's detail.
     pub(super) fn detail(&self) -> f64 {
         self.width.min(self.height)

@@ -114,15 +114,16 @@ impl SystemAnalysis {
         Ok(factor.map_or(Method::Incomplete, |(method, _)| method))
     }
 
-    /// Unknowns from which a factor is not looked at where two levels fit: its symbolic part takes longer than a design, or seconds,
-    /// and its memory is twice that of two levels and more.
+    /// Unknowns from which a factor is not looked at where two levels fit: its symbolic part takes longer than a design, or
+    /// seconds, and its memory is twice that of two levels and more.
     fn factors_up_to(&self) -> usize {
         let is_new = self.settings.reuse == Reuse::Never;
         match (self.field, self.elements) {
-            // Without a factor that serves other designs. Of a state and its adjoint on 18 000 and 36 000 unknowns of a meshed plate two
-            // levels take two thirds of the time even where a part is kept, and as long as the factor where there are two of each.
+            // Of a state and its adjoint on 18 000 and 36 000 unknowns of a meshed plate two levels take two thirds of the time
+            // even where a part of the factor is kept, and as long as the factor where there are two of each.
             (FieldKind::Harmonic, (ElementFamily::Nodal, Order::Linear)) if is_new => {
-                if self.settings.solutions <= FEW_SOLUTIONS { 12_000 } else { 100_000 }
+                let few = self.settings.solutions <= FEW_SOLUTIONS;
+                if few { two_levels_from(self.field, self.elements) } else { 100_000 }
             }
             (_, (_, Order::Linear)) => 200_000,
             (_, (ElementFamily::Nodal, Order::Quadratic)) => 400_000,
@@ -183,12 +184,20 @@ impl SystemAnalysis {
         Ok(best)
     }
 
-    /// Counted work of a design with state and adjoint by the method that solutions begin with [ns].
+    /// Counted work of a design with all its solutions by the method that solutions begin with [ns].
     ///
     /// # Errors
     /// [`MeshError::Factorisation`] when the symbolic factorisation does not fit.
     pub fn work_of_design(&self) -> Result<f64, MeshError> {
-        Ok(self.costs(self.method)?.of_design(self.service(self.method), self.settings.solutions))
+        self.work_of(self.settings.solutions)
+    }
+
+    /// Counted work of so many solutions with one matrix [ns].
+    ///
+    /// # Errors
+    /// As [`SystemAnalysis::work_of_design`].
+    pub(crate) fn work_of(&self, solutions: usize) -> Result<f64, MeshError> {
+        Ok(self.costs(self.method)?.of_design(self.service(self.method), solutions))
     }
 
     /// The same in a run, in which what is kept of a factor is made once.
@@ -338,6 +347,7 @@ fn two_levels(
 /// as that.
 pub const fn two_levels_from(field: FieldKind, elements: (ElementFamily, Order)) -> usize {
     match (elements, field) {
+        ((ElementFamily::Nodal, Order::Linear), FieldKind::Harmonic) => 12_000,
         ((_, Order::Linear), _) => 45_000,
         ((ElementFamily::Nodal, Order::Quadratic), FieldKind::Harmonic) => 50_000,
         ((ElementFamily::Nodal, Order::Quadratic), FieldKind::Static) => 150_000,

@@ -91,7 +91,7 @@ impl Transfer {
 
     /// The structure of `Pᵀ K`.
     pub(crate) fn restricted_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
-        let own = itself(fine.column_count);
+        let own = identity_columns(fine.column_count);
         self.product_structure(fine, fine.column_count, |g| &own[g..=g])
     }
 
@@ -115,7 +115,7 @@ impl Transfer {
         structure: &Arc<CsrStructure>,
         fine: &CsrMatrix<c64>,
     ) -> CsrMatrix<c32> {
-        let own = itself(fine.structure.column_count);
+        let own = identity_columns(fine.structure.column_count);
         let single = |sum: c64| c32::new(sum.re as f32, sum.im as f32);
         self.product(structure, fine, |g| (&[1.0], &own[g..=g]), single)
     }
@@ -201,7 +201,7 @@ impl Transfer {
 }
 
 /// The columns of the rows of a unit matrix.
-fn itself(count: usize) -> Vec<u32> {
+fn identity_columns(count: usize) -> Vec<u32> {
     (0..count as u32).collect()
 }
 
@@ -253,6 +253,11 @@ mod tests {
         assert_eq!(coarse.entry(1, 1), Some(c64::new(1.5, 1.25)));
         assert_eq!(coarse.entry(0, 1), Some(c64::new(-0.5, 0.0)));
         assert_eq!(coarse.entry(1, 0), coarse.entry(0, 1));
+        let half = transfer.restricted_matrix(&transfer.restricted_structure(&fine.structure), &fine);
+        // The second row: (0, −1, 1 (2 + j) − 1/2, 1/2 (2 + j) − 1), exact in single precision.
+        let row = [c32::new(-1.0, 0.0), c32::new(1.5, 1.0), c32::new(0.0, 0.5)];
+        assert_eq!(half.structure.columns[half.structure.row(1)], [1, 2, 3]);
+        assert_eq!(half.values[half.structure.row(1)], row);
         let mut z = vec![c64::default(); 4];
         transfer.add_prolongation(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
         assert_eq!(z[1], c64::new(0.5, 0.0));

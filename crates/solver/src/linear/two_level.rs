@@ -10,9 +10,9 @@
 //!
 //! ("A-DEF2" of Tang, Nabben, Vuik and Erlangga, J. Sci. Comput. 39 (2009) 340). For a residual without a coarse part it is the
 //! balanced `Q r + (I − Q K) S (I − K Q) r`, which is complex symmetric, at little more than half the cost; the iteration
-//! keeps residuals free of it if it begins with [`TwoLevel::start`]. All that it takes of `K S r` is `Pᵀ K S r`: with the incomplete
-//! factor the product `Pᵀ K`, a half of the coarse matrix, is kept in single precision, with less than half of the entries of `K`. Unlike smoothing before and after, it does not ask that
-//! `S` contracts, which an incomplete factor does not on flat elements.
+//! keeps residuals free of it if it begins with [`TwoLevel::start`]. Unlike smoothing before and after, it does not ask that
+//! `S` contracts, which an incomplete factor does not on flat elements. All that it takes of `K S r` is `Pᵀ K S r`: beside an
+//! incomplete factor `Pᵀ K`, which has fewer entries than `K`, is kept in single precision.
 
 use std::sync::Arc;
 
