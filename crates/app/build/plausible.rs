@@ -210,8 +210,8 @@ fn common_place(first: &Racetrack, second: &Racetrack) -> Option<Point> {
     let at = |k: [usize; 3]| -> Point {
         std::array::from_fn(|d| low[d] + (high[d] - low[d]) * (k[d] as f64 + 0.5) / GRID as f64)
     };
-    let all = (0..GRID.pow(3)).map(|k| at([k % GRID, k / GRID % GRID, k / GRID.pow(2)]));
-    all.into_iter().find(|x| flows(first, x) && flows(second, x))
+    let mut all = (0..GRID.pow(3)).map(|k| at([k % GRID, k / GRID % GRID, k / GRID.pow(2)]));
+    all.find(|x| flows(first, x) && flows(second, x))
 }
 
 /// The analytic windings, by the numbers of their coils.

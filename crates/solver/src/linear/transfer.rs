@@ -1,5 +1,6 @@
 //! A transfer between two levels: prolongation, restriction, the Galerkin product `Pᵀ K P`, and the half of it `Pᵀ K`.
 
+use std::slice;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
@@ -86,13 +87,12 @@ impl Transfer {
     /// The structure of `Pᵀ K P` for a matrix with the structure `fine`.
     pub(crate) fn coarse_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
         let p = &self.prolongation.structure;
-        self.product_structure(fine, self.coarse_count(), |g| &p.columns[p.row(g)])
+        self.product_structure(fine, self.coarse_count(), |&g| &p.columns[p.row(g as usize)])
     }
 
     /// The structure of `Pᵀ K`.
     pub(crate) fn restricted_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
-        let own = identity_columns(fine.column_count);
-        self.product_structure(fine, fine.column_count, |g| &own[g..=g])
+        self.product_structure(fine, fine.column_count, slice::from_ref)
     }
 
     /// `Pᵀ K P`, with the structure of [`Self::coarse_structure`]; every entry is summed in the order of the fine rows.
@@ -102,8 +102,8 @@ impl Transfer {
         fine: &CsrMatrix<c64>,
     ) -> CsrMatrix<c64> {
         let p = &self.prolongation;
-        let parents = |g| {
-            let range = p.structure.row(g);
+        let parents = |&g: &u32| {
+            let range = p.structure.row(g as usize);
             (&p.values[range.clone()], &p.structure.columns[range])
         };
         self.product(structure, fine, parents, |sum| sum)
@@ -115,24 +115,23 @@ impl Transfer {
         structure: &Arc<CsrStructure>,
         fine: &CsrMatrix<c64>,
     ) -> CsrMatrix<c32> {
-        let own = identity_columns(fine.structure.column_count);
         let single = |sum: c64| c32::new(sum.re as f32, sum.im as f32);
-        self.product(structure, fine, |g| (&[1.0], &own[g..=g]), single)
+        self.product(structure, fine, |g| (&[1.0], slice::from_ref(g)), single)
     }
 
     /// The structure of `Pᵀ K Q`, with so many columns, for the columns of the rows of `Q`.
     fn product_structure<'q>(
-        &self,
-        fine: &CsrStructure,
+        &'q self,
+        fine: &'q CsrStructure,
         column_count: usize,
-        columns_of: impl Fn(usize) -> &'q [u32] + Sync,
+        columns_of: impl Fn(&'q u32) -> &'q [u32] + Sync,
     ) -> Arc<CsrStructure> {
         let r = &self.restriction.structure;
         let columns_of_row = |seen: &mut Vec<u32>, row: usize| {
             let mut found = Vec::new();
             for &f in &r.columns[r.row(row)] {
-                for &g in &fine.columns[fine.row(f as usize)] {
-                    for &c in columns_of(g as usize) {
+                for g in &fine.columns[fine.row(f as usize)] {
+                    for &c in columns_of(g) {
                         if seen[c as usize] != row as u32 {
                             seen[c as usize] = row as u32;
                             found.push(c);
@@ -159,10 +158,10 @@ impl Transfer {
 
     /// `Pᵀ K Q` for the weights and columns of the rows of `Q`, stored as `store` says.
     fn product<'q, T: Scalar>(
-        &self,
+        &'q self,
         structure: &Arc<CsrStructure>,
-        fine: &CsrMatrix<c64>,
-        row_of: impl Fn(usize) -> (&'q [f64], &'q [u32]) + Sync,
+        fine: &'q CsrMatrix<c64>,
+        row_of: impl Fn(&'q u32) -> (&'q [f64], &'q [u32]) + Sync,
         store: impl Fn(c64) -> T + Sync,
     ) -> CsrMatrix<T> {
         let r = &self.restriction;
@@ -184,7 +183,7 @@ impl Transfer {
             for (&weight, &f) in r.values[terms.clone()].iter().zip(&r.structure.columns[terms]) {
                 for k in fine.structure.row(f as usize) {
                     let value = fine.values[k] * weight;
-                    let (weights, columns) = row_of(fine.structure.columns[k] as usize);
+                    let (weights, columns) = row_of(&fine.structure.columns[k]);
                     for (&w, &c) in weights.iter().zip(columns) {
                         sums[place[c as usize] as usize] += value * w;
                     }
@@ -198,11 +197,6 @@ impl Transfer {
             .for_each_init(|| (vec![0u32; structure.column_count], Vec::new()), fill_row);
         product
     }
-}
-
-/// The columns of the rows of a unit matrix.
-fn identity_columns(count: usize) -> Vec<u32> {
-    (0..count as u32).collect()
 }
 
 fn transpose(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {
