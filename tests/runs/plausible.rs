@@ -191,6 +191,64 @@ fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
 }
 
 #[test]
+fn a_force_across_a_plane_that_cuts_its_body_is_asked_about() {
+    let along = |direction: &str| {
+        let direction = format!("objective.direction={direction}");
+        let mut checked = command(&[&"check", &repository("configs/actuator.toml"), &"--json"]);
+        texts(&finish(checked.args(set(&[&direction]))).exits_with(0).json()["warnings"])
+    };
+    assert!(
+        along("[1, 0, 0]").contains("the surface `x_min` cuts the body `armature`"),
+        "{}",
+        along("[1, 0, 0]")
+    );
+    assert!(!along("[0, 0, -1]").contains("cuts the body"));
+}
+
+#[test]
+fn a_device_in_open_space_needs_no_condition() {
+    let home = folder();
+    let path = home.path().join("magnet.toml");
+    let warned = |open: &str| {
+        std::fs::write(&path, MAGNET.replace("OPEN", open)).expect("written");
+        let json = finish(&mut command(&[&"check", &path, &"--json"])).exits_with(0).json();
+        texts(&json["warnings"]).contains("no surface has a condition")
+    };
+    let sides = |sides: &str| format!("[open]\nsurfaces = [{sides}]");
+    assert!(!warned(&sides("\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_min\", \"z_max\"")));
+    assert!(warned(&sides("\"x_max\", \"y_min\", \"y_max\", \"z_min\", \"z_max\"")));
+    assert!(warned(""));
+}
+
+/// A cube of 20 mm in a box, whole.
+const MAGNET: &str = r#"
+[mesh]
+generator = "boxes"
+
+[mesh.boxes]
+box = [["-30 mm", "-30 mm", "-30 mm"], ["30 mm", "30 mm", "30 mm"]]
+
+[[mesh.boxes.regions]]
+name = "magnet"
+box = [["-10 mm", "-10 mm", "-10 mm"], ["10 mm", "10 mm", "10 mm"]]
+cells = [2, 2, 2]
+
+[analysis]
+elements = "edge"
+order = 1
+frequency = 0
+
+[materials.ndfeb]
+relative_permeability = 1.05
+
+[regions.magnet]
+material = "ndfeb"
+remanence = [0, 0, "1.2 T"]
+
+OPEN
+"#;
+
+#[test]
 fn a_current_along_a_wall_that_mirrors_it_reversed_is_asked_about() {
     let with = |walls: &str| {
         let walls = format!("boundaries.flux_parallel={walls}");

@@ -189,7 +189,7 @@ fn fault(source: &SourceMap, design: &config::Design, error: DesignError) -> Err
                 ),
             )
             .expected("a surface and a mesh that are symmetric about the plane")
-            .help("check `at`, mesh one half and mirror it, or leave the symmetry out"),
+            .help("check `at` and mesh.unit, mesh one half and mirror it, or leave the symmetry out"),
         DesignError::WideFilter { .. } => source
             .diagnostic("design.filter_radius", error.to_string())
             .help("take a smaller radius, or a coarser mesh on the surface"),

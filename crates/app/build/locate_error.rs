@@ -102,6 +102,11 @@ impl<'a> DiagnosticSink<'a> {
         }
     }
 
+    /// Keeps one.
+    pub(super) fn push(&mut self, fault: Diagnostic) {
+        self.faults.push(fault);
+    }
+
     /// All faults at once, if there are any.
     pub(super) fn check(self) -> Result<(), Error> {
         Ok(self.source.check(self.faults)?)

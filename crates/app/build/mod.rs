@@ -128,21 +128,12 @@ pub fn set_up_watched(
         .and_then(|built| problem_on(built, config, source, mode, group, progress))
         .map_err(|error| locate_error::attribute_error(error, config, source))?;
     if !(mode == Mode::Inspection && config.morph.is_some()) {
-        check_expansions(config, source, &setup.problem)?;
+        multipole::check_all(config, source, &setup.problem)?;
     }
     let at_bounds =
         skin::bound_warnings(config, &setup.audits, &setup.problem, setup.designed_body.as_deref());
     setup.warnings.extend(at_bounds);
     Ok(setup)
-}
-
-/// Refuses expansions of which a point lies outside the mesh, which would fail when the run is over.
-fn check_expansions(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
-    let mut sink = DiagnosticSink::new(config, source, Vec::new());
-    for set in &config.multipoles {
-        sink.take(multipole::multipoles(config, set, problem.original(), &problem.states()[0]))?;
-    }
-    sink.check()
 }
 
 /// Sets up the problem of a configuration on a mesh that is not its own, but has its regions and surfaces; with the design

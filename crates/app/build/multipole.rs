@@ -1,12 +1,14 @@
 //! Expansions of a configuration on its mesh and states.
 
-use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::{Mesh, millimetres};
+use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::coil::Frame;
 use fluxmorph_solver::functional::{MirrorPlane, Multipoles, OfTerms};
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{FieldModel, Functional};
 
 use super::functional::follow;
+use super::locate_error::DiagnosticSink;
 use super::references::functionals;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
 use crate::error::Error;
@@ -89,6 +91,42 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     faults
 }
 
+fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
+    let frame = Frame::new(set.center, set.axis.vector(), set.direction)?;
+    Ok(match set.shape {
+        ExpansionShape::Circle => Expansion::circle(&frame, set.radius, set.order),
+        ExpansionShape::Ball => Expansion::ball(&frame, set.radius, set.order),
+    })
+}
+
+/// Refuses the expansions of a problem of which a point lies outside the mesh, which would fail when the run is over, and those
+/// around matter, whose terms mean nothing.
+pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
+    let mut sink = DiagnosticSink::new(config, source, Vec::new());
+    for (k, set) in config.multipoles.iter().enumerate() {
+        let (mesh, model) = (problem.original(), &problem.states()[0]);
+        if sink.take(multipoles(config, set, mesh, model))?.is_none() {
+            continue;
+        }
+        let planes = planes(config, set, mesh)?;
+        // Above 0 Hz conductors carry currents.
+        let models = || std::iter::once(model).chain(problem.states().last());
+        let at = |model| Multipoles::disturbance(model, mesh, (&expansion(set).ok()?, set.center), &planes);
+        if let Some((place, what)) = models().find_map(at) {
+            let message = format!(
+                "the {} of the expansion `{}` holds {what}, at {}",
+                if set.shape == ExpansionShape::Ball { "ball" } else { "circle" },
+                set.name,
+                millimetres(place)
+            );
+            let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
+            let expected = "air alone in it: only there is B a sum of the terms of sources outside";
+            sink.push(fault.expected(expected).help("take a smaller radius, or another center"));
+        }
+    }
+    sink.check()
+}
+
 /// An expansion on a mesh.
 pub(crate) fn multipoles(
     config: &Config,
@@ -96,11 +134,7 @@ pub(crate) fn multipoles(
     mesh: &Mesh,
     model: &FieldModel,
 ) -> Result<Multipoles, Error> {
-    let frame = Frame::new(set.center, set.axis.vector(), set.direction)?;
-    let expansion = match set.shape {
-        ExpansionShape::Circle => Expansion::circle(&frame, set.radius, set.order),
-        ExpansionShape::Ball => Expansion::ball(&frame, set.radius, set.order),
-    };
+    let expansion = expansion(set)?;
     let planes = planes(config, set, mesh)?;
     // What is reported is what is made of it.
     let named =

@@ -11,10 +11,12 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetre
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
+use super::open;
+use super::references::functionals;
 use super::soundness::faces_of;
 use crate::config::{
-    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, RegionModel,
-    SourceMap,
+    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, ObjectiveKind,
+    RegionModel, SourceMap,
 };
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -125,7 +127,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Ve
             ));
         }
     }
-    if config.boundaries.is_empty() {
+    if config.boundaries.is_empty() && !ends_at_infinity(mesh.topology()) {
         warnings.push(
             "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
              flux_normal"
@@ -163,6 +165,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Ve
     }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
+    warnings.extend(cut_force_warnings(config, mesh));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -368,6 +371,44 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
         "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
          take `{joined}` into its regions, or leave air between the two"
     ))
+}
+
+/// What to say of forces that are sought across a plane which cuts their body: of these only a part is computed.
+fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let topology = mesh.topology();
+    let mut warnings = Vec::new();
+    let forces = functionals(config).into_iter().filter(|(_, own)| own.kind == ObjectiveKind::Force);
+    for (path, force) in forces {
+        let direction = force.direction.unwrap_or_default();
+        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == force.region.as_ref()) else {
+            continue;
+        };
+        let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
+        let outside: Vec<[NodeId; 3]> = regions.flat_map(|region| topology.outer_faces(region)).collect();
+        let cut = config.boundaries.surfaces().find(|surface| {
+            let own = faces_of(topology, [surface.as_str()]);
+            outside.iter().filter(|face| own.contains(&face_key(**face))).any(|face| {
+                let area = area_vector(face.map(|node| mesh.point(node)));
+                dot(direction, area).abs() > INCLINED * norm(direction) * norm(area)
+            })
+        });
+        if let Some(surface) = cut {
+            warnings.push(format!(
+                "{path}: the surface `{surface}` cuts the body `{}`, and across it the force is that on the free faces of the meshed part \
+                 alone, without the stress in the cut: of the half of a body that is pulled towards its other half it is no force that \
+                 anything feels. Take a direction along the surface, or the whole body",
+                body.name
+            ));
+        }
+    }
+    warnings
+}
+
+/// Whether all that bounds a mesh is the end of a shell of open space.
+fn ends_at_infinity(topology: &Topology) -> bool {
+    let end = faces_of(topology, [open::INFINITY]);
+    let regions = (0..topology.region_names().len()).map(RegionId::new);
+    regions.flat_map(|region| topology.outer_faces(region)).all(|face| end.contains(&face_key(face)))
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::Ownership;
-use fluxmorph_geometry::tet4::{add, centroid, dot, sub};
+use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
@@ -18,6 +18,9 @@ use super::outline::same_nodes;
 use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
+
+/// Cosine of an angle to a plane up to which a direction is along it.
+const ALONG: f64 = 1e-6;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
@@ -375,17 +378,28 @@ fn held_node_fault(
         Some(i) => surface.directions()[i][axis] != 0.0,
         None => map.is_unknown(node, axis),
     };
-    let (node, axis) = unknowns.plane_nodes().find_map(|(node, axes)| {
-        (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
-    })?;
+    let across_axes = unknowns.plane_nodes().find_map(|(node, axes)| {
+        let axis = (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis))?;
+        Some((node, ["x", "y", "z"][axis].to_owned(), "the plane listed in remesh.slide"))
+    });
+    let leaves_along = |node: NodeId, normal: Point| match designed(node) {
+        Some(i) => dot(surface.directions()[i], normal).abs() > ALONG * norm(surface.directions()[i]),
+        None => moves(node),
+    };
+    let across_normals = || {
+        let (node, [x, y, z]) =
+            unknowns.oblique_nodes().iter().find(|(node, normal)| leaves_along(*node, *normal))?;
+        let fixed = "the surface listed in remesh.fixed (only planes normal to x, y or z can slide)";
+        Some((*node, format!("({x:.3}, {y:.3}, {z:.3})"), fixed))
+    };
+    let (node, across, listed) = across_axes.or_else(across_normals)?;
     let message = format!(
-        "a plane with a condition at right angles to {} would lose its nodes at {}",
-        ["x", "y", "z"][axis],
+        "a plane with a condition at right angles to {across} would lose its nodes at {}",
         millimetres(inputs.mesh.point(node))
     );
     let fault = inputs.source.diagnostic("remesh", message);
     Some(fault.expected(match designed(node) {
-        Some(_) => "a design.direction along the plane, or a design.surface that ends before it",
-        None => "the plane listed in remesh.slide, or a remesh region that ends before it",
+        Some(_) => "a design.direction along the plane, or a design.surface that ends before it".to_owned(),
+        None => format!("{listed}, or a remesh region that ends before it"),
     }))
 }

@@ -18,12 +18,13 @@ use crate::config::{Config, ElementOrder, Elements, SourceMap};
 use crate::error::Error;
 use crate::show::Observer;
 
-/// Bytes that an estimate takes for each tetrahedron beside the problem: pattern, matrix and smoother of second order, of edge
-/// elements and of nodal ones. Measured on the shield and the pole: 8.6 to 10.1 kB in all, and 8.1 to 10.7 kB.
-const ESTIMATE_BYTES_PER_TET: [usize; 2] = [9_000, 9_100];
+/// Bytes that an estimate takes beside the problem, for each tetrahedron and for each with ψ, all of whose second order the coarse
+/// factor holds: pattern, matrix and smoother of second order, of edge elements and of nodal ones. Fits to fourteen devices of 9 to
+/// 73 thousand tetrahedra: 8.9 to 10.8 kB without ψ and 26 to 30 more with it, and 8.7 to 8.9 and 15 to 21 of nodal elements.
+const ESTIMATE_BYTES: [[usize; 2]; 2] = [[9_200, 29_000], [8_700, 20_000]];
 
-/// What Newton's method adds to that along a B–H curve: the matrix of the tangent beside that of the linear parts.
-const TANGENT_BYTES_PER_TET: usize = 5_000;
+/// What Newton's method adds for each tetrahedron along a B–H curve: the matrix of the tangent beside that of the linear parts.
+const TANGENT_BYTES_PER_TET: usize = 3_900;
 
 /// Error of second order over what halved edges change.
 const OF_HALVED_EDGES: f64 = 4.0 / 3.0;
@@ -43,7 +44,7 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
     let sizes = Sizes::of(problem);
     let has_curve = problem.states().iter().any(|state| !state.is_linear());
     let tangent = if has_curve { TANGENT_BYTES_PER_TET } else { 0 };
-    let [edge, nodal] = ESTIMATE_BYTES_PER_TET.map(|bytes| bytes + tangent);
+    let [edge, nodal] = ESTIMATE_BYTES.map(|[all, eddy]| [all + tangent, eddy]);
     Some(match config.analysis.elements {
         _ if is_second_order => sizes.on_other_mesh(8.0)[0],
         Elements::Edge => sizes.beside(edge),

@@ -144,8 +144,8 @@ impl MeshIndependence<'_> {
                     let (name, bound) = (&constraint.name, constraint.bound);
                     let share = (constraint.value - bound) / bound.abs().max(f64::MIN_POSITIVE);
                     observer.warning(&format!(
-                        "on the finer mesh the best shape violates the constraint `{name}`: {:+.2} % from its bound",
-                        100.0 * share
+                        "on the finer mesh the best shape violates the constraint `{name}`: by {:.1e} of its bound",
+                        share.abs()
                     ));
                 }
                 objective.verified_ratio = Some(verification.ratio);

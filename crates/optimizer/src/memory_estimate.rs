@@ -34,8 +34,8 @@ const HELD_BY_SETUP: usize = 300;
 const FACTOR_GROWTH: f64 = 1.2;
 
 /// Bytes of both levels of the two-level preconditioner per unknown: 470 to 850 on shields of 18 000 to 210 000 unknowns, 1090 of
-/// 530 000, and of quadratic elements 1.1 to 1.8 kB.
-const TWO_LEVELS_PER_UNKNOWN: [usize; 2] = [800, 1400];
+/// 530 000, and of quadratic elements 1.1 to 1.8 kB, with the vectors and transfers beside them 2.1.
+const TWO_LEVELS_PER_UNKNOWN: [usize; 2] = [800, 1800];
 
 /// What an evaluation of a problem adds to the process [bytes], and what that grows with on another mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +48,8 @@ pub struct Sizes {
     preconditioners: usize,
     /// Elements of the mesh.
     tets: usize,
+    /// Those with ψ, of the state that has most of them.
+    eddy_tets: usize,
     /// Unknowns of the largest field problem.
     unknowns: usize,
     /// Whether a factor preconditions one of them.
@@ -73,6 +75,7 @@ impl Sizes {
             matrices: 0,
             preconditioners: 0,
             tets,
+            eddy_tets: problem.states().iter().map(eddy_tets).max().unwrap_or(0),
             unknowns: solvers().map(|solver| solver.unknown_count()).max().unwrap_or(0),
             has_factor: solvers().any(|solver| is_factor(solver.method())),
             two_levels_from: harmonic
@@ -109,9 +112,10 @@ impl Sizes {
         PROCESS + self.arrays + self.matrices + self.preconditioners
     }
 
-    /// Bytes that the process holds while it works on something else that takes so many for each element, about.
-    pub fn beside(&self, bytes_per_tet: usize) -> usize {
-        PROCESS + self.tets * (HELD_BY_SETUP + bytes_per_tet)
+    /// Bytes that the process holds while it works on something else that takes so many for each element, and so many more for
+    /// each with ψ, about.
+    pub fn beside(&self, [bytes_per_tet, bytes_per_eddy_tet]: [usize; 2]) -> usize {
+        PROCESS + self.tets * (HELD_BY_SETUP + bytes_per_tet) + self.eddy_tets * bytes_per_eddy_tet
     }
 
     /// Bytes that the process holds at the peak of the same analysis on another mesh of `growth` times the elements, while the
@@ -137,6 +141,11 @@ impl Sizes {
         };
         times(self.arrays + self.matrices, growth) + preconditioners
     }
+}
+
+/// Elements with ψ.
+fn eddy_tets(state: &FieldModel) -> usize {
+    state.topology().elements().filter(|&e| state.has_eddy_currents(e)).count()
 }
 
 fn is_factor(method: Method) -> bool {

@@ -56,7 +56,7 @@ pub enum RemeshError {
     /// A sliding surface has a triangle whose normal is not along an axis.
     #[error(
         "the surface `{surface}` cannot slide: its triangle at {} has the normal ({:.3}, {:.3}, {:.3}), and only faces normal \
-         to x, y or z may slide; list it as fixed or free",
+         to x, y or z may slide; list it as fixed, or where it has no condition as free",
         millimetres(*centroid), normal[0], normal[1], normal[2]
     )]
     SlideNormal {

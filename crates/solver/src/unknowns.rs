@@ -54,6 +54,8 @@ pub struct Unknowns {
     harmonic: Vec<HarmonicField>,
     /// Bit `d`: the node lies on a conditioned plane at right angles to the axis `d`.
     planes: BTreeMap<NodeId, u8>,
+    /// Nodes on conditioned triangles that are at right angles to no axis, with the unit normals of these.
+    oblique: Vec<(NodeId, Point)>,
 }
 
 /// Where currents flow, so that there is ψ.
@@ -179,8 +181,8 @@ impl Unknowns {
             let i = node.index();
             if c == PSI { has_psi[i] && !psi_zero[i] } else { fixed[i] >> c & 1 == 0 }
         });
-        let planes = planes(mesh, boundaries)?;
-        Ok(Self { dofs, grounded, frames, prescribed, planes, harmonic: Vec::new() })
+        let (planes, oblique) = planes(mesh, boundaries)?;
+        Ok(Self { dofs, grounded, frames, prescribed, planes, oblique, harmonic: Vec::new() })
     }
 
     fn of_edges(
@@ -234,8 +236,9 @@ impl Unknowns {
             };
             is_rotational || conducts[i] && is_gradient(space.order(), i < edges.len(), c)
         });
-        let planes = planes(mesh, boundaries)?;
-        Ok(Self { dofs, grounded: Vec::new(), frames: BTreeMap::new(), prescribed, planes, harmonic })
+        let (planes, oblique) = planes(mesh, boundaries)?;
+        let (grounded, frames) = (Vec::new(), BTreeMap::new());
+        Ok(Self { dofs, grounded, frames, prescribed, planes, oblique, harmonic })
     }
 
     /// The coefficients of a carrier, of a node `A_x, A_y, A_z` and `ψ`, out of a vector of unknowns; zero where a component is fixed.
@@ -288,6 +291,12 @@ impl Unknowns {
         self.planes.iter().map(|(&node, &axes)| (node, axes))
     }
 
+    /// Nodes on conditioned surfaces that are at right angles to no axis, with the unit normals of the triangles there: along these
+    /// the nodes must not move either.
+    pub fn oblique_nodes(&self) -> &[(NodeId, Point)] {
+        &self.oblique
+    }
+
     /// Adds the components of a carrier, of a node `x, y, z` and ψ, into a vector of unknowns; what is fixed is dropped.
     #[inline]
     pub fn scatter_add(&self, values: &mut [c64], carrier: CarrierId, components: [c64; 4]) {
@@ -313,18 +322,23 @@ impl Unknowns {
     }
 }
 
-/// The axes across conditioned planes, at every vertex on one.
-fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<BTreeMap<NodeId, u8>, SolverError> {
-    let mut planes = BTreeMap::new();
+/// What [`planes`] finds.
+type Planes = (BTreeMap<NodeId, u8>, Vec<(NodeId, Point)>);
+
+/// The axes across conditioned planes, at every vertex on one, and the normals of the triangles across no axis at theirs.
+fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<Planes, SolverError> {
+    let (mut planes, mut oblique) = Planes::default();
     for (surface, _) in boundaries {
         for &triangle in mesh.topology().surface(surface)? {
             let area = area_vector(triangle.map(|v| mesh.point(v)));
-            if let Some(axis) = axis_of(area.map(|c| c / norm(area))) {
-                triangle.iter().for_each(|&v| *planes.entry(v).or_insert(0) |= 1 << axis);
+            let normal = area.map(|c| c / norm(area));
+            match axis_of(normal) {
+                Some(axis) => triangle.iter().for_each(|&v| *planes.entry(v).or_insert(0) |= 1 << axis),
+                None => oblique.extend(triangle.map(|v| (v, normal))),
             }
         }
     }
-    Ok(planes)
+    Ok((planes, oblique))
 }
 
 /// The faces of conditioned surfaces at every carrier of the space, but for flux-parallel ones that have a term instead.

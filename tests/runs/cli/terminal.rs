@@ -121,7 +121,7 @@ fn an_error_leaves_no_bar() {
     let folder = tiny();
     let arguments = ["run", "tiny.toml", "--set", "coils=[]"];
     let Some((text, code)) = on_terminal(folder.path(), "xterm-256color", "", &arguments) else { return };
-    assert_eq!(code, 4, "{text}");
+    assert_eq!(code, 3, "{text}");
     let (bar, end) = text.rsplit_once("error").expect("an error");
     assert!(bar.ends_with("\r\u{1b}[2K") || bar.ends_with('\n') || bar.ends_with("[0m"), "{text}");
     assert!(!end.contains("/2 ["), "{end}");

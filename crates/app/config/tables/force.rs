@@ -3,7 +3,8 @@
 use crate::config::table::table;
 
 table! {
-    /// A body on which the magnetic force and torque are reported, of the meshed part; in harmonics their time average. It is
+    /// A body on which the magnetic force and torque are reported, of the meshed part; in harmonics their time average. Of a body
+    /// that a symmetry plane cuts, the component across the plane is that on its free faces, without the stress in the cut. It is
     /// taken by virtual work in the layer of elements around the body, which must be free of current, magnets, conductors
     /// and B–H curves.
     ///
@@ -18,7 +19,7 @@ table! {
         /// `region`. Each name once.
         name: String = TEXT, need "\"pole\"";
         /// The regions that make up the body, meshed: iron, magnets, or windings that are regions.
-        regions: Vec<String> = NAMES, need "[\"pole\"]";
+        regions: Vec<String> = not_empty(NAMES), need "[\"pole\"]";
         /// The point about which the torque is taken [m].
         about: [f64; 3] = length(FINITE) => [0.0; 3];
     }

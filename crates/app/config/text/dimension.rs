@@ -94,10 +94,10 @@ dimensions! {
         decimal("T2 m3", 0), decimal("T\u{b2} m\u{b3}", 0);
     /// A power [W].
     Power = "a power", in "W", such as "20 W":
-        decimal("W", 0), decimal("mW", -3), decimal("kW", 3);
+        decimal("W", 0), decimal("uW", -6), decimal("mW", -3), decimal("kW", 3), decimal("MW", 6);
     /// An energy [J].
     Energy = "an energy", in "J", such as "1.5 J":
-        decimal("J", 0), decimal("mJ", -3), decimal("kJ", 3);
+        decimal("J", 0), decimal("uJ", -6), decimal("mJ", -3), decimal("kJ", 3);
     /// A force [N].
     Force = "a force", in "N", such as "20 N":
         decimal("N", 0), decimal("mN", -3), decimal("kN", 3);
@@ -109,13 +109,13 @@ dimensions! {
         decimal("V", 0), decimal("mV", -3), decimal("kV", 3);
     /// A resistance [Ω].
     Resistance = "a resistance", in "\u{3a9}", such as "0.2 ohm":
-        decimal("\u{3a9}", 0), decimal("ohm", 0), decimal("mohm", -3), decimal("kohm", 3);
+        decimal("\u{3a9}", 0), decimal("ohm", 0), decimal("uohm", -6), decimal("mohm", -3), decimal("kohm", 3);
     /// An inductance [H].
     Inductance = "an inductance", in "H", such as "10 uH":
         decimal("H", 0), decimal("mH", -3), decimal("uH", -6), decimal("\u{b5}H", -6), decimal("nH", -9);
     /// A capacitance [F].
     Capacitance = "a capacitance", in "F", such as "100 nF":
-        decimal("F", 0), decimal("uF", -6), decimal("\u{b5}F", -6), decimal("nF", -9), decimal("pF", -12);
+        decimal("F", 0), decimal("mF", -3), decimal("uF", -6), decimal("\u{b5}F", -6), decimal("nF", -9), decimal("pF", -12);
     /// A ratio of like quantities [1].
     Ratio = "a ratio", in "1", such as "1e-8 1":
         decimal("1", 0), decimal("%", -2);

@@ -7,7 +7,7 @@ use super::iron;
 use super::markup::{Card, header};
 use super::observed;
 use super::plane::bounds;
-use super::ticks::{duration, group_digits, number, threads, trim_zeros};
+use super::ticks::{self, duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::Objective;
@@ -84,7 +84,7 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
         let remark = objective.map_or("so far".to_owned(), |o| {
             format!("{} → {} {}", number(o.initial, 4), number(o.best, 4), unit(data))
         });
-        cards.push(("objective F / F₀", number(ratio, 4), remark));
+        cards.push(("objective F / F₀", ticks::ratio(ratio), remark));
     }
     cards.extend(objective.map(|objective| finer_mesh_card(data, objective)));
     let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
@@ -106,11 +106,11 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         Verdict::NotConfirmed => "NOT CONFIRMED",
     };
     let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
-    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", number(objective.ratio, 4), number(bar, 2)));
+    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), number(bar, 2)));
     let other = accuracy.cross_check.as_ref().map(|check| {
         let CrossCheck { elements, order, ratio, by_estimate, .. } = check;
         let source = if *by_estimate { ", by the estimate" } else { "" };
-        format!("{} by {elements} elements of order {order}{source}", number(*ratio, 4))
+        format!("{} by {elements} elements of order {order}{source}", ticks::ratio(*ratio))
     });
     let refined = match (accuracy.refinements, accuracy.within_tolerance) {
         (_, None) => None,
@@ -144,9 +144,9 @@ fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
                     format!("both shapes on the elements of the run, cut into {tets} tetrahedra{violated}")
                 }
             };
-            (number(ratio, 4), remark)
+            (ticks::ratio(ratio), remark)
         }
-        (Some(ratio), None) => (number(ratio, 4), "the initial shape is the best".to_owned()),
+        (Some(ratio), None) => (ticks::ratio(ratio), "the initial shape is the best".to_owned()),
         (None, ..) if data.config.output.verify_refinement == 0.0 => {
             ("not checked".to_owned(), "output.verify_refinement is 0".to_owned())
         }

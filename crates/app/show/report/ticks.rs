@@ -61,7 +61,10 @@ pub(crate) fn common_power(ticks: &[f64]) -> Option<i32> {
     let step = ticks.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
     let largest = ticks.iter().fold(0.0_f64, |largest, t| largest.max(t.abs()));
     let is_plain = (1e-3..1e6).contains(&step) && largest < 1e6;
-    (step.is_finite() && step > 0.0 && !is_plain).then(|| largest.log10().floor() as i32)
+    // Dividing by one makes no text shorter.
+    (step.is_finite() && step > 0.0 && !is_plain)
+        .then(|| largest.log10().floor() as i32)
+        .filter(|power| *power != 0)
 }
 
 /// A power of ten.
@@ -99,6 +102,13 @@ pub(crate) fn number(value: f64, digits: usize) -> String {
         _ if mantissa == "1" => power_of_ten(exponent),
         _ => format!("{} × {}", minus(mantissa), power_of_ten(exponent)),
     }
+}
+
+/// `F/F₀` with four digits, and as many as show two of a small gain.
+pub(crate) fn ratio(value: f64) -> String {
+    let gain = (value - 1.0).abs();
+    let decimals = if gain > 0.0 { (1.0 - gain.log10().floor()).clamp(0.0, 8.0) as usize } else { 0 };
+    number(value, 4.max(1 + decimals))
 }
 
 /// A number with as many decimals as asked for, without trailing zeros.
@@ -167,6 +177,12 @@ fn superscript(exponent: i32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_ratio_shows_its_gain() {
+        let shown = [0.510_67, 1.000_214, 0.999_998_76, 1.0, 12.345_6].map(ratio);
+        assert_eq!(shown, ["0.5107", "1.00021", "0.9999988", "1.000", "12.35"]);
+    }
 
     #[test]
     fn ticks_are_round_and_inside() {

@@ -26,6 +26,8 @@ pub(crate) struct Border {
     /// `FᵀW + D` [H], by rows.
     schur: Vec<Vec<c64>>,
     angular_frequency: f64,
+    /// Iterations of all responses that it solved for, and the largest of their residuals.
+    report: LinearSolverReport,
 }
 
 impl Border {
@@ -45,8 +47,19 @@ impl Border {
         if angular_frequency == 0.0 || solids.count() == 0 && !is_driven {
             return Ok(None);
         }
+        // Those taken over have been counted.
+        let earlier_report = LinearSolverReport {
+            iterations: 0,
+            residual: earlier.as_ref().map_or(0.0, |earlier| earlier.report.residual),
+        };
         let (mut of_solids, mut of_coils) = earlier.map(Self::into_responses).unwrap_or_default();
-        let mut respond = |load: &[c64]| Ok::<_, SolverError>(solve(load)?.0);
+        let mut report = earlier_report;
+        let mut respond = |load: &[c64]| {
+            let (response, own) = solve(load)?;
+            report.iterations += own.iterations;
+            report.residual = report.residual.max(own.residual);
+            Ok::<_, SolverError>(response)
+        };
         of_solids.truncate(solids.count());
         for load in solids.loads.iter().skip(of_solids.len()) {
             of_solids.push(respond(load)?);
@@ -59,8 +72,8 @@ impl Border {
                 (None, None) => respond(&driven.load)?,
             });
         }
-        let border =
-            Self { windings: Arc::clone(windings), solids, responses, schur: Vec::new(), angular_frequency };
+        let (windings, schur) = (Arc::clone(windings), Vec::new());
+        let border = Self { windings, solids, responses, schur, angular_frequency, report };
         let schur = border.eliminated();
         Ok(Some(Self { schur, ..border }))
     }
@@ -96,6 +109,11 @@ impl Border {
     fn loads(&self) -> impl Iterator<Item = &[c64]> {
         let of_coils = self.windings.with_source().map(|(driven, _)| driven.field_load());
         self.solids.loads.iter().map(Vec::as_slice).chain(of_coils)
+    }
+
+    /// Iterations of the responses, and the largest of their residuals.
+    pub(crate) fn report(&self) -> LinearSolverReport {
+        self.report
     }
 
     /// What solid conductors add to the field's matrix.

@@ -11,12 +11,19 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::{Follow, FunctionalValue};
+use crate::coil::{Coil, CoilShape};
 use crate::element::Complex3;
 use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
 use crate::recovery::{BlendedPoint, FixedPlaces, RecoveredPoint};
 use crate::solution::FieldSolution;
+
+/// Places between the centre of an expansion and each of its points, as shares of the way, at which matter is looked for.
+const WITHIN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
+/// Relative permeabilities that differ from one by so much bend the field less than a mesh does.
+const LIKE_AIR: f64 = 1e-3;
 
 /// A symmetry plane at right angles to an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,21 +131,8 @@ impl Multipoles {
         expansion: &Expansion,
         (planes, follow): (&[MirrorPlane], Follow),
     ) -> Result<Self, SolverError> {
-        // All combinations of planes, the points themselves first.
-        let images = |x: Point| -> Vec<(Point, Point)> {
-            let combinations = (0..1usize << planes.len()).map(|bits| {
-                let through = planes.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
-                through.fold((x, [1.0; 3]), |(mut x, mut factors), (_, plane)| {
-                    x[plane.axis] = 2.0 * plane.at - x[plane.axis];
-                    // In a flux-normal plane the image has the components along it reversed: minus one in all, and across it.
-                    let along = -plane.across;
-                    (0..3).for_each(|d| factors[d] *= if d == plane.axis { plane.across } else { along });
-                    (x, factors)
-                })
-            });
-            combinations.collect()
-        };
-        let candidates: Vec<Vec<(Point, Point)>> = expansion.points.iter().map(|&x| images(x)).collect();
+        let candidates: Vec<Vec<(Point, Point)>> =
+            expansion.points.iter().map(|&x| images(x, planes)).collect();
         let all: Vec<Point> = candidates.iter().flatten().map(|(x, _)| *x).collect();
         let found = locate(mesh, &all);
         let count = 1usize << planes.len();
@@ -165,6 +159,34 @@ impl Multipoles {
             Follow::Held | Follow::Mesh => Places::Held(places.iter().map(recovered).collect()),
         };
         Ok(Self { places, terms, domain: expansion.domain })
+    }
+
+    /// The first place on or in the circle or ball of an expansion where B is not the field of sources outside it, and what is there:
+    /// a winding, or another material than air. The terms would be those of no field there.
+    pub fn disturbance(
+        model: &FieldModel,
+        mesh: &Mesh,
+        (expansion, centre): (&Expansion, Point),
+        planes: &[MirrorPlane],
+    ) -> Option<(Point, &'static str)> {
+        let on_the_way =
+            |x: Point, share: f64| std::array::from_fn(|d| centre[d] + share * (x[d] - centre[d]));
+        let inside = |x: Point| WITHIN.map(|share| on_the_way(x, share));
+        let sampled: Vec<Point> = expansion.points.iter().flat_map(|&x| inside(x)).collect();
+        let candidates: Vec<Point> =
+            sampled.iter().flat_map(|&x| images(x, planes)).map(|(x, _)| x).collect();
+        let found = locate(mesh, &candidates);
+        let count = 1usize << planes.len();
+        sampled.iter().zip(candidates.chunks(count)).zip(found.chunks(count)).find_map(
+            |((&place, images), found)| {
+                let hit = images.iter().zip(found).find_map(|(x, found)| Some((*x, found.as_ref()?.0)));
+                let what = match hit {
+                    Some((x, element)) => matter_at(model, element, x)?,
+                    None => "a hole in the mesh",
+                };
+                Some((place, what))
+            },
+        )
     }
 
     /// Elements that must not move.
@@ -200,6 +222,42 @@ impl Multipoles {
             weights.iter().zip(&fields).map(dot).sum()
         };
         self.terms.iter().map(|(term, weights)| (*term, sum(weights))).collect()
+    }
+}
+
+/// A point and its images in all combinations of planes, itself first, with the factors on the components of B there.
+fn images(x: Point, planes: &[MirrorPlane]) -> Vec<(Point, Point)> {
+    let combinations = (0..1usize << planes.len()).map(|bits| {
+        let through = planes.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+        through.fold((x, [1.0; 3]), |(mut x, mut factors), (_, plane)| {
+            x[plane.axis] = 2.0 * plane.at - x[plane.axis];
+            // In a flux-normal plane the image has the components along it reversed: minus one in all, and across it.
+            let along = -plane.across;
+            (0..3).for_each(|d| factors[d] *= if d == plane.axis { plane.across } else { along });
+            (x, factors)
+        })
+    });
+    combinations.collect()
+}
+
+/// What there is at a point of an element but air.
+fn matter_at(model: &FieldModel, element: ElementId, x: Point) -> Option<&'static str> {
+    let is_wound = |coil: &Coil| match &coil.shape {
+        CoilShape::Racetrack(shape) => shape.current_density(x) != [0.0; 3],
+        CoilShape::Region(_) | CoilShape::Solid(_) => false,
+    };
+    let region = model.topology().region_of()[element.index()];
+    let permeability = model.materials()[region.index()].relative_permeability;
+    if model.coil_at(element).is_some() || model.coils().iter().any(is_wound) {
+        Some("a winding")
+    } else if model.curve_of(element).is_some() || (permeability - 1.0).abs() > LIKE_AIR {
+        Some("a material with a permeability")
+    } else if model.remanence_of(element) != [0.0; 3] {
+        Some("a magnet")
+    } else if model.has_eddy_currents(element) {
+        Some("a conductor with eddy currents")
+    } else {
+        model.is_open(element).then_some("the shell of open space")
     }
 }
 

@@ -197,11 +197,16 @@ impl PreparedSystem {
     ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
         let unknowns = self.border.as_ref().map_or(right_side.len(), |border| border.field_unknowns()[0]);
         let (right_side, of_solids) = right_side.split_at(unknowns.min(right_side.len()));
-        let (mut values, report) = match &self.tangent {
+        let (mut values, mut report) = match &self.tangent {
             Some(tangent) => tangent.solve_adjoint(right_side, &mut self.field)?,
             None => self.field.solve(right_side)?,
         };
         let border = self.border.as_ref();
+        // What circuits drive is as exact as the responses that it is made of.
+        if let (Some(border), Excitation::Voltages) = (border, excitation) {
+            report.residual = report.residual.max(border.report().residual);
+            report.iterations += border.report().iterations;
+        }
         let currents = border.map(|border| border.complete(&mut values, of_solids, excitation));
         Ok((values, report, currents.unwrap_or_default()))
     }

@@ -230,6 +230,16 @@ impl FieldModel {
         self.weak_form.shell().into_iter().flat_map(Shell::elements)
     }
 
+    /// Whether an element carries eddy currents, so that it has ψ.
+    pub fn has_eddy_currents(&self, e: ElementId) -> bool {
+        self.weak_form.conducts(e)
+    }
+
+    /// Whether an element is of the shell that stands for open space.
+    pub(crate) fn is_open(&self, e: ElementId) -> bool {
+        self.weak_form.stretch_of(e).is_some()
+    }
+
     /// Elements that a coil meets, with its window.
     pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         self.all_sources().flat_map(Sources::coil_elements)

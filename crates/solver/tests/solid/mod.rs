@@ -101,6 +101,8 @@ fn a_bar_is_a_coil_among_others() {
     for elements in ALL {
         let given = with_a_bar(&mesh, elements, 300.0, (100.0, NO_CIRCUIT));
         let (state, _) = given.solve(&mesh).expect("a field");
+        let report = state.report();
+        assert!(report.iterations > 0 && report.residual > 0.0 && report.residual < 1e-12, "{report:?}");
         let found = terminals(&given, &mesh, &state).expect("terminals");
         let [l, m] = [found.inductance[0][1], found.inductance[1][0]];
         println!("{elements:?}: {:?} M = {l:e}", found.coils[0]);
