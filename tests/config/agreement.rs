@@ -204,7 +204,8 @@ fn program_and_schema_agree() {
             (false, false) => row[1] += 1,
             (true, false) => {
                 row[2] += 1;
-                wrong.push(format!("{name}, {change:?}: only the schema refuses: {:?}", verdict.complaints));
+                let complaints = verdict.complaints;
+                wrong.push(format!("{name}, {change:?}: only the schema refuses: {complaints:?}\n{config}"));
             }
             (false, true) => {
                 row[3] += 1;

@@ -92,7 +92,7 @@ fn a_mesh_that_the_memory_does_not_let_refine_is_searched_on_as_it_is() {
     let out = folder.path().join("out");
     let run = device.command("run", &out);
     let mut command = std::process::Command::new("sh");
-    command.args(["-c", "ulimit -d 100000 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
+    command.args(["-c", "ulimit -d 115000 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
     command.args(run.get_args()).args(["--threads", "1"]);
     finish(&mut command)
         .completed()

@@ -209,15 +209,9 @@ fn a_force_across_a_plane_that_cuts_its_body_is_asked_about() {
 fn a_device_in_open_space_needs_no_condition() {
     let home = folder();
     let path = home.path().join("magnet.toml");
-    let warned = |open: &str| {
-        std::fs::write(&path, MAGNET.replace("OPEN", open)).expect("written");
-        let json = finish(&mut command(&[&"check", &path, &"--json"])).exits_with(0).json();
-        texts(&json["warnings"]).contains("no surface has a condition")
-    };
-    let sides = |sides: &str| format!("[open]\nsurfaces = [{sides}]");
-    assert!(!warned(&sides("\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_min\", \"z_max\"")));
-    assert!(warned(&sides("\"x_max\", \"y_min\", \"y_max\", \"z_min\", \"z_max\"")));
-    assert!(warned(""));
+    std::fs::write(&path, MAGNET).expect("written");
+    let json = finish(&mut command(&[&"check", &path, &"--json"])).exits_with(0).json();
+    assert!(!texts(&json["warnings"]).contains("no surface has a condition"), "{}", json["warnings"]);
 }
 
 /// A cube of 20 mm in a box, whole.
@@ -245,7 +239,8 @@ relative_permeability = 1.05
 material = "ndfeb"
 remanence = [0, 0, "1.2 T"]
 
-OPEN
+[open]
+surfaces = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
 "#;
 
 #[test]

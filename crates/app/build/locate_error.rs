@@ -102,7 +102,7 @@ impl<'a> DiagnosticSink<'a> {
         }
     }
 
-    /// Keeps one.
+    /// Keeps a diagnostic.
     pub(super) fn push(&mut self, fault: Diagnostic) {
         self.faults.push(fault);
     }

@@ -91,6 +91,7 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     faults
 }
 
+/// The expansion that a table asks for, in space.
 fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
     let frame = Frame::new(set.center, set.axis.vector(), set.direction)?;
     Ok(match set.shape {
@@ -100,29 +101,28 @@ fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
 }
 
 /// Refuses the expansions of a problem of which a point lies outside the mesh, which would fail when the run is over, and those
-/// around matter, whose terms mean nothing.
+/// that hold matter, whose terms mean nothing.
 pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
+    let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
     for (k, set) in config.multipoles.iter().enumerate() {
-        let (mesh, model) = (problem.original(), &problem.states()[0]);
-        if sink.take(multipoles(config, set, mesh, model))?.is_none() {
+        if sink.take(multipoles(config, set, mesh, &states[0]))?.is_none() {
             continue;
         }
         let planes = planes(config, set, mesh)?;
-        // Above 0 Hz conductors carry currents.
-        let models = || std::iter::once(model).chain(problem.states().last());
-        let at = |model| Multipoles::disturbance(model, mesh, (&expansion(set).ok()?, set.center), &planes);
-        if let Some((place, what)) = models().find_map(at) {
-            let message = format!(
-                "the {} of the expansion `{}` holds {what}, at {}",
-                if set.shape == ExpansionShape::Ball { "ball" } else { "circle" },
-                set.name,
-                millimetres(place)
-            );
-            let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
-            let expected = "air alone in it: only there is B a sum of the terms of sources outside";
-            sink.push(fault.expected(expected).help("take a smaller radius, or another center"));
-        }
+        let Some((place, what)) = Multipoles::disturbance(states, mesh, &expansion(set)?, &planes) else {
+            continue;
+        };
+        let (shape, expected) = match set.shape {
+            ExpansionShape::Circle => ("circle", "a circle in air, on which B is that of sources beside it"),
+            ExpansionShape::Ball => {
+                ("ball", "air alone in it: only there is B a sum of the terms of sources outside")
+            }
+        };
+        let place = millimetres(place);
+        let message = format!("the {shape} of the expansion `{}` holds {what}, at {place}", set.name);
+        let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
+        sink.push(fault.expected(expected).help("take a smaller radius, or another center"));
     }
     sink.check()
 }

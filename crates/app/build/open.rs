@@ -13,7 +13,7 @@ use crate::error::Error;
 const REGION: &str = "open";
 
 /// Its outer surface.
-pub(super) const INFINITY: &str = "infinity";
+const INFINITY: &str = "infinity";
 
 /// The name of the shell's region.
 pub(super) fn region_of(open: &Open) -> &str {

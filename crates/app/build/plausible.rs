@@ -5,7 +5,7 @@
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
@@ -127,7 +127,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Ve
             ));
         }
     }
-    if config.boundaries.is_empty() && !ends_at_infinity(mesh.topology()) {
+    if config.boundaries.is_empty() && !ends_at_infinity(config, mesh.topology()) {
         warnings.push(
             "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
              flux_normal"
@@ -373,30 +373,39 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     ))
 }
 
-/// What to say of forces that are sought across a plane which cuts their body: of these only a part is computed.
+/// What to say of forces and torques that are sought across a plane which cuts their body: of these only a part is computed.
 fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let topology = mesh.topology();
     let mut warnings = Vec::new();
-    let forces = functionals(config).into_iter().filter(|(_, own)| own.kind == ObjectiveKind::Force);
-    for (path, force) in forces {
-        let direction = force.direction.unwrap_or_default();
-        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == force.region.as_ref()) else {
+    for (path, own) in functionals(config) {
+        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == own.region.as_ref()) else {
             continue;
+        };
+        let direction = own.direction.unwrap_or_default();
+        // Of the virtual motion of the body.
+        let velocity = |x: Point| match own.kind {
+            ObjectiveKind::Force => direction,
+            ObjectiveKind::Torque => cross(direction, sub(x, body.about)),
+            _ => [0.0; 3],
         };
         let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
         let outside: Vec<[NodeId; 3]> = regions.flat_map(|region| topology.outer_faces(region)).collect();
+        // Such planes hold the nodes of the body (`Force`).
+        let goes_across = |face: &[NodeId; 3]| {
+            let corners = face.map(|node| mesh.point(node));
+            let (area, v) = (area_vector(corners), velocity(centroid(corners)));
+            let is_normal_to_an_axis = area.iter().any(|c| beside((c / norm(area)).abs()) < INCLINED);
+            is_normal_to_an_axis && dot(v, area).abs() > INCLINED * norm(v) * norm(area)
+        };
         let cut = config.boundaries.surfaces().find(|surface| {
-            let own = faces_of(topology, [surface.as_str()]);
-            outside.iter().filter(|face| own.contains(&face_key(**face))).any(|face| {
-                let area = area_vector(face.map(|node| mesh.point(node)));
-                dot(direction, area).abs() > INCLINED * norm(direction) * norm(area)
-            })
+            let faces = faces_of(topology, [surface.as_str()]);
+            outside.iter().any(|face| faces.contains(&face_key(*face)) && goes_across(face))
         });
         if let Some(surface) = cut {
             warnings.push(format!(
-                "{path}: the surface `{surface}` cuts the body `{}`, and across it the force is that on the free faces of the meshed part \
-                 alone, without the stress in the cut: of the half of a body that is pulled towards its other half it is no force that \
-                 anything feels. Take a direction along the surface, or the whole body",
+                "{path}: the surface `{surface}` cuts the body `{}`, and what is computed across it is that on the free faces of \
+                 the meshed part, without the stress in the cut; on half of a symmetric body that is not a force on anything. \
+                 Take a direction along the surface, or mesh the whole body",
                 body.name
             ));
         }
@@ -405,8 +414,9 @@ fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
 }
 
 /// Whether all that bounds a mesh is the end of a shell of open space.
-fn ends_at_infinity(topology: &Topology) -> bool {
-    let end = faces_of(topology, [open::INFINITY]);
+fn ends_at_infinity(config: &Config, topology: &Topology) -> bool {
+    let Some((infinity, _)) = open::condition(config) else { return false };
+    let end = faces_of(topology, [infinity.as_str()]);
     let regions = (0..topology.region_names().len()).map(RegionId::new);
     regions.flat_map(|region| topology.outer_faces(region)).all(|face| end.contains(&face_key(face)))
 }

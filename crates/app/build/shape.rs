@@ -19,8 +19,8 @@ use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
-/// Cosine of an angle to a plane up to which a direction is along it.
-const ALONG: f64 = 1e-6;
+/// Sine of the angle to a plane up to which a direction is along it: files carry few digits, and their facets differ by that.
+const ALONG: f64 = 1e-3;
 
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
@@ -366,40 +366,40 @@ fn held_node_fault(
     let (space, unknowns) = (model.space(), model.unknowns());
     let moves = |node: NodeId| may_move(surface, map, node);
     if let Some(held) = unknowns.held_carriers().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
-        let message = format!(
-            "a surface with a condition that is curved, oblique or has an applied field would move at {}",
-            millimetres(space.position(inputs.mesh, held))
-        );
-        let fault = inputs.source.diagnostic("remesh", message);
-        return Some(fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed"));
+        return Some(leaves_its_surface(inputs, space.position(inputs.mesh, held)));
     }
     let designed = |node: NodeId| surface.nodes().binary_search(&node).ok();
     let leaves = |node: NodeId, axis: usize| match designed(node) {
         Some(i) => surface.directions()[i][axis] != 0.0,
         None => map.is_unknown(node, axis),
     };
-    let across_axes = unknowns.plane_nodes().find_map(|(node, axes)| {
-        let axis = (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis))?;
-        Some((node, ["x", "y", "z"][axis].to_owned(), "the plane listed in remesh.slide"))
-    });
-    let leaves_along = |node: NodeId, normal: Point| match designed(node) {
-        Some(i) => dot(surface.directions()[i], normal).abs() > ALONG * norm(surface.directions()[i]),
-        None => moves(node),
-    };
-    let across_normals = || {
-        let (node, [x, y, z]) =
-            unknowns.oblique_nodes().iter().find(|(node, normal)| leaves_along(*node, *normal))?;
-        let fixed = "the surface listed in remesh.fixed (only planes normal to x, y or z can slide)";
-        Some((*node, format!("({x:.3}, {y:.3}, {z:.3})"), fixed))
-    };
-    let (node, across, listed) = across_axes.or_else(across_normals)?;
+    if let Some((node, _)) = unknowns.oblique_nodes().iter().find(|(node, normal)| match designed(*node) {
+        Some(i) => dot(surface.directions()[i], *normal).abs() > ALONG * norm(surface.directions()[i]),
+        None => (0..3).any(|axis| map.is_unknown(*node, axis) && normal[axis].abs() > ALONG),
+    }) {
+        return Some(leaves_its_surface(inputs, inputs.mesh.point(*node)));
+    }
+    let (node, axis) = unknowns.plane_nodes().find_map(|(node, axes)| {
+        (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
+    })?;
     let message = format!(
-        "a plane with a condition at right angles to {across} would lose its nodes at {}",
+        "a plane with a condition at right angles to {} would lose its nodes at {}",
+        ["x", "y", "z"][axis],
         millimetres(inputs.mesh.point(node))
     );
     let fault = inputs.source.diagnostic("remesh", message);
     Some(fault.expected(match designed(node) {
-        Some(_) => "a design.direction along the plane, or a design.surface that ends before it".to_owned(),
-        None => format!("{listed}, or a remesh region that ends before it"),
+        Some(_) => "a design.direction along the plane, or a design.surface that ends before it",
+        None => "the plane listed in remesh.slide, or a remesh region that ends before it",
     }))
+}
+
+/// A node of a conditioned surface at right angles to no axis that would leave it.
+fn leaves_its_surface(inputs: &Inputs<'_>, place: Point) -> Diagnostic {
+    let message = format!(
+        "a surface with a condition that is curved, oblique or has an applied field would move at {}",
+        millimetres(place)
+    );
+    let fault = inputs.source.diagnostic("remesh", message);
+    fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed")
 }

@@ -83,7 +83,8 @@ pub struct RunResult {
     pub linear_solver: LinearSolverResult,
     /// Wall time by part, with `total` [s].
     pub timings_s: BTreeMap<String, f64>,
-    /// What the field of this design says against the model it was computed with; empty where it says nothing.
+    /// Bounds that the best design violates and better designs that nearly keep them, and what the field of this design says against
+    /// the model it was computed with; empty where there is nothing to say.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// Most memory held [bytes].

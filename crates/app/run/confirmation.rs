@@ -14,7 +14,7 @@ use fluxmorph_remesh::Moved;
 use super::Session;
 use super::estimate::{Estimator, left_out};
 use super::facets::{curved_facets, described, is_empty};
-use super::finer::{Cut, FinerProblem};
+use super::finer::{Cut, FinerProblem, looked_at_once};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
@@ -283,7 +283,7 @@ pub(super) fn cross_check(
     let mut other = Config { constraints: Vec::new(), ..config.clone() };
     (other.analysis.elements, other.analysis.order) = (Elements::Edge, order);
     (other.analysis.penalty, other.analysis.linear_solver.method) = (1.0, SolverMethod::Automatic);
-    let problem = FinerProblem::new(&other, source, &meshes.full, Cut::Halvings(0))?;
+    let problem = FinerProblem::new(&looked_at_once(other), source, &meshes.full, Cut::Halvings(0))?;
     memory_limit::check_problem(&problem.setup.problem, source, OverwritePolicy::Keep)?;
     let Some(analyses) = problem.analyses(&meshes.solved, interrupted)? else { return Ok(None) };
     let [initial, best] = analyses.each_ref().map(|analysis| analysis.objective.unwrap_or(f64::NAN));

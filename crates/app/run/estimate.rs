@@ -12,7 +12,7 @@ use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Meas
 use fluxmorph_solver::SolverError;
 use fluxmorph_solver::enrichment::Effort;
 
-use super::finer::{Cut, FinerProblem};
+use super::finer::{Cut, FinerProblem, looked_at_once};
 use crate::build::{Setup, memory_limit};
 use crate::config::{Config, ElementOrder, Elements, SourceMap};
 use crate::error::Error;
@@ -106,7 +106,10 @@ impl<'a> Estimator<'a> {
     fn on_halved_edges(&mut self, analysis: &Analysis) -> Result<ErrorEstimate, Error> {
         let finer = match self.finer.take() {
             Some(finer) => finer,
-            None => FinerProblem::new(self.config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?,
+            None => {
+                let config = looked_at_once(self.config.clone());
+                FinerProblem::new(&config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?
+            }
         };
         let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
         let error = |(fine, coarse): (f64, f64)| OF_HALVED_EDGES * (fine - coarse);

@@ -173,7 +173,7 @@ fn field_alone(config: &Config) -> Config {
     let mut alone = Config { design: None, remesh: None, morph: None, ..config.clone() };
     let is_of_field = |own: &Functional| own.kind.is_of_field();
     alone.constraints.retain(|constraint| constraint.limit.functional().is_some_and(is_of_field));
-    looked_at_once(alone)
+    alone
 }
 
 /// Relative residual of a field whose objective is looked at once: its digits are far below the errors that a check is about, and

@@ -142,10 +142,9 @@ impl MeshIndependence<'_> {
             Ok(Outcome::Found(verification)) => {
                 for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
                     let (name, bound) = (&constraint.name, constraint.bound);
-                    let share = (constraint.value - bound) / bound.abs().max(f64::MIN_POSITIVE);
                     observer.warning(&format!(
-                        "on the finer mesh the best shape violates the constraint `{name}`: by {:.1e} of its bound",
-                        share.abs()
+                        "on the finer mesh the best shape violates the constraint `{name}`: {}",
+                        excess(constraint.value - bound, bound)
                     ));
                 }
                 objective.verified_ratio = Some(verification.ratio);
@@ -173,7 +172,7 @@ impl MeshIndependence<'_> {
     fn compute_on_finer_elements(&self, interrupted: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         let Some(meshes) = self.meshes else { return Ok(Outcome::CutShort) };
         let parts = self.config.output.verify_refinement;
-        let mesh = FinerMesh::new(self.config, &meshes.full, Cut::Growth(parts))?;
+        let mesh = FinerMesh::new(&looked_at_once(self.config.clone()), &meshes.full, Cut::Growth(parts))?;
         if let Some(shortage) = memory_limit::shortage(self.sizes.on_other_mesh(mesh.growth())[0]) {
             return Ok(Outcome::TooLarge(shortage));
         }
@@ -282,6 +281,16 @@ fn analysis_at(
         None => problem.moved(&[])?,
     };
     Ok(problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?)
+}
+
+/// How far a value is from its bound, as a share of this where it is none of zero.
+fn excess(beyond: f64, bound: f64) -> String {
+    let share = beyond / bound.abs();
+    match share.abs() {
+        share_size if !share_size.is_finite() => format!("{beyond:+.1e} in its unit"),
+        1e-4.. => format!("{:+.2} % from its bound", 100.0 * share),
+        _ => format!("{share:+.1e} of its bound"),
+    }
 }
 
 #[cfg(test)]

@@ -225,6 +225,7 @@ impl Session<'_> {
                 observer,
             )?
         };
+        result.warnings.splice(0..0, optimised.warnings.clone());
         self.keep_search(&mut result, observer)?;
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
         if let Some([at_initial, at_best]) = &errors {

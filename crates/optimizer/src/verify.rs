@@ -21,15 +21,12 @@ use crate::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 /// step of 2 % of the span leaves of any function that bends.
 const ROUNDING: f64 = 1e-9;
 
-/// Remainders over F(p) that the solver's residual alone may leave, the tolerance of a state: from there on no slope is fitted.
-const RESIDUAL: f64 = 1e-11;
-
-/// Fewest remainders above it that a slope is fitted to.
+/// Fewest remainders above the residual of the states that a slope is fitted to.
 const FEWEST: usize = 3;
 
-/// Change over the span, as a share of F(p), below which a difference is related to this and not to the change itself: what a
-/// residual of 1e-11 leaves of a difference over a step of 5e-4 is 1e-6 of it.
-const LEAST_SLOPE: f64 = 1e-2;
+/// Change over the span, as a share of F(p), below which a difference is related to this and not to the change itself: there the
+/// parts of a derivative cancel.
+const LEAST_SLOPE: f64 = 1e-3;
 
 /// Steps for the bound on a thickness, a smooth maximum over many places: it bends within hundredths of a millimetre, and
 /// is computed without a field, so that small steps cost no digits.
@@ -57,6 +54,8 @@ pub struct Settings {
     pub largest_error: f64,
     /// Seed of the directions. Default 1.
     pub seed: u64,
+    /// What the residual of the states may move F by, over F. Default 1e-11; of a problem their tolerance, of what has no field zero.
+    pub residual: f64,
 }
 
 impl Default for Settings {
@@ -69,7 +68,16 @@ impl Default for Settings {
             least_slope: 1.95,
             largest_error: 1e-6,
             seed: 1,
+            residual: 1e-11,
         }
+    }
+}
+
+impl Settings {
+    /// The change over the span, as a share of F(p), that differences are related to at least: half the residual over a step of
+    /// the difference is as much of it as is allowed.
+    fn least_change(&self) -> f64 {
+        LEAST_SLOPE.max(0.5 * self.residual / (self.difference_step * self.largest_error))
     }
 }
 
@@ -87,7 +95,7 @@ pub struct Direction {
     pub adjoint: f64,
     /// The same by central difference.
     pub difference: f64,
-    /// `|difference − adjoint| / |adjoint|`, with a thousandth of F(p) for an adjoint that is smaller.
+    /// `|difference − adjoint| / |adjoint|`, with a hundredth of F(p) for an adjoint that is smaller, for states solved to 1e-11.
     pub error: f64,
 }
 
@@ -148,7 +156,8 @@ pub fn certify(
     let mut cache = SolverCache::default();
     let base = problem.evaluate(p, Derivatives::First, &mut cache, &mut NoProgress)?;
     let at = (p, &base, &cache);
-    let mut settings = *settings;
+    let tolerance = problem.states().iter().map(|state| state.setup().linear_solver.tolerance);
+    let mut settings = Settings { residual: tolerance.fold(0.0, f64::max), ..*settings };
     for _ in 0..MOST_HALVINGS {
         match certify_at(problem, at, &settings, interrupted, &mut progress) {
             Err(Error::Remesh(RemeshError::Inverted { .. })) => {
@@ -204,7 +213,9 @@ fn certify_at(
             Quantity::Thickness { .. } => FINE,
             _ => [settings.first_step, settings.difference_step],
         };
-        let settings = Settings { first_step, difference_step, ..*settings };
+        let residual =
+            if matches!(constraint.quantity, Quantity::Field(_)) { settings.residual } else { 0.0 };
+        let settings = Settings { first_step, difference_step, residual, ..*settings };
         let certificate = measure(&function, p, measured.value, gradient, &span, &settings, report)?;
         constraints.push(Named { name: constraint.name.clone(), certificate });
     }
@@ -273,7 +284,7 @@ pub fn measure(
         let odd = |h: f64| Ok::<_, Error>(value(&direction, h)? - value(&direction, -h)?);
         let difference = (8.0 * odd(h)? - odd(2.0 * h)?) / (12.0 * h);
         let linear = remainders.iter().all(|&r| r <= ROUNDING);
-        let clear = remainders.iter().take_while(|&&r| r > RESIDUAL).count();
+        let clear = remainders.iter().take_while(|&&r| r > settings.residual).count();
         let fitted = if clear < FEWEST { steps.len() } else { clear };
         let measured = Direction {
             slope: if linear { 2.0 } else { fitted_slope(&steps[..fitted], &remainders[..fitted]) },
@@ -281,7 +292,7 @@ pub fn measure(
             remainders,
             adjoint,
             difference,
-            error: (difference - adjoint).abs() / adjoint.abs().max(LEAST_SLOPE),
+            error: (difference - adjoint).abs() / adjoint.abs().max(settings.least_change()),
         };
         progress(index, &measured);
         directions.push(measured);
@@ -344,8 +355,8 @@ mod tests {
 
     #[test]
     fn what_the_residual_of_a_state_leaves_spoils_no_certificate_and_covers_no_wrong_gradient() {
-        // A thousandth over the whole span, hardly bent, and known to 4e-12 alone.
-        let noisy = |p: &[f64]| Ok(1.0 + 1e-3 * p[0] + 1e-5 * p[0] * p[0] + 4e-12 * (1e7 * p[0]).sin());
+        // A thousandth over the whole span, hardly bent, and known to 1e-12 alone.
+        let noisy = |p: &[f64]| Ok(1.0 + 1e-3 * p[0] + 1e-5 * p[0] * p[0] + 1e-12 * (1e7 * p[0]).sin());
         let certify = |gradient: f64| {
             measure(&noisy, &[0.0], 1.0, &[gradient], &[1.0], &Settings::default(), |_, _| {}).unwrap()
         };

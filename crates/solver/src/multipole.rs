@@ -79,6 +79,21 @@ impl Harmonic {
 }
 
 impl Domain {
+    /// The centre [m].
+    pub fn centre(&self) -> Point {
+        self.frame.centre()
+    }
+
+    /// The reference radius [m].
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Whether it is a ball, and not a circle.
+    pub fn is_ball(&self) -> bool {
+        self.is_ball
+    }
+
     /// Whether an element's middle lies in the ball, or in the circle while the element reaches across its plane.
     pub fn meets(&self, vertices: [Point; 4]) -> bool {
         let [x, y, z] = self.frame.local(centroid(vertices));

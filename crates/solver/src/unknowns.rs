@@ -338,6 +338,8 @@ fn planes(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<Planes, Solv
             }
         }
     }
+    oblique.sort_by_key(|(node, normal): &(NodeId, Point)| (*node, normal.map(f64::to_bits)));
+    oblique.dedup();
     Ok((planes, oblique))
 }
 

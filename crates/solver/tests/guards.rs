@@ -103,6 +103,18 @@ fn a_negative_diagonal_is_refused_by_complete_factors_and_audited_after_incomple
 }
 
 #[test]
+fn an_incomplete_factor_goes_on_where_others_may_end() {
+    let residual = |method: Method| {
+        let settings = LinearSolverSettings { tolerance: 1e-6, required: 1e-6, ..fixed(method) };
+        let (mesh, model) = model(settings);
+        let (state, _) = model.solve(&mesh).expect("a field");
+        state.report().residual
+    };
+    assert!(residual(Method::Incomplete) <= 1e-9);
+    assert!(residual(Method::TwoLevel) > 1e-9, "the settings hold");
+}
+
+#[test]
 fn a_coupling_that_is_no_number_leaves_no_pivot_to_any_method() {
     let causes = no_method_factors(|mut matrix| {
         let row = matrix.structure.row_count() / 2;

@@ -88,7 +88,7 @@ fn the_force_of_team_20_is_within_5_percent_of_the_measured_one() {
         let error = found / expected - 1.0;
         println!("{current} A: {found:.2} N, measured {expected} N, {:+.1} %, {steps} steps", 100.0 * error);
         assert!(error.abs() < 0.05, "{current} A");
-        // One more than steps that are solved exactly take, in two thirds of their time.
+        // One more than steps that are solved exactly take (docs/verification.md).
         assert!(steps <= 9, "{current} A: {steps} steps from zero");
         for (name, points, first) in &places {
             let (found, expected) = (solved.mean(points, 2).abs(), numbers(&measured[name])[k]);

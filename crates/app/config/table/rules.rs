@@ -92,6 +92,11 @@ impl Rules {
         self.add(json!({ "if": is(key, words), "then": then.schema() }))
     }
 
+    /// Where a key is written with none of these words.
+    pub(in crate::config) fn when_none_of(self, key: &str, words: &[&str], then: Then<'_>) -> Self {
+        self.add(json!({ "if": { "required": [key], "not": is(key, words) }, "then": then.schema() }))
+    }
+
     /// Where a key is not written, or with none of these words.
     pub(in crate::config) fn unless(self, key: &str, words: &[&str], then: Then<'_>) -> Self {
         self.add(json!({ "if": is(key, words), "else": then.schema() }))

@@ -116,7 +116,7 @@ pub(super) fn keys_of_the_kind(rules: Rules) -> Rules {
         .when("kind", &DIRECTED, Then { required: &["direction"], refused: &[] })
         .unless("kind", &MAY_BE_DIRECTED, Then { required: &[], refused: &["direction"] })
         .unless("kind", &["homogeneity"], Then { required: &[], refused: &["compare"] })
-        .unless("kind", &OBSERVES, Then { required: &[], refused: &["follow"] })
+        .when_none_of("kind", &OBSERVES, Then { required: &[], refused: &["follow"] })
         .add(json!({ "if": is("kind", &OF_TERMS), "then": { "properties": { "follow": { "const": "space" } } } }))
         .when("compare", &["component"], Then { required: &["direction"], refused: &[] })
         .when("compare", &["vector", "modulus"], Then { required: &[], refused: &["direction"] })

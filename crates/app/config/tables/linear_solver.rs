@@ -53,8 +53,8 @@ table! {
         /// Where the ladder of methods begins.
         method: SolverMethod = WORD => SolverMethod::Automatic;
         /// Largest relative residual of a solution. The default is a hundred times below the 1e-9 that every state is
-        /// audited against, so that values are limited by the mesh and not by the solver. Adjoint problems of a search go
-        /// to 1e-7.
+        /// audited against, so that values are limited by the mesh and not by the solver. Adjoint problems of a search and the
+        /// fields of checks at its end, on finer meshes and by other elements, go to 1e-7, with an incomplete factor to 1e-9.
         tolerance: f64 = number(TOLERANCES) => 1e-11;
         /// Largest factor of a matrix that the program takes by itself, in GiB; where none fits, it takes the incomplete one. A
         /// laptop with 8 GiB holds the default beside the rest.

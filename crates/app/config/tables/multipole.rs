@@ -14,7 +14,8 @@ table! {
     /// constraints of the kinds `multipole` and `multipole_content` name it as their `region`.
     ///
     /// Points beyond a symmetry plane through the centre, one of `[boundaries]` at right angles to a coordinate axis, have the field
-    /// of their image.
+    /// of their image. A ball that holds a winding with a current, iron, a magnet, eddy currents or a hole of the mesh is refused, and
+    /// a circle that goes through them: a circle around them has the terms of the field on it.
     ///
     /// ```toml
     /// [[multipoles]]

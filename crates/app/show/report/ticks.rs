@@ -108,7 +108,8 @@ pub(crate) fn number(value: f64, digits: usize) -> String {
 pub(crate) fn ratio(value: f64) -> String {
     let gain = (value - 1.0).abs();
     let decimals = if gain > 0.0 { (1.0 - gain.log10().floor()).clamp(0.0, 8.0) as usize } else { 0 };
-    number(value, 4.max(1 + decimals))
+    let before = usize::from(value.abs() >= 1.0);
+    number(value, 4.max(before + decimals))
 }
 
 /// A number with as many decimals as asked for, without trailing zeros.

@@ -42,4 +42,6 @@ pub struct Optimised {
     pub worst_residual: f64,
     /// Where the time went, all evaluations together.
     pub timings: Timings,
+    /// What is to be said of the best design: bounds that it violates, and better designs that nearly keep them. Reported already.
+    pub warnings: Vec<String>,
 }

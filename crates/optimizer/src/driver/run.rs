@@ -297,8 +297,9 @@ impl<'a> Run<'a> {
         let names: Vec<String> =
             violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
         let best = self.with_field(best)?;
+        let mut warnings = Vec::new();
         if best.violation > 0.0 {
-            self.warn(&format!(
+            warnings.push(format!(
                 "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
                  design's bounds, or allow more evaluations",
                 names.join(", of ")
@@ -306,7 +307,7 @@ impl<'a> Run<'a> {
         }
         if let Some(missed) = self.missed_by(&best) {
             let (k, excess) = missed.worst;
-            self.warn(&format!(
+            warnings.push(format!(
                 "evaluation {} has an objective of {:.6e}, against {:.6e} of the best design, and does not count: it is \
                  beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
                  method of those that take constraints",
@@ -316,6 +317,7 @@ impl<'a> Run<'a> {
                 self.problem.constraints()[k].name
             ));
         }
+        warnings.iter().for_each(|warning| self.warn(warning));
         let is_infeasible = stop_reason.is_converged() && best.violation > 0.0;
         Ok(Optimised {
             stop_reason: if is_infeasible { StopReason::Infeasible } else { stop_reason },
@@ -328,6 +330,7 @@ impl<'a> Run<'a> {
             initial_quality: initial.quality,
             worst_residual: self.worst_residual,
             timings: self.timings,
+            warnings,
         })
     }
 }

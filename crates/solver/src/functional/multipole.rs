@@ -7,7 +7,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::tet4::{Point, centroid};
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::{Follow, FunctionalValue};
@@ -22,7 +22,10 @@ use crate::solution::FieldSolution;
 /// Places between the centre of an expansion and each of its points, as shares of the way, at which matter is looked for.
 const WITHIN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
-/// Relative permeabilities that differ from one by so much bend the field less than a mesh does.
+/// Barycentric coordinate of a point from which on it lies inside an element and not on its face.
+const OFF_FACES: f64 = 1e-6;
+
+/// What bends the field by less than this share of it disturbs no expansion.
 const LIKE_AIR: f64 = 1e-3;
 
 /// A symmetry plane at right angles to an axis.
@@ -161,32 +164,44 @@ impl Multipoles {
         Ok(Self { places, terms, domain: expansion.domain })
     }
 
-    /// The first place on or in the circle or ball of an expansion where B is not the field of sources outside it, and what is there:
-    /// a winding, or another material than air. The terms would be those of no field there.
+    /// The first place of an expansion where B is not the field of sources outside it in one of some states, and what is there: of
+    /// a ball anywhere in it, of a circle on it. The terms would be those of no field there.
     pub fn disturbance(
-        model: &FieldModel,
+        states: &[FieldModel],
         mesh: &Mesh,
-        (expansion, centre): (&Expansion, Point),
+        expansion: &Expansion,
         planes: &[MirrorPlane],
     ) -> Option<(Point, &'static str)> {
+        let domain = &expansion.domain;
+        let matter_at = |element: ElementId, x: Point| {
+            states.iter().find_map(|state| matter_at(state, domain, element, x)).map(|what| (x, what))
+        };
+        let centre = domain.centre();
         let on_the_way =
             |x: Point, share: f64| std::array::from_fn(|d| centre[d] + share * (x[d] - centre[d]));
-        let inside = |x: Point| WITHIN.map(|share| on_the_way(x, share));
-        let sampled: Vec<Point> = expansion.points.iter().flat_map(|&x| inside(x)).collect();
+        let shares = if domain.is_ball() { &WITHIN[..] } else { &[1.0] };
+        let sampled =
+            expansion.points.iter().flat_map(|&x| shares.iter().map(move |&share| on_the_way(x, share)));
+        let sampled: Vec<Point> = sampled.collect();
         let candidates: Vec<Point> =
             sampled.iter().flat_map(|&x| images(x, planes)).map(|(x, _)| x).collect();
         let found = locate(mesh, &candidates);
         let count = 1usize << planes.len();
-        sampled.iter().zip(candidates.chunks(count)).zip(found.chunks(count)).find_map(
-            |((&place, images), found)| {
-                let hit = images.iter().zip(found).find_map(|(x, found)| Some((*x, found.as_ref()?.0)));
-                let what = match hit {
-                    Some((x, element)) => matter_at(model, element, x)?,
-                    None => "a hole in the mesh",
-                };
-                Some((place, what))
-            },
-        )
+        let at_points = || {
+            let places = candidates.chunks(count).zip(found.chunks(count));
+            sampled.iter().zip(places).find_map(|(&place, (images, found))| {
+                let hit = images.iter().zip(found).find_map(|(x, found)| Some((*x, (*found)?)));
+                let Some((x, (element, within))) = hit else { return Some((place, "a hole in the mesh")) };
+                // On a face either side may be meant.
+                if within.into_iter().any(|share| share < OFF_FACES) { None } else { matter_at(element, x) }
+            })
+        };
+        let inside = || {
+            let elements = mesh.topology().elements();
+            let mut met = elements.filter(|&e| domain.is_ball() && domain.meets(mesh.vertices(e)));
+            met.find_map(|e| matter_at(e, centroid(mesh.vertices(e))))
+        };
+        at_points().or_else(inside)
     }
 
     /// Elements that must not move.
@@ -241,23 +256,29 @@ fn images(x: Point, planes: &[MirrorPlane]) -> Vec<(Point, Point)> {
 }
 
 /// What there is at a point of an element but air.
-fn matter_at(model: &FieldModel, element: ElementId, x: Point) -> Option<&'static str> {
-    let is_wound = |coil: &Coil| match &coil.shape {
-        CoilShape::Racetrack(shape) => shape.current_density(x) != [0.0; 3],
-        CoilShape::Region(_) | CoilShape::Solid(_) => false,
+fn matter_at(state: &FieldModel, domain: &Domain, element: ElementId, x: Point) -> Option<&'static str> {
+    let is_fed = |(k, coil): &(usize, &Coil)| {
+        let winding = state.setup().windings.get(*k).and_then(Option::as_ref);
+        coil.ampere_turns != c64::default() || winding.is_some_and(|winding| winding.voltage.is_some())
     };
-    let region = model.topology().region_of()[element.index()];
-    let permeability = model.materials()[region.index()].relative_permeability;
-    if model.coil_at(element).is_some() || model.coils().iter().any(is_wound) {
-        Some("a winding")
-    } else if model.curve_of(element).is_some() || (permeability - 1.0).abs() > LIKE_AIR {
-        Some("a material with a permeability")
-    } else if model.remanence_of(element) != [0.0; 3] {
+    let is_wound = |(k, coil): (usize, &Coil)| match &coil.shape {
+        CoilShape::Racetrack(shape) => shape.current_density(x) != [0.0; 3],
+        CoilShape::Region(_) | CoilShape::Solid(_) => state.coil_at(element) == Some(k),
+    };
+    let material = state.materials()[state.topology().region_of()[element.index()].index()];
+    // Of eddy currents the field is off by the square of the radius in skin depths.
+    let depth = material.skin_depth(state.angular_frequency()).filter(|_| state.has_eddy_currents(element));
+    let is_shielded = |depth: f64| (domain.radius() / depth).powi(2) > LIKE_AIR;
+    if state.coils().iter().enumerate().filter(is_fed).any(is_wound) {
+        Some("a winding with a current")
+    } else if state.remanence_of(element) != [0.0; 3] {
         Some("a magnet")
-    } else if model.has_eddy_currents(element) {
+    } else if state.curve_of(element).is_some() || (material.relative_permeability - 1.0).abs() > LIKE_AIR {
+        Some("a material with another permeability than air")
+    } else if depth.is_some_and(is_shielded) {
         Some("a conductor with eddy currents")
     } else {
-        model.is_open(element).then_some("the shell of open space")
+        state.is_open(element).then_some("the shell of open space")
     }
 }
 
