@@ -71,7 +71,7 @@ const SAID: [(&str, &str); 8] = [
     ("docs/README.md", "up to 15 T"),
     ("docs/README.md", "mpirun"),
     ("docs/verification.md", "secondary source"),
-    ("docs/howto/gradient_certificate.md", "a thousandth of F"),
+    ("docs/howto/gradient_certificate.md", "a hundredth of F"),
 ];
 
 #[test]
