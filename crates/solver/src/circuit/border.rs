@@ -47,13 +47,10 @@ impl Border {
         if angular_frequency == 0.0 || solids.count() == 0 && !is_driven {
             return Ok(None);
         }
-        // Those taken over have been counted.
-        let earlier_report = LinearSolverReport {
-            iterations: 0,
-            residual: earlier.as_ref().map_or(0.0, |earlier| earlier.report.residual),
-        };
+        // The iterations of those taken over have been counted.
+        let residual = earlier.as_ref().map_or(0.0, |earlier| earlier.report.residual);
+        let mut report = LinearSolverReport { iterations: 0, residual };
         let (mut of_solids, mut of_coils) = earlier.map(Self::into_responses).unwrap_or_default();
-        let mut report = earlier_report;
         let mut respond = |load: &[c64]| {
             let (response, own) = solve(load)?;
             report.iterations += own.iterations;

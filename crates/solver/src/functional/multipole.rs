@@ -6,7 +6,7 @@
 //! changes its sign.
 
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::locate::{holders, locate};
 use fluxmorph_geometry::tet4::{Point, centroid};
 use fluxmorph_geometry::{ElementId, Mesh};
 
@@ -21,9 +21,6 @@ use crate::solution::FieldSolution;
 
 /// Places between the centre of an expansion and each of its points, as shares of the way, at which matter is looked for.
 const WITHIN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
-
-/// Barycentric coordinate of a point from which on it lies inside an element and not on its face.
-const OFF_FACES: f64 = 1e-6;
 
 /// What bends the field by less than this share of it disturbs no expansion.
 const LIKE_AIR: f64 = 1e-3;
@@ -185,15 +182,15 @@ impl Multipoles {
         let sampled: Vec<Point> = sampled.collect();
         let candidates: Vec<Point> =
             sampled.iter().flat_map(|&x| images(x, planes)).map(|(x, _)| x).collect();
-        let found = locate(mesh, &candidates);
-        let count = 1usize << planes.len();
+        let mut held: Vec<Vec<(Point, ElementId)>> = vec![Vec::new(); sampled.len()];
+        for (i, (element, _)) in holders(mesh, &candidates) {
+            held[i >> planes.len()].push((candidates[i], element));
+        }
         let at_points = || {
-            let places = candidates.chunks(count).zip(found.chunks(count));
-            sampled.iter().zip(places).find_map(|(&place, (images, found))| {
-                let hit = images.iter().zip(found).find_map(|(x, found)| Some((*x, (*found)?)));
-                let Some((x, (element, within))) = hit else { return Some((place, "a hole in the mesh")) };
-                // On a face either side may be meant.
-                if within.into_iter().any(|share| share < OFF_FACES) { None } else { matter_at(element, x) }
+            sampled.iter().zip(&held).find_map(|(&place, held)| {
+                // On a face either side may be meant: it must be on both.
+                let on_all = held.iter().map(|&(x, element)| matter_at(element, x)).reduce(Option::and);
+                on_all.unwrap_or(Some((place, "a hole in the mesh")))
             })
         };
         let inside = || {
