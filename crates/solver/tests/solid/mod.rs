@@ -101,7 +101,6 @@ fn a_bar_is_a_coil_among_others() {
     for elements in ALL {
         let given = with_a_bar(&mesh, elements, 300.0, (100.0, NO_CIRCUIT));
         let (state, _) = given.solve(&mesh).expect("a field");
-        let given_report = state.report();
         let found = terminals(&given, &mesh, &state).expect("terminals");
         let [l, m] = [found.inductance[0][1], found.inductance[1][0]];
         println!("{elements:?}: {:?} M = {l:e}", found.coils[0]);
@@ -123,8 +122,6 @@ fn a_bar_is_a_coil_among_others() {
             let winding = Winding { voltage: Some(source), ..series };
             let driven = with_a_bar(&mesh, elements, 300.0, (0.0, winding));
             let (state, _) = driven.solve(&mesh).expect("a field");
-            // With those of the responses that it is made of.
-            assert!(state.report().iterations > given_report.iterations, "{:?}", state.report());
             let seen = terminals(&driven, &mesh, &state).expect("terminals");
             let (same, other) = (&seen.coils[0], &seen.coils[1]);
             let pairs = [
@@ -209,6 +206,9 @@ fn a_closed_ring_is_two_halves_in_series() {
         };
         let omega = 2.0 * PI * setup.frequency;
         let (model, state) = solved(&mesh, setup);
+        // Nothing but the ring excites it: what is solved for are the responses.
+        let report = state.report();
+        assert!(report.iterations > 0 && report.residual > 0.0 && report.residual < 1e-12, "{report:?}");
         let found = terminals(&model, &mesh, &state).expect("terminals");
         let voltage = found.coils[0].voltage / 2.0;
         assert!((voltage - impedance(&found, omega)).norm() < 1e-9 * voltage.norm());
