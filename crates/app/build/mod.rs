@@ -177,7 +177,7 @@ fn problem_on(
         let coils = coils.as_deref().unwrap_or_default();
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);
         sink.take(source.check(faults).map_err(Error::from))?;
-        warnings.extend(plausible::warnings(config, &full_mesh, coils));
+        warnings.extend(plausible::warnings(config, &full_mesh, coils, &open_patches));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());

@@ -5,13 +5,13 @@
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
+use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
-use super::open;
 use super::references::functionals;
 use super::soundness::faces_of;
 use crate::config::{
@@ -114,8 +114,13 @@ fn strands_in_iron(config: &Config, source: &SourceMap, i: usize) -> Option<Diag
     })
 }
 
-/// What is rarely meant; `coils` are those of the configuration.
-pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
+/// What is rarely meant; `coils` are those of the configuration, and the outer faces without a condition lie in `open_patches`.
+pub(super) fn warnings(
+    config: &Config,
+    mesh: &Mesh,
+    coils: &[coil::Coil],
+    open_patches: &[OpenPatch],
+) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
     warnings.extend(wave_warning(config, mesh));
     warnings.extend(overlap_warnings(config, coils));
@@ -127,7 +132,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Ve
             ));
         }
     }
-    if config.boundaries.is_empty() && !ends_at_infinity(config, mesh.topology()) {
+    if config.boundaries.is_empty() && !open_patches.is_empty() {
         warnings.push(
             "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
              flux_normal"
@@ -411,14 +416,6 @@ fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         }
     }
     warnings
-}
-
-/// Whether all that bounds a mesh is the end of a shell of open space.
-fn ends_at_infinity(config: &Config, topology: &Topology) -> bool {
-    let Some((infinity, _)) = open::condition(config) else { return false };
-    let end = faces_of(topology, [infinity.as_str()]);
-    let regions = (0..topology.region_names().len()).map(RegionId::new);
-    regions.flat_map(|region| topology.outer_faces(region)).all(|face| end.contains(&face_key(face)))
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.
