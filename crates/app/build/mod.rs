@@ -54,7 +54,7 @@ use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::problem::{Problem, Progress, Shape, Stage};
+use fluxmorph_optimizer::problem::{Cut, Problem, Progress, Shape, Stage};
 use fluxmorph_solver::FieldModel;
 
 use self::curves::Curves;
@@ -223,7 +223,7 @@ fn problem_on(
             let shape = shape::shape(inputs, config, body, &states, &observed)?;
             source.check(functional::bodies_at_rest(config, source, &mesh, (&shape, &states[0])))?;
             if group.is_none() {
-                check_initial_design(source, &shape)?;
+                check_initial_design(source, (&shape, &mesh))?;
             }
             Some(shape)
         }
@@ -306,7 +306,7 @@ fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode
 
 /// Refuses an initial design of which the mesh carries a part alone. One process looks: several ranks move the mesh when all are set
 /// up.
-fn check_initial_design(source: &SourceMap, shape: &Shape) -> Result<(), Error> {
+fn check_initial_design(source: &SourceMap, (shape, mesh): (&Shape, &Mesh)) -> Result<(), Error> {
     let initial = shape.initial();
     if initial.iter().all(|&p| p == 0.0) {
         return Ok(());
@@ -315,11 +315,15 @@ fn check_initial_design(source: &SourceMap, shape: &Shape) -> Result<(), Error> 
     if carried.share == 1.0 {
         return Ok(());
     }
-    let message = format!("the mesh carries {:.0} % of the initial design", 100.0 * carried.share);
+    let cut = Cut::of(shape, mesh, initial, carried.room.element);
+    let message = format!(
+        "the mesh carries {:.0} % of the initial design: beyond, {}",
+        100.0 * carried.share,
+        cut.cause
+    );
     let fault = source.diagnostic("design.initial", message);
-    Err(source
-        .error(vec![fault.expected("a design nearer to the mesh as it is, or more room for the mesh")])
-        .into())
+    let expected = format!("a design nearer to the mesh as it is, or more room for the mesh: {}", cut.cure);
+    Err(source.error(vec![fault.expected(expected)]).into())
 }
 
 /// Refuses a field problem whose potential no surface fixes.

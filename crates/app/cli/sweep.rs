@@ -248,7 +248,8 @@ impl<'a> Session<'a> {
             }
             Ending::Code(ExitCode::Success | ExitCode::Stopped) => {
                 let row = self.row(index)?;
-                let ratio = row.ratio.map_or(String::new(), |ratio| format!(", F/F0 {ratio:.5}"));
+                let ratio =
+                    row.ratio.map_or(String::new(), |ratio| format!(", F/F0 {}", crate::show::ratio(ratio)));
                 let evaluations = row.evaluations.unwrap_or(0);
                 let outcome = row.describe();
                 self.note(index, &format!("{outcome}{ratio}, {evaluations} evaluations, {seconds:.1} s"));

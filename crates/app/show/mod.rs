@@ -69,6 +69,11 @@ pub trait RunObserver: Observer {
 
 impl RunObserver for Silent {}
 
+/// `F/F0` with five decimals, and a very small one with four digits.
+pub(crate) fn ratio(value: f64) -> String {
+    if value != 0.0 && value.abs() < 0.01 { format!("{value:.3e}") } else { format!("{value:.5}") }
+}
+
 /// A message that cannot be shown, as on a closed terminal, is no reason to stop a run.
 fn show(writer: &mut impl Write, text: &str) {
     let _ = writeln!(writer, "{text}").and_then(|()| writer.flush());

@@ -160,14 +160,14 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     let unit = &named.unit;
     rows.push(("objective, initial", format!("{initial:.6e}{unit}")));
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
-    rows.push(("F/F0", styled(styles.strong, &format!("{ratio:.5}"))));
+    rows.push(("F/F0", styled(styles.strong, &super::ratio(*ratio))));
     rows.extend(homogeneity(objective));
     if let Some(found) = objective.verification.as_ref().filter(|_| !named.is_of_shape) {
         let name = match found.mesh {
             VerificationMesh::Fresh => "F/F0 on a fresh mesh",
             VerificationMesh::Cut => "F/F0 on cut elements",
         };
-        rows.push((name, format!("{:.5} ({} tetrahedra)", found.ratio, found.tets)));
+        rows.push((name, format!("{} ({} tetrahedra)", super::ratio(found.ratio), found.tets)));
     }
     let Some(accuracy) = &result.accuracy else { return rows };
     if let Some(error) = accuracy.error_estimate_relative {
@@ -179,7 +179,10 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     }
     if let Some(CrossCheck { elements, order, ratio, by_estimate, .. }) = &accuracy.cross_check {
         let source = if *by_estimate { ", by the estimate" } else { "" };
-        rows.push(("F/F0 by other elements", format!("{ratio:.5} ({elements}, order {order}{source})")));
+        rows.push((
+            "F/F0 by other elements",
+            format!("{} ({elements}, order {order}{source})", super::ratio(*ratio)),
+        ));
     }
     rows.extend(accuracy.verdict.map(|verdict| {
         let style = if verdict == Verdict::Confirmed { styles.good } else { styles.bad };
@@ -244,8 +247,12 @@ fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
 
 /// The frequencies of an analysis, and what was measured.
 fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
-    let mut frequencies: Vec<String> = result.frequencies_hz.iter().map(|f| format!("{f} Hz")).collect();
-    frequencies.dedup();
+    let mut frequencies: Vec<String> = Vec::new();
+    for frequency in result.frequencies_hz.iter().map(|f| format!("{f} Hz")) {
+        if !frequencies.contains(&frequency) {
+            frequencies.push(frequency);
+        }
+    }
     let mut rows = vec![("analysed at", frequencies.join(", "))];
     if !result.loads.is_empty() {
         rows.push(("loads", printable(&result.loads.join(", ")).into_owned()));

@@ -41,7 +41,7 @@ pub(super) fn row(row: &Evaluation, columns: Columns) -> String {
         row.evaluation.to_string(),
         row.iteration.to_string(),
         format!("{:.6e}", row.objective),
-        format!("{:.5}", row.ratio),
+        super::ratio(row.ratio),
         format!("{:.2e}", row.gradient_norm),
         format!("{:.3}", row.step_norm * 1e3),
         format!("{:.4}", row.worst_quality),

@@ -41,12 +41,18 @@ table! {
     }
     check = Accuracy::check;
     rules = |rules| rules.add(json!({
-        "if": { "required": ["tolerance"] }, "then": { "properties": { "estimate": { "const": true } } },
+        "if": { "required": ["tolerance"] },
+        "then": { "properties": { "estimate": { "const": true }, "tolerance": { "exclusiveMaximum": 1 } } },
     }));
 }
 
 impl Accuracy {
     fn check(&mut self, section: &Section<'_>) {
+        if let Some(tolerance) = self.tolerance.filter(|tolerance| *tolerance >= 1.0) {
+            let message =
+                format!("`accuracy.tolerance` is {tolerance}, as much as the objective itself or more");
+            section.wrong("tolerance", message, "less than 1; with its unit it is a share, like \"2 %\"");
+        }
         if self.tolerance.is_some() && self.estimate == Some(false) {
             section.clash(
                 ["estimate", "tolerance"],

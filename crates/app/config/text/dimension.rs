@@ -117,7 +117,7 @@ dimensions! {
     Capacitance = "a capacitance", in "F", such as "100 nF":
         decimal("F", 0), decimal("mF", -3), decimal("uF", -6), decimal("\u{b5}F", -6), decimal("nF", -9), decimal("pF", -12);
     /// A ratio of like quantities [1].
-    Ratio = "a ratio", in "1", such as "1e-8 1":
+    Ratio = "a ratio", in "1", such as "5 %":
         decimal("1", 0), decimal("%", -2);
     /// A flux linkage [Wb].
     FluxLinkage = "a flux linkage", in "Wb", such as "5 mWb":

@@ -80,15 +80,23 @@ fn in_range(entry: &Entry<'_>, value: f64, kind: &Number) -> Option<f64> {
     if kind.range.contains(value) {
         return Some(value);
     }
-    let unit = kind.dimension.map_or("", Dimension::si_unit);
-    let shown = if unit.is_empty() { format!("{value}") } else { format!("{value} {unit}") };
+    let unit = kind.dimension.map(Dimension::behind_value).unwrap_or_default();
+    let shown = format!("{}{unit}", written(value));
     let message = if value.is_finite() {
         format!("`{}` is {shown}, which is out of range", entry.path)
     } else {
         format!("`{}` is {value}, not a finite number", entry.path)
     };
-    entry.wrong(message, &format!("must be {}", kind.range.describe(unit)), None);
+    entry.wrong(message, &format!("must be {}", kind.range.describe(unit.trim_start())), None);
     None
+}
+
+/// All digits of a number, by a power of ten where they would be a line of zeros.
+fn written(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-9..1e16 => format!("{value}"),
+        _ => format!("{value:e}"),
+    }
 }
 
 fn number(range: Range) -> Keywords {
@@ -179,7 +187,7 @@ impl Value<ZeroOr> for f64 {
             return Some(value);
         }
         let expected = format!("0 for no check, or a number {}", kind.0.describe(""));
-        entry.wrong(format!("`{}` is {value}", entry.path), &expected, None);
+        entry.wrong(format!("`{}` is {}", entry.path, written(value)), &expected, None);
         None
     }
 
