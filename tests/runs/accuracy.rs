@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::device::{shipped, written};
+use crate::support::device::{BLOCK, shipped, written};
 use crate::support::folder::{RunFolder, count, number, read_json, scalars};
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 
@@ -134,6 +134,20 @@ fn a_tolerance_that_the_refinements_do_not_reach_is_said_to_be_missed() {
     assert!(page.contains("beyond the tolerance"));
 }
 
+/// The time of a run is that of its refinements too: without any left, the initial design is evaluated on the mesh as it is.
+#[test]
+fn no_mesh_is_refined_when_the_time_is_over() {
+    let home = folder();
+    let out = home.path().join("out");
+    let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
+    let tight = ("[analysis]", "[accuracy]\ntolerance = \"0.1 %\"\n\n[analysis]");
+    let device = written("block", home.path(), &[edges, tight]);
+    finish(device.command("run", &out).args(["--max-time", "1e-9 s"]))
+        .says(&["optimizer.max_time is over before"]);
+    let result = read_json(&out.join("result.json"));
+    assert_eq!((count(&result, "/evaluations"), &result["stop_reason"]), (1, &"max_time".into()));
+}
+
 /// A pole of coarse first-order elements, with a tolerance: what it reports of itself has to hold against second order.
 #[test]
 fn a_run_with_a_tolerance_refines_its_mesh_until_its_error_bar_is_within() {
@@ -185,4 +199,36 @@ fn check_and_solve_say_the_same_error_and_the_field_file_where_it_is() {
     let sum: f64 = scalars(&solved.field(0).cell_data["error_estimate"]).iter().sum();
     // Beside what is quadratic in the correction.
     assert!((sum / checked - 1.0).abs() < 0.1, "{sum} {checked}");
+}
+
+/// A field recovered at places is that of second order in the estimate, as its potentials are: without, the error of the recovery
+/// itself was missing, and the sign of the estimate with it.
+#[test]
+fn the_estimate_of_a_recovered_field_is_that_of_second_order() {
+    let home = folder();
+    let ball = "multipoles=[{name=\"ball\",shape=\"ball\",center=[0,0,\"5 mm\"],radius=\"4 mm\",order=2}]";
+    let of_terms = |kind: &str| format!("kind = \"{kind}\"\nregion = \"ball\"\nharmonics = [\"c2_0\"]");
+    let objective = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"volume\"";
+    let in_space = |what: &str| format!("{what}\nfollow = \"space\"");
+    let moves = &BLOCK[BLOCK.find("[design]").expect("a design")..BLOCK.find("[output]").expect("an output")];
+    for (other, moves) in [
+        (of_terms("multipole"), moves),
+        (of_terms("multipole_content"), moves),
+        (in_space(&of_terms("multipole")), ""),
+        (in_space(objective), ""),
+    ] {
+        let device = written("block", home.path(), &[(objective, &other), (moves, "")]);
+        let solve = |order: &str, estimate: &str| {
+            let out = home.path().join("out");
+            let sets = ["analysis.elements=edge", order, estimate, ball].map(|set| ["--set", set]);
+            finish(device.command("solve", &out).arg("--force").args(sets.as_flattened())).completed();
+            read_json(&out.join("result.json"))
+        };
+        let first = solve("analysis.order=1", "accuracy.estimate=true");
+        let second = solve("analysis.order=2", "accuracy.estimate=false");
+        let [before, after] = [&first, &second].map(|result| number(result, "/objective/best"));
+        let estimate = number(&first, "/accuracy/error_estimate/0");
+        println!("{other}: {before:e} {estimate:+e}, by second order {:+e}", after - before);
+        assert!((estimate / (after - before) - 1.0).abs() < 0.01, "{estimate} {before} {after}");
+    }
 }

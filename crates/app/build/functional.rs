@@ -239,7 +239,7 @@ fn measured(
         | ObjectiveKind::TargetField
         | ObjectiveKind::Homogeneity
         | ObjectiveKind::FieldComponent => {
-            let follow = follow(functional.follow, model);
+            let follow = follow(functional.follow);
             Ok(Functional::observation(mesh, region()?, observed(functional), follow)?)
         }
         ObjectiveKind::Loss => Ok(Functional::loss(model, name)?),
@@ -296,11 +296,11 @@ fn body(
 }
 
 /// What observed places do where the mesh moves.
-pub(super) fn follow(written: Option<config::Follow>, model: &FieldModel) -> Follow {
+pub(super) fn follow(written: Option<config::Follow>) -> Follow {
     match written {
         None => Follow::Held,
         Some(config::Follow::Mesh) => Follow::Mesh,
-        Some(config::Follow::Space) => Follow::Space(model.space().order()),
+        Some(config::Follow::Space) => Follow::Space,
     }
 }
 

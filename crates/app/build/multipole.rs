@@ -140,7 +140,7 @@ pub(crate) fn multipoles(
     let named =
         functionals(config).into_iter().map(|(_, f)| f).filter(|f| f.region.as_ref() == Some(&set.name));
     let written = named.filter(|f| f.kind.is_of_terms()).find_map(|f| f.follow);
-    Ok(Multipoles::new(model, mesh, &set.name, &expansion, (&planes, follow(written, model)))?)
+    Ok(Multipoles::new(model, mesh, &set.name, &expansion, (&planes, follow(written)))?)
 }
 
 /// A functional of terms.

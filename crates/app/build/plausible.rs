@@ -53,9 +53,6 @@ const LARGEST_PART_OF_A_WAVE: f64 = 0.1;
 /// Part of a unit vector along a plane, or across it, that is more than rounding.
 const INCLINED: f64 = 1e-3;
 
-/// Weights of the vertices at which an element is looked at: its middle, near every vertex, and on every edge.
-const NEAR: f64 = 0.85;
-
 /// Coils of the configuration that are no source of a field in this mesh, or no physical one.
 pub(super) fn coil_faults(
     config: &Config,
@@ -241,9 +238,8 @@ fn place_of_current(
     winding: &Racetrack,
     is_wanted: impl Fn(ElementId) -> bool,
 ) -> Option<(ElementId, Point)> {
-    mesh.topology().elements().filter(|&e| is_wanted(e)).find_map(|e| {
-        places(mesh.vertices(e)).into_iter().find(|x| flows(winding, x)).map(|place| (e, place))
-    })
+    let mut wanted = mesh.topology().elements().filter(|&e| is_wanted(e));
+    wanted.find_map(|e| winding.place_in(mesh.vertices(e)).map(|place| (e, place)))
 }
 
 /// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.
@@ -472,29 +468,4 @@ fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(Regio
     let region = |e: ElementId| topology.region_of()[e.index()];
     let (e, place) = place_of_current(mesh, winding, |e| matter[region(e).index()])?;
     Some((region(e), place))
-}
-
-/// Places in an element at which it is looked at: inside it, for on its faces another material may begin.
-fn places(vertices: [Point; 4]) -> [Point; 11] {
-    let at = |weights: [f64; 4]| -> Point {
-        std::array::from_fn(|d| (0..4).map(|a| weights[a] * vertices[a][d]).sum())
-    };
-    let rest = (1.0 - NEAR) / 3.0;
-    let near = |k: usize| at(std::array::from_fn(|a| if a == k { NEAR } else { rest }));
-    let rest = 0.5 * (1.0 - NEAR);
-    let edge =
-        |i: usize, j: usize| at(std::array::from_fn(|a| if a == i || a == j { 0.5 * NEAR } else { rest }));
-    [
-        at([0.25; 4]),
-        near(0),
-        near(1),
-        near(2),
-        near(3),
-        edge(0, 1),
-        edge(0, 2),
-        edge(0, 3),
-        edge(1, 2),
-        edge(1, 3),
-        edge(2, 3),
-    ]
 }

@@ -110,16 +110,17 @@ impl Session<'_> {
         }
         // Of second order the set-up has said it.
         levels = levels.filter(|_| !is_shared_out && self.config.analysis.order == ElementOrder::Linear);
-        if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.is_replaying(), observer)?;
-        }
         let clock = Instant::now();
+        let time_left = || settings.max_time.map(|time| (time - clock.elapsed().as_secs_f64()).max(0.0));
+        if let Some(levels) = &mut levels {
+            let is_over = || time_left() == Some(0.0);
+            self.refine_before_search(levels, (recorder.is_replaying(), &is_over), observer)?;
+        }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
         loop {
             let first = self.setup.problem.moved(self.initial_design())?;
-            let max_time = settings.max_time.map(|time| (time - clock.elapsed().as_secs_f64()).max(0.0));
-            let settings = Settings { max_time, ..settings.clone() };
+            let settings = Settings { max_time: time_left(), ..settings.clone() };
             let optimised = driver::optimise_from(
                 &start,
                 &mut self.setup.problem,
@@ -147,11 +148,11 @@ impl Session<'_> {
         }
     }
 
-    /// Refines the mesh until the error bar of the initial design is within the tolerance.
+    /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over.
     fn refine_before_search(
         &mut self,
         levels: &mut Levels,
-        has_begun: bool,
+        (has_begun, is_over): (bool, &dyn Fn() -> bool),
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         loop {
@@ -162,6 +163,13 @@ impl Session<'_> {
                 continue;
             }
             if has_begun {
+                return Ok(());
+            }
+            if is_over() {
+                observer.warning(
+                    "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
+                     evaluated on the mesh as it is",
+                );
                 return Ok(());
             }
             observer.phase("solving the field of the initial design");

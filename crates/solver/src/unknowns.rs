@@ -199,20 +199,18 @@ impl Unknowns {
             dot(potential, sub(to, from))
         };
         let at_carriers = conditions(mesh, space, boundaries, &HashSet::new())?;
-        let applied: Vec<(CarrierId, f64, bool)> = at_carriers
-            .iter()
-            .filter(|(carrier, _)| carrier.index() < edges.len())
-            .filter_map(|(&carrier, at)| {
-                let is_zero = at.own.iter().any(|(fix, _)| *fix == Fix::Tangential);
-                Some((carrier, along(carrier, at.potential?), is_zero))
-            })
-            .collect();
-        let largest = applied.iter().map(|(_, value, _)| value.abs()).fold(0.0, f64::max);
-        for (carrier, value, is_zero) in applied {
-            if is_zero && value.abs() > CONFLICT * largest {
-                return Err(SolverError::Conflict { place: space.position(mesh, carrier) });
-            }
-            prescribed.insert(carrier, [if is_zero { 0.0 } else { value }, 0.0, 0.0]);
+        let applied = || {
+            let of_edges = at_carriers.iter().filter(|(carrier, _)| carrier.index() < edges.len());
+            of_edges.filter_map(|(&carrier, at)| Some((carrier, at, at.potential?)))
+        };
+        let tolerance = CONFLICT * applied().map(|(_, _, potential)| norm(potential)).fold(0.0, f64::max);
+        for (carrier, at, potential) in applied() {
+            // Along the plane in all directions, whether or not of the edge: beside a plane without A all flux must be in that of the
+            // surface.
+            let planes: Vec<_> = at.own.iter().copied().filter(|(fix, _)| *fix == Fix::Tangential).collect();
+            check_agreement(mesh, space, carrier, &planes, potential, tolerance)?;
+            let value = if planes.is_empty() { along(carrier, potential) } else { 0.0 };
+            prescribed.insert(carrier, [value, 0.0, 0.0]);
         }
         for (carrier, at) in &at_carriers {
             known[carrier.index()] = at.psi_zero;

@@ -15,12 +15,15 @@ use crate::OUTSIDE;
 /// A cube of 3³ cells whose sides lean: no face but z_min and z_max is at right angles to an axis. The cell in the
 /// corner x_min, y_min, in the middle of z, is a region of its own.
 fn leaning() -> Mesh {
+    cube(|[x, y, z]| [x + 0.3 * y + 0.1 * z, y - 0.2 * x + 0.2 * z, z])
+}
+
+fn cube(lean: impl Fn([f64; 3]) -> [f64; 3]) -> Mesh {
     let line = || (0..=3).map(|i| 0.01 * f64::from(i)).collect::<Vec<_>>();
     let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
     let corner = |[x, y, z]: [f64; 3]| x < 0.01 && y < 0.01 && (0.01..0.02).contains(&z);
     let topology =
         grid.topology(&["air", "corner"], |x| RegionId(u32::from(corner(x)))).expect("two regions");
-    let lean = |[x, y, z]: [f64; 3]| [x + 0.3 * y + 0.1 * z, y - 0.2 * x + 0.2 * z, z];
     Mesh::new(Arc::new(topology), grid.points().into_iter().map(lean).collect()).expect("a mesh")
 }
 
@@ -66,6 +69,41 @@ fn a_field_on_a_part_of_the_outside_is_uniform_inside() {
         setup.boundaries.extend(["z_min", "z_max"].map(|name| (name.to_owned(), Boundary::FluxNormal)));
         let error = error(&mesh, setup, field);
         assert!(error < 1e-9, "{order:?}: {error:e}");
+    }
+}
+
+/// A field along x between flux-normal planes, flux-parallel ones across y, and A given on what is left. A flux-parallel plane has no
+/// part of the flux, so that A must be that of the whole beside it: with its center elsewhere edge elements had 3/4 of the field, between
+/// two such planes half of it.
+#[test]
+fn a_field_beside_flux_parallel_planes_has_its_centre_on_them_or_is_refused() {
+    let (mesh, flux_density) = (cube(|x| x), [0.1, 0.0, 0.0]);
+    for (family, order) in [
+        (ElementFamily::Nodal, Order::Linear),
+        (ElementFamily::Edge, Order::Linear),
+        (ElementFamily::Edge, Order::Quadratic),
+    ] {
+        let with = |parallel: &[&str], applied: &[&str], centre: Option<[f64; 3]>| {
+            let field = Boundary::UniformField(UniformField { flux_density, centre });
+            let mut setup = setup(order, applied, field);
+            setup.family = family;
+            let of = |names: &[&str], kind| names.iter().map(|&n| (n.to_owned(), kind)).collect::<Vec<_>>();
+            setup.boundaries.extend(of(parallel, Boundary::FluxParallel));
+            setup.boundaries.extend(of(&["x_min", "x_max"], Boundary::FluxNormal));
+            setup
+        };
+        let beside = ["z_min", "z_max", "y_max"];
+        let error = error(&mesh, with(&["y_min"], &beside, None), flux_density);
+        assert!(error < 1e-9, "{family:?} {order:?}: {error:e}");
+        let refused = [
+            with(&["y_min"], &beside, Some([0.0, 0.004, 0.0])),
+            with(&["y_min", "y_max"], &beside[..2], None),
+            with(&["y_min", "y_max"], &beside[..2], Some([0.0, 0.015, 0.0])),
+        ];
+        for setup in refused {
+            let error = FieldModel::new(&mesh, setup).unwrap_err();
+            assert!(matches!(error, SolverError::Conflict { .. }), "{family:?} {order:?}: {error}");
+        }
     }
 }
 

@@ -34,8 +34,9 @@ table! {
         max_evaluations: usize = integer(1, MOST_EVALUATIONS) => Settings::DEFAULT.max_evaluations;
         /// No evaluation is started after this time [s]. Default: no limit.
         max_time: Option<f64> = quantity(Duration, POSITIVE);
-        /// Stop when the objective changes by less than this fraction between iterations; 0: off. The default is well below the
-        /// error of the mesh.
+        /// Stop when the objective changes by less than this fraction between iterations, and the gradient, less what bounds and
+        /// constraints hold of it, promises no more than ten times that: while it does, the search goes on from its best design. 0:
+        /// off. The default is well below the error of the mesh.
         ftol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.ftol_rel;
         /// Stop when all variables change by less than this fraction; 0: off. It is off by default, since the variables of a
         /// design at its bounds get there long before the rest has settled.

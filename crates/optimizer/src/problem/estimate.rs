@@ -166,13 +166,15 @@ impl State<'_> {
             }
         }
         let model = self.enriched.model();
-        let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| self.enriched.state(share));
+        let [half_way, after] = [0.5, 1.0].map(|share| self.enriched.state(share));
         let mut error = 0.0;
         let mut right_side = vec![c64::default(); model.unknown_count()];
         let mut inductances = Vec::new();
         for term in own() {
             let at = |state| term.functional.evaluate(model, mesh, state);
-            error += term.weight * (at(&after)?.value - at(&before)?.value);
+            // A field that is recovered from the same potentials is another one in either order.
+            let before = term.functional.evaluate(self.coarse, mesh, solution)?;
+            error += term.weight * (at(&after)?.value - before.value);
             let FunctionalValue { derivative, inductances: of_term, .. } = at(&half_way)?;
             right_side.resize(right_side.len().max(derivative.len()), c64::default());
             right_side.iter_mut().zip(derivative).for_each(|(sum, d)| *sum += term.weight * d);

@@ -116,12 +116,13 @@ impl SkinAudit {
     }
 }
 
-/// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced or the region is empty.
+/// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced, the region is empty or nothing of it
+/// but faces towards `joined`: regions of one conductor with it, whose common faces have no skin.
 ///
 /// A quadratic element counts as two: it follows the decay over twice the thickness.
 pub fn skin_audit(
     mesh: &Mesh,
-    region: RegionId,
+    (region, joined): (RegionId, &[RegionId]),
     material: &Material,
     frequency: f64,
     order: Order,
@@ -135,15 +136,18 @@ pub fn skin_audit(
     let around = AxisBox::around(elements.as_flattened());
     let squares: f64 = elements.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
 
-    // (elements per skin depth, area) of every face towards another region; symmetry planes are no faces.
+    // (elements per skin depth, area) of every face of the conductor; symmetry planes are none.
     let (mut layers, mut faces) = (Vec::new(), Vec::new());
     for facet in topology.facets() {
         let Some(outside) = facet.outside else { continue };
-        let element = match (region_at(facet.inside) == region, region_at(outside) == region) {
-            (true, false) => facet.inside,
-            (false, true) => outside,
+        let (element, other) = match (region_at(facet.inside) == region, region_at(outside) == region) {
+            (true, false) => (facet.inside, region_at(outside)),
+            (false, true) => (outside, region_at(facet.inside)),
             _ => continue,
         };
+        if joined.contains(&other) {
+            continue;
+        }
         let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
         let height = 3.0 * volume(mesh.vertices(element)) / area;
         layers.push((order.degree() as f64 * skin_depth / height, area));

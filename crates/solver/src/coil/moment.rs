@@ -5,7 +5,7 @@
 //! degree two (Hammer and Stroud 1956) is exact. In round corners `T` is curved, and its kinks are arcs: there pieces
 //! are halved along all edges, deeper where an arc crosses them.
 
-use fluxmorph_geometry::tet4::{Point, Tet4, centroid, dot, norm, sub, volume};
+use fluxmorph_geometry::tet4::{Point, Tet4, add, centroid, dot, norm, sub, volume};
 
 use super::cut::{Plane, for_each_piece};
 use super::racetrack::{Corner, Racetrack};
@@ -18,6 +18,9 @@ const CORNER_LEVELS: usize = 2;
 
 /// Halvings where an arc on which `T` has a kink crosses a piece.
 const KINK_LEVELS: usize = 4;
+
+/// Share of an element from which a winding is in it, above rounding and the facets of arcs.
+const LEAST_SHARE: f64 = 1e-3;
 
 /// Distance to a kink, relative to the smaller of the winding's width and height, below which a vertex is on it.
 const ON_PLANE: f64 = 1e-9;
@@ -35,14 +38,38 @@ impl Racetrack {
     /// is piecewise linear, by subdivision in round corners. Shape `(4, 3)`.
     pub fn moment(&self, vertices: [Point; 4]) -> [Point; 4] {
         let local = vertices.map(|x| self.frame.local(x));
+        let integral = Integral { coil: self, origin: local[0], gradients: Tet4::new(local).gradients };
+        let mut weights = [0.0; 4];
+        self.for_each_piece(local, &mut |piece| integral.add(piece, &mut weights));
+        weights.map(|w| self.axis().map(|e| w * e))
+    }
+
+    /// The middle of what the winding takes of a tetrahedron, cut as for [`Self::moment`]; `None` where that is next to nothing, as
+    /// where a face lies along the winding's.
+    pub fn place_in(&self, vertices: [Point; 4]) -> Option<Point> {
+        let local = vertices.map(|x| self.frame.local(x));
+        let (mut wound, mut moment) = (0.0, [0.0; 3]);
+        self.for_each_piece(local, &mut |piece| {
+            let c = centroid(piece);
+            if (0.0..self.width).contains(&self.distance(c)) {
+                let volume = volume(piece).abs();
+                wound += volume;
+                (0..3).for_each(|d| moment[d] += volume * c[d]);
+            }
+        });
+        let place = || add(self.frame.centre(), self.frame.vector(moment.map(|m| m / wound)));
+        (wound > LEAST_SHARE * volume(vertices).abs()).then(place)
+    }
+
+    /// Calls `visit` for the pieces of a tetrahedron, in local coordinates, that lie between the ends of the coil and not far from
+    /// its winding: cut at the kinks of `T`, and divided where it is curved.
+    fn for_each_piece(&self, local: [Point; 4], visit: &mut impl FnMut([Point; 4])) {
         let extent = self.extent();
         let misses =
             |d: usize| local.iter().all(|x| x[d] >= extent[d]) || local.iter().all(|x| x[d] <= -extent[d]);
         if (0..3).any(misses) {
-            return [[0.0; 3]; 4];
+            return;
         }
-        let integral = Integral { coil: self, origin: local[0], gradients: Tet4::new(local).gradients };
-        let mut weights = [0.0; 4];
         let reach = local.iter().flatten().chain(&extent).fold(0.0_f64, |reach, c| reach.max(c.abs()));
         let tolerance = (ON_PLANE * self.detail()).max(ROUNDING * reach);
         for_each_piece(local, &self.kinks(), tolerance, &mut |piece| {
@@ -51,12 +78,35 @@ impl Racetrack {
                 return;
             }
             if self.in_round_corner(c) {
-                integral.add_curved(piece, 0, &mut weights);
+                self.divide_curved(piece, 0, visit);
             } else {
-                integral.add(piece, &mut weights);
+                visit(piece);
             }
         });
-        weights.map(|w| self.axis().map(|e| w * e))
+    }
+
+    /// Splits a piece of a round corner into eight as often as its curvature and kinks ask for.
+    fn divide_curved(&self, piece: [Point; 4], level: usize, visit: &mut impl FnMut([Point; 4])) {
+        let rho = piece.map(|x| self.distance(x));
+        let (least, greatest) =
+            (rho.iter().copied().fold(f64::INFINITY, f64::min), rho.iter().copied().fold(f64::MIN, f64::max));
+        // ρ is convex: a piece with its vertices in the window lies in the window, where T is constant.
+        if greatest <= 0.0 {
+            return visit(piece);
+        }
+        // ρ changes no faster than the place: a piece this far outside does not reach the winding.
+        let reach = (1..4).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let diameter = reach.map(|(a, b)| norm(sub(piece[a], piece[b]))).fold(0.0, f64::max);
+        if greatest - diameter >= self.width {
+            return;
+        }
+        let kinked = (least < 0.0) || (least < self.width && greatest > self.width);
+        if level >= if kinked { KINK_LEVELS } else { CORNER_LEVELS } {
+            return visit(piece);
+        }
+        for child in eighths(piece) {
+            self.divide_curved(child, level + 1, visit);
+        }
     }
 
     /// Planes between which `T` is linear (apart from round corners), in local coordinates.
@@ -121,31 +171,6 @@ impl Integral<'_> {
                 let lambda = dot(self.gradients[b], from_first) + if b == 0 { 1.0 } else { 0.0 };
                 *weight += value * lambda;
             }
-        }
-    }
-
-    /// Adds a piece of a round corner, split into eight as often as its curvature and kinks ask for.
-    fn add_curved(&self, piece: [Point; 4], level: usize, weights: &mut Weights) {
-        let rho = piece.map(|x| self.coil.distance(x));
-        let (least, greatest) =
-            (rho.iter().copied().fold(f64::INFINITY, f64::min), rho.iter().copied().fold(f64::MIN, f64::max));
-        // ρ is convex: a piece with its vertices in the window lies in the window, where T is constant.
-        if greatest <= 0.0 {
-            return self.add(piece, weights);
-        }
-        // ρ changes no faster than the place: a piece this far outside does not reach the winding.
-        let reach = (1..4).flat_map(|a| (0..a).map(move |b| (a, b)));
-        let diameter = reach.map(|(a, b)| norm(sub(piece[a], piece[b]))).fold(0.0, f64::max);
-        let width = self.coil.width;
-        if greatest - diameter >= width {
-            return;
-        }
-        let kinked = (least < 0.0) || (least < width && greatest > width);
-        if level >= if kinked { KINK_LEVELS } else { CORNER_LEVELS } {
-            return self.add(piece, weights);
-        }
-        for child in eighths(piece) {
-            self.add_curved(child, level + 1, weights);
         }
     }
 }
@@ -217,6 +242,26 @@ mod tests {
         for n in [3, 4] {
             let sum = over_paper_box(&coil, n);
             assert!((sum / exact - 1.0).abs() < 1e-12, "{sum} {exact}");
+        }
+    }
+
+    #[test]
+    fn a_winding_within_an_element_is_found_and_one_along_its_face_is_not() {
+        for corner in [Corner::Mitred, Corner::Round { inner_radius: 0.02 }] {
+            let coil = Racetrack::new([0.0; 3], 2, [0.02, 0.02], 1e-3, 1e-3, corner).unwrap();
+            let tet = |base: Point| -> [Point; 4] {
+                std::array::from_fn(|k| {
+                    std::array::from_fn(|d| base[d] + if k == d + 1 { 0.012 } else { 0.0 })
+                })
+            };
+            // It passes between the corners and the middle.
+            let crossed = tet([0.016, -0.006, -0.004]);
+            assert!(crossed.iter().chain([&centroid(crossed)]).all(|x| coil.current_density(*x) == [0.0; 3]));
+            let place = coil.place_in(crossed).expect("a place");
+            assert!(coil.current_density(place) != [0.0; 3], "{corner:?}: {place:?}");
+            assert_eq!(coil.place_in(tet([0.021, -0.006, -0.004])), None, "beside it");
+            assert_eq!(coil.place_in(tet([0.016, -0.006, 0.0005])), None, "above it");
+            assert_eq!(coil.place_in(tet([-0.006, -0.006, -0.006])), None, "in its window");
         }
     }
 

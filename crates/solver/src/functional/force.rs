@@ -184,15 +184,8 @@ impl Force {
 
 /// Whether the current of a coil flows in an element.
 fn carries_current(model: &FieldModel, mesh: &Mesh, e: ElementId) -> bool {
-    let vertices = mesh.vertices(e);
-    let centre = fluxmorph_geometry::tet4::centroid(vertices);
     model.coils().iter().any(|coil| match &coil.shape {
-        // A point just inside every corner: faces of the winding may lie along those of elements.
-        CoilShape::Racetrack(racetrack) => vertices
-            .iter()
-            .map(|x| std::array::from_fn(|d| 0.999 * x[d] + 0.001 * centre[d]))
-            .chain([centre])
-            .any(|x| racetrack.current_density(x) != [0.0; 3]),
+        CoilShape::Racetrack(racetrack) => racetrack.place_in(mesh.vertices(e)).is_some(),
         // What flows in a solid conductor above 0 Hz moves with it, as eddy currents do.
         CoilShape::Solid(_) if model.angular_frequency() > 0.0 => false,
         shape => shape

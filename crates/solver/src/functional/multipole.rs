@@ -5,6 +5,8 @@
 //! image. On a flux-parallel plane B has no component across it, on a flux-normal one none along it: mirrored, that component
 //! changes its sign.
 
+use std::borrow::Cow;
+
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{holders, locate};
 use fluxmorph_geometry::tet4::{Point, centroid};
@@ -13,6 +15,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use super::{Follow, FunctionalValue};
 use crate::coil::{Coil, CoilShape};
 use crate::element::Complex3;
+use crate::elements::Order;
 use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
@@ -48,22 +51,27 @@ pub struct Multipoles {
 /// Where the field is taken.
 #[derive(Clone, Debug)]
 enum Places {
-    /// In elements that do not move.
-    Held(Vec<RecoveredPoint>),
+    /// In elements that do not move, which hold each; recovered for elements of an order.
+    Held(Vec<(Point, ElementId)>, Order, Vec<RecoveredPoint>),
     /// In whatever elements are there.
     InSpace(FixedPlaces),
 }
 
 /// What gives the field at one of them on a mesh.
 enum At<'a> {
-    Held(&'a RecoveredPoint),
+    Held(Cow<'a, RecoveredPoint>),
     InSpace(Box<BlendedPoint>),
 }
 
 impl Places {
     fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<At<'_>>, SolverError> {
         Ok(match self {
-            Self::Held(points) => points.iter().map(At::Held).collect(),
+            Self::Held(_, order, points) if *order == model.space().order() => {
+                points.iter().map(|point| At::Held(Cow::Borrowed(point))).collect()
+            }
+            Self::Held(places, ..) => {
+                recovered(places, model, mesh).into_iter().map(|point| At::Held(Cow::Owned(point))).collect()
+            }
             Self::InSpace(places) => {
                 places.on(model, mesh)?.into_iter().map(|point| At::InSpace(Box::new(point))).collect()
             }
@@ -153,10 +161,12 @@ impl Multipoles {
             weights.iter().zip(&factors).map(of).collect()
         };
         let terms = expansion.terms.iter().map(|(term, weights)| (*term, mirrored(weights))).collect();
-        let recovered = |&(x, e): &(Point, ElementId)| RecoveredPoint::new(model, mesh, e, x);
         let places = match follow {
-            Follow::Space(order) => Places::InSpace(FixedPlaces::new(mesh, order, places)),
-            Follow::Held | Follow::Mesh => Places::Held(places.iter().map(recovered).collect()),
+            Follow::Space => Places::InSpace(FixedPlaces::new(mesh, places)),
+            Follow::Held | Follow::Mesh => {
+                let points = recovered(&places, model, mesh);
+                Places::Held(places, model.space().order(), points)
+            }
         };
         Ok(Self { places, terms, domain: expansion.domain })
     }
@@ -204,7 +214,7 @@ impl Multipoles {
     /// Elements that must not move.
     pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         let held = match &self.places {
-            Places::Held(points) => points.as_slice(),
+            Places::Held(_, _, points) => points.as_slice(),
             Places::InSpace(_) => &[],
         };
         held.iter().flat_map(RecoveredPoint::elements)
@@ -235,6 +245,11 @@ impl Multipoles {
         };
         self.terms.iter().map(|(term, weights)| (*term, sum(weights))).collect()
     }
+}
+
+/// The field at places, recovered for elements of the order of a model.
+fn recovered(places: &[(Point, ElementId)], model: &FieldModel, mesh: &Mesh) -> Vec<RecoveredPoint> {
+    places.iter().map(|&(x, e)| RecoveredPoint::new(model, mesh, e, x)).collect()
 }
 
 /// A point and its images in all combinations of planes, itself first, with the factors on the components of B there.
@@ -314,7 +329,7 @@ impl MultipoleFunctional {
     pub(super) fn check_places(&self, model: &FieldModel, mesh: &Mesh) -> Result<(), SolverError> {
         match &self.multipoles.places {
             Places::InSpace(places) => places.locate(model, mesh).map(|_| ()),
-            Places::Held(_) => Ok(()),
+            Places::Held(..) => Ok(()),
         }
     }
 

@@ -64,8 +64,8 @@ pub enum Follow {
     Held,
     /// They move with it.
     Mesh,
-    /// They stay, and the mesh moves through them; the field is recovered for elements of this order.
-    Space(Order),
+    /// They stay, and the mesh moves through them; the field is recovered.
+    Space,
 }
 
 /// A function of the mean flux densities `B_k` of cells.
@@ -124,7 +124,7 @@ impl Observation {
             }
         };
         let fixed = match follow {
-            Follow::Space(order) => Some(FixedCells::new(mesh, &cells, (observed, order))),
+            Follow::Space => Some(FixedCells::new(mesh, &cells, observed)),
             Follow::Held | Follow::Mesh => None,
         };
         Ok(Self { cells, observed, follow, fixed })
@@ -358,7 +358,7 @@ impl Observation {
 
 impl FixedCells {
     /// The places of cells at the start: the points of a rule in each element.
-    fn new(mesh: &Mesh, cells: &[Vec<ElementId>], (observed, order): (Observed, Order)) -> Self {
+    fn new(mesh: &Mesh, cells: &[Vec<ElementId>], observed: Observed) -> Self {
         let is_by_cell = matches!(
             observed,
             Observed::Deviation { weighting: Weighting::Point, .. }
@@ -385,7 +385,7 @@ impl FixedCells {
                 (parts, volume)
             }));
         }
-        Self { places: FixedPlaces::new(mesh, order, places), samples }
+        Self { places: FixedPlaces::new(mesh, places), samples }
     }
 
     fn samples_at(

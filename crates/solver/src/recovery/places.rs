@@ -18,7 +18,6 @@ use rayon::prelude::*;
 use super::fit::Fit;
 use super::{LAYERS_LIMIT, around, has_the_material_of, scatter_flux, super_convergent};
 use crate::element::{Complex3, dot3};
-use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
@@ -27,7 +26,6 @@ use crate::solution::FieldSolution;
 #[derive(Clone, Debug)]
 pub(crate) struct FixedPlaces {
     start: Mesh,
-    order: Order,
     /// With the element that holds each at the start.
     places: Vec<(Point, ElementId)>,
 }
@@ -49,9 +47,9 @@ struct Patch {
 }
 
 impl FixedPlaces {
-    /// Places [m] with the elements that hold them on the mesh at the start; patches fit elements of an order.
-    pub(crate) fn new(start: &Mesh, order: Order, places: Vec<(Point, ElementId)>) -> Self {
-        Self { start: start.clone(), order, places }
+    /// Places [m] with the elements that hold them on the mesh at the start.
+    pub(crate) fn new(start: &Mesh, places: Vec<(Point, ElementId)>) -> Self {
+        Self { start: start.clone(), places }
     }
 
     /// The element that holds each place now.
@@ -108,18 +106,18 @@ impl FixedPlaces {
         (element, vertex): (ElementId, NodeId),
         point: Point,
     ) -> Patch {
-        let topology = model.topology();
+        let (topology, order) = (model.topology(), model.space().order());
         let is_alike = has_the_material_of(model, element);
         let of_vertex = topology.elements_around(vertex).iter().copied();
         let mut elements: BTreeSet<ElementId> = of_vertex.filter(|&e| is_alike(e)).collect();
         let fitted = |elements: &BTreeSet<ElementId>, degree| {
-            let samples = super_convergent(self.order, elements);
+            let samples = super_convergent(order, elements);
             Fit::even(degree, &offsets(&self.start, &samples, self.start.point(vertex)))?;
             let fit = Fit::even(degree, &offsets(mesh, &samples, point))?;
             Some(Patch { samples, weights: fit.value(), fit })
         };
         for _ in 0..LAYERS_LIMIT {
-            if let Some(patch) = fitted(&elements, self.order.degree()) {
+            if let Some(patch) = fitted(&elements, order.degree()) {
                 return patch;
             }
             elements = around(topology, &elements, &is_alike);
