@@ -51,8 +51,9 @@ impl Session<'_> {
         let design = problem.shape().zip(design).map(|(shape, values)| design_result(shape, values));
         let topology = mesh.topology();
         let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
-        let warnings = reservations(self.config, &self.setup, analysis);
-        warnings.iter().for_each(|warning| observer.warning(warning));
+        let more = reservations(self.config, &self.setup, analysis);
+        more.iter().for_each(|warning| observer.warning(warning));
+        let warnings = self.setup.warnings.iter().cloned().chain(more).collect();
         Ok(RunResult {
             schema_version: 1,
             command: self.command.to_owned(),

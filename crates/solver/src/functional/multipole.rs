@@ -19,7 +19,7 @@ use crate::elements::Order;
 use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
-use crate::recovery::{BlendedPoint, FixedPlaces, RecoveredPoint};
+use crate::recovery::{BlendedField, FixedPlaces, RecoveredPoint};
 use crate::solution::FieldSolution;
 
 /// Places between the centre of an expansion and each of its points, as shares of the way, at which matter is looked for.
@@ -57,33 +57,34 @@ enum Places {
     InSpace(FixedPlaces),
 }
 
-/// What gives the field at one of them on a mesh.
+/// The field of a state at them.
 enum At<'a> {
-    Held(Cow<'a, RecoveredPoint>),
-    InSpace(Box<BlendedPoint>),
+    Held(Cow<'a, [RecoveredPoint]>),
+    InSpace(Box<BlendedField<'a>>),
 }
 
+/// A state with its model and mesh.
+type State<'a> = (&'a FieldSolution, &'a FieldModel, &'a Mesh);
+
 impl Places {
-    fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<At<'_>>, SolverError> {
+    fn at<'a>(&'a self, (solution, model, mesh): State<'a>) -> Result<At<'a>, SolverError> {
         Ok(match self {
             Self::Held(_, order, points) if *order == model.space().order() => {
-                points.iter().map(|point| At::Held(Cow::Borrowed(point))).collect()
+                At::Held(Cow::Borrowed(points))
             }
-            Self::Held(places, ..) => {
-                recovered(places, model, mesh).into_iter().map(|point| At::Held(Cow::Owned(point))).collect()
-            }
-            Self::InSpace(places) => {
-                places.on(model, mesh)?.into_iter().map(|point| At::InSpace(Box::new(point))).collect()
-            }
+            Self::Held(places, ..) => At::Held(Cow::Owned(recovered(places, model, mesh))),
+            Self::InSpace(places) => At::InSpace(Box::new(places.field((solution, model, mesh))?)),
         })
     }
 }
 
 impl At<'_> {
-    fn flux_density(&self, state: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+    fn flux_densities(&self, (solution, model, mesh): State<'_>) -> Vec<Complex3> {
         match self {
-            Self::Held(point) => point.flux_density(state, model, mesh),
-            Self::InSpace(point) => point.flux_density(state, model, mesh),
+            Self::Held(points) => {
+                points.iter().map(|point| point.flux_density(solution, model, mesh)).collect()
+            }
+            Self::InSpace(field) => field.flux_densities(),
         }
     }
 }
@@ -230,18 +231,15 @@ impl Multipoles {
         mesh: &Mesh,
         state: &FieldSolution,
     ) -> Result<Vec<(Harmonic, c64)>, SolverError> {
-        Ok(self.coefficients_at(&self.places.on(model, mesh)?, (state, model, mesh)))
+        let state = (state, model, mesh);
+        Ok(self.coefficients_of(&self.places.at(state)?.flux_densities(state)))
     }
 
-    fn coefficients_at(
-        &self,
-        places: &[At<'_>],
-        (state, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
-    ) -> Vec<(Harmonic, c64)> {
-        let fields: Vec<_> = places.iter().map(|place| place.flux_density(state, model, mesh)).collect();
+    /// Of the fields [T] at the places.
+    fn coefficients_of(&self, fields: &[Complex3]) -> Vec<(Harmonic, c64)> {
         let sum = |weights: &[Point]| -> c64 {
             let dot = |(w, b): (&Point, &[c64; 3])| (0..3).map(|d| w[d] * b[d]).sum::<c64>();
-            weights.iter().zip(&fields).map(dot).sum()
+            weights.iter().zip(fields).map(dot).sum()
         };
         self.terms.iter().map(|(term, weights)| (*term, sum(weights))).collect()
     }
@@ -339,24 +337,31 @@ impl MultipoleFunctional {
         mesh: &Mesh,
         state: &FieldSolution,
     ) -> Result<FunctionalValue, SolverError> {
-        let places = self.multipoles.places.on(model, mesh)?;
-        let coefficients = self.multipoles.coefficients_at(&places, (state, model, mesh));
-        let (value, slopes) = self.value(&coefficients, model.angular_frequency());
-        let mut derivative = vec![c64::default(); model.unknown_count()];
-        let mut explicit: Option<Vec<Point>> = None;
-        for (k, place) in places.iter().enumerate() {
-            let mut q = [c64::default(); 3];
-            for ((_, weights), slope) in self.multipoles.terms.iter().zip(&slopes) {
-                (0..3).for_each(|d| q[d] += slope * weights[k][d]);
-            }
-            match place {
-                At::Held(point) => point.add_derivative(q, model, mesh, &mut derivative),
-                At::InSpace(point) => {
-                    let by_positions = explicit.get_or_insert_with(|| vec![[0.0; 3]; mesh.points().len()]);
-                    point.add_derivatives(q, (state, model, mesh), (&mut derivative, by_positions));
-                }
+        let state = (state, model, mesh);
+        let at = self.multipoles.places.at(state)?;
+        let fields = at.flux_densities(state);
+        let (value, slopes) =
+            self.value(&self.multipoles.coefficients_of(&fields), model.angular_frequency());
+        let mut by_fields = vec![[c64::default(); 3]; fields.len()];
+        for ((_, weights), slope) in self.multipoles.terms.iter().zip(&slopes) {
+            for (q, weight) in by_fields.iter_mut().zip(weights) {
+                (0..3).for_each(|d| q[d] += slope * weight[d]);
             }
         }
+        let mut derivative = vec![c64::default(); model.unknown_count()];
+        let explicit = match at {
+            At::Held(points) => {
+                for (point, q) in points.iter().zip(by_fields) {
+                    point.add_derivative(q, model, mesh, &mut derivative);
+                }
+                None
+            }
+            At::InSpace(field) => {
+                let mut by_positions = vec![[0.0; 3]; mesh.points().len()];
+                field.add_derivatives(&by_fields, (&mut derivative, &mut by_positions));
+                Some(by_positions)
+            }
+        };
         Ok(FunctionalValue { value, derivative, explicit, ..Default::default() })
     }
 

@@ -10,7 +10,6 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, point_at, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
-use rayon::prelude::*;
 
 use super::FunctionalValue;
 use super::deviation::length;
@@ -20,7 +19,7 @@ use crate::element::{Complex3, dot3};
 use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
-use crate::recovery::{BlendedPoint, FixedPlaces, scatter_flux};
+use crate::recovery::{FixedPlaces, scatter_flux};
 use crate::solution::FieldSolution;
 
 /// How observation cells are weighted.
@@ -178,14 +177,16 @@ impl Observation {
         let field = (solution, model, mesh);
         let value = match (&self.fixed, &mut explicit) {
             (Some(fixed), Some(explicit)) => {
-                let points = fixed.places.on(model, mesh)?;
-                let of = self.of_samples(&fixed.samples_at(&points, field), model.angular_frequency());
+                let blended = fixed.places.field(field)?;
+                let fields = blended.flux_densities();
+                let of = self.of_samples(&fixed.means(&fields), model.angular_frequency());
+                let mut by_fields = vec![[c64::default(); 3]; fields.len()];
                 for ((parts, _), by_b) in fixed.samples.iter().zip(&of.by_b) {
                     for &(place, share) in parts {
-                        let own = by_b.map(|c| share * c);
-                        points[place].add_derivatives(own, field, (&mut derivative, explicit));
+                        (0..3).for_each(|d| by_fields[place][d] += share * by_b[d]);
                     }
                 }
+                blended.add_derivatives(&by_fields, (&mut derivative, explicit));
                 of.value
             }
             (_, explicit) => self.differentiate(field, &mut derivative, explicit.as_deref_mut()),
@@ -254,7 +255,7 @@ impl Observation {
         solution: &FieldSolution,
     ) -> Result<Vec<Sample>, SolverError> {
         let Some(fixed) = &self.fixed else { return Ok(self.samples_of_cells(model, mesh, solution)) };
-        Ok(fixed.samples_at(&fixed.places.on(model, mesh)?, (solution, model, mesh)))
+        Ok(fixed.means(&fixed.places.field((solution, model, mesh))?.flux_densities()))
     }
 
     fn samples_of_cells(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<Sample> {
@@ -388,13 +389,8 @@ impl FixedCells {
         Self { places: FixedPlaces::new(mesh, places), samples }
     }
 
-    fn samples_at(
-        &self,
-        points: &[BlendedPoint],
-        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
-    ) -> Vec<Sample> {
-        let fields: Vec<Complex3> =
-            points.par_iter().map(|point| point.flux_density(solution, model, mesh)).collect();
+    /// Of the fields [T] at the places.
+    fn means(&self, fields: &[Complex3]) -> Vec<Sample> {
         let mean = |(parts, volume): &(Vec<(usize, f64)>, f64)| {
             let b = |d| parts.iter().map(|&(place, share)| share * fields[place][d]).sum();
             (std::array::from_fn(b), *volume)

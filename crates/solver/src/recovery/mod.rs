@@ -32,7 +32,7 @@ use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 use fit::Fit;
-pub(crate) use places::{BlendedPoint, FixedPlaces};
+pub(crate) use places::{BlendedField, FixedPlaces};
 
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
@@ -158,13 +158,21 @@ fn around(
     all.filter(|&e| counts(e)).collect()
 }
 
-/// Points of elements of an order at which `B` is of one order better: the centroid, or the four of the rule of degree 2.
-fn super_convergent(order: Order, elements: &BTreeSet<ElementId>) -> Vec<(ElementId, &'static [f64; 4])> {
-    let rule: &'static [Node] = match order {
+/// Points of an element of an order at which `B` is of one order better: the centroid, or the four of the rule of degree 2.
+fn super_convergent(order: Order) -> &'static [Node] {
+    match order {
         Order::Linear => Rule::Centroid.nodes(),
         Order::Quadratic => Rule::Degree2.nodes(),
-    };
-    elements.iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda))).collect()
+    }
+}
+
+/// Those of some elements.
+fn samples_in<'e>(
+    order: Order,
+    elements: impl IntoIterator<Item = &'e ElementId>,
+) -> Vec<(ElementId, &'static [f64; 4])> {
+    let rule = super_convergent(order);
+    elements.into_iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda))).collect()
 }
 
 /// Adds `∂(q·B)/∂u` at a point of an element to a vector of unknowns.
@@ -216,7 +224,7 @@ fn of_flux_densities(
     point: Point,
 ) -> Option<Weights> {
     let order = model.space().order();
-    let samples = super_convergent(order, elements);
+    let samples = samples_in(order, elements);
     let weights = Fit::new(order.degree(), &places::offsets(mesh, &samples, point))?.value();
     Some(Weights::FluxDensities(
         samples.into_iter().zip(weights).map(|((e, lambda), w)| (e, *lambda, w)).collect(),

@@ -16,7 +16,8 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use super::fit::Fit;
-use super::{LAYERS_LIMIT, around, has_the_material_of, scatter_flux, super_convergent};
+use super::{LAYERS_LIMIT, around, has_the_material_of, samples_in, scatter_flux, super_convergent};
+use crate::element::quadrature::Node;
 use crate::element::{Complex3, dot3};
 use crate::error::SolverError;
 use crate::model::FieldModel;
@@ -30,17 +31,34 @@ pub(crate) struct FixedPlaces {
     places: Vec<(Point, ElementId)>,
 }
 
-/// The field at one of them as a linear function of the potentials, on one mesh.
-pub(crate) struct BlendedPoint {
+/// The field of a state at all of them, on one mesh.
+pub(crate) struct BlendedField<'a> {
+    state: (&'a FieldSolution, &'a FieldModel, &'a Mesh),
+    points: Vec<BlendedPoint>,
+    samples: Samples,
+}
+
+/// `B` where patches take it: neighbouring ones share most of these points.
+struct Samples {
+    /// Points in each element.
+    rule: &'static [Node],
+    /// Elements with samples, ascending.
+    elements: Vec<ElementId>,
+    /// `B` [T] at the points of each, shape `(n_elements, n_points)`.
+    values: Vec<Complex3>,
+}
+
+/// The field at one place as a linear function of samples.
+struct BlendedPoint {
     element: ElementId,
     /// `λ_a` and `∇λ_a` [1/m].
     shares: [(f64, Point); 4],
     patches: [Patch; 4],
 }
 
-/// A polynomial fitted around a vertex.
+/// A polynomial fitted around a vertex to the samples in some elements.
 struct Patch {
-    samples: Vec<(ElementId, &'static [f64; 4])>,
+    elements: Vec<ElementId>,
     fit: Fit,
     /// Of the samples in its value at the place.
     weights: Vec<f64>,
@@ -70,16 +88,33 @@ impl FixedPlaces {
         found.map(holder).collect()
     }
 
-    /// The fields at all of them on a mesh.
+    /// The field of a state at all of them.
     ///
     /// # Errors
     /// As [`FixedPlaces::locate`].
-    pub(crate) fn on(&self, model: &FieldModel, mesh: &Mesh) -> Result<Vec<BlendedPoint>, SolverError> {
+    pub(crate) fn field<'a>(
+        &self,
+        (solution, model, mesh): (&'a FieldSolution, &'a FieldModel, &'a Mesh),
+    ) -> Result<BlendedField<'a>, SolverError> {
         let located = self.locate(model, mesh)?;
         let blend = |(located, (point, _)): (&Located, &(Point, ElementId))| {
             self.blend(model, mesh, *located, *point)
         };
-        Ok(located.par_iter().zip(&self.places).map(blend).collect())
+        let points: Vec<BlendedPoint> = located.par_iter().zip(&self.places).map(blend).collect();
+        let patches = points.iter().flat_map(|point| &point.patches);
+        let mut elements: Vec<ElementId> = patches.flat_map(|patch| patch.elements.iter().copied()).collect();
+        elements.sort_unstable();
+        elements.dedup();
+        let rule = super_convergent(model.space().order());
+        let of_element = |&e: &ElementId| {
+            rule.iter().map(move |(lambda, _)| solution.at(model, mesh, e, lambda).flux_density)
+        };
+        let values = elements.par_iter().flat_map_iter(of_element).collect();
+        Ok(BlendedField {
+            state: (solution, model, mesh),
+            points,
+            samples: Samples { rule, elements, values },
+        })
     }
 
     fn blend(
@@ -111,10 +146,11 @@ impl FixedPlaces {
         let of_vertex = topology.elements_around(vertex).iter().copied();
         let mut elements: BTreeSet<ElementId> = of_vertex.filter(|&e| is_alike(e)).collect();
         let fitted = |elements: &BTreeSet<ElementId>, degree| {
-            let samples = super_convergent(order, elements);
+            let elements: Vec<ElementId> = elements.iter().copied().collect();
+            let samples = samples_in(order, &elements);
             Fit::even(degree, &offsets(&self.start, &samples, self.start.point(vertex)))?;
             let fit = Fit::even(degree, &offsets(mesh, &samples, point))?;
-            Some(Patch { samples, weights: fit.value(), fit })
+            Some(Patch { elements, weights: fit.value(), fit })
         };
         for _ in 0..LAYERS_LIMIT {
             if let Some(patch) = fitted(&elements, order.degree()) {
@@ -133,68 +169,101 @@ pub(super) fn offsets(mesh: &Mesh, samples: &[(ElementId, &[f64; 4])], origin: P
     samples.iter().map(|(e, lambda)| sub(point_at(&mesh.vertices(*e), lambda), origin)).collect()
 }
 
-impl BlendedPoint {
-    /// `B` [T] there.
-    pub(crate) fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
-        let part = |(patch, (lambda, _)): (&Patch, (f64, Point))| {
-            patch.blend(&patch.values(solution, model, mesh)).map(|c| lambda * c)
+impl BlendedField<'_> {
+    /// `B` [T] at the places.
+    pub(crate) fn flux_densities(&self) -> Vec<Complex3> {
+        let at = |point: &BlendedPoint| {
+            let part = |(patch, (lambda, _)): (&Patch, (f64, Point))| {
+                patch.blend(&self.samples.of(patch)).map(|c| lambda * c)
+            };
+            let parts = point.patches.iter().zip(point.shares).map(part);
+            parts.fold([c64::default(); 3], |sum, part| std::array::from_fn(|d| sum[d] + part[d]))
         };
-        let parts = self.patches.iter().zip(self.shares).map(part);
-        parts.fold([c64::default(); 3], |sum, part| std::array::from_fn(|d| sum[d] + part[d]))
+        self.points.par_iter().map(at).collect()
     }
 
-    /// Adds `∂(q·B)/∂u` to a vector of unknowns, and `2 Re ∂(q·B)/∂x` [per m] at fixed potentials to one of nodes.
+    /// Adds `∂(Σ_k q_k·B_k)/∂u` over the places to a vector of unknowns, and `2 Re ∂(Σ_k q_k·B_k)/∂x` [per m] at fixed potentials to
+    /// one of nodes.
     pub(crate) fn add_derivatives(
         &self,
-        q: Complex3,
-        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+        q: &[Complex3],
         (by_potentials, by_positions): (&mut [c64], &mut [Point]),
     ) {
-        let vertices = model.topology().tet(self.element);
-        for (patch, (lambda, gradient)) in self.patches.iter().zip(self.shares) {
-            let values = patch.values(solution, model, mesh);
-            let along = dot3(q, patch.blend(&values));
-            // The place stays: δλ_a = −∇λ_a · v, with v = λ_k d.
-            for (node, (of_node, _)) in vertices.iter().zip(self.shares) {
-                let change = -2.0 * of_node * along.re;
-                (0..3).for_each(|d| by_positions[node.index()][d] += change * gradient[d]);
+        let topology = self.state.1.topology();
+        let mut by_samples = vec![[c64::default(); 3]; self.samples.values.len()];
+        for (point, q) in self.points.iter().zip(q) {
+            let vertices = topology.tet(point.element);
+            for (patch, (lambda, gradient)) in point.patches.iter().zip(point.shares) {
+                let values = self.samples.of(patch);
+                let along = dot3(*q, patch.blend(&values));
+                // The place stays: δλ_a = −∇λ_a · v, with v = λ_k d.
+                for (node, (of_node, _)) in vertices.iter().zip(point.shares) {
+                    let change = -2.0 * of_node * along.re;
+                    (0..3).for_each(|d| by_positions[node.index()][d] += change * gradient[d]);
+                }
+                let own = q.map(|c| lambda * c);
+                let along: Vec<c64> = values.iter().map(|b| dot3(own, *b)).collect();
+                let by_points = patch.fit.value_by_points(&patch.weights, &along);
+                for ((place, weight), by_point) in
+                    self.samples.places_of(patch).zip(&patch.weights).zip(by_points)
+                {
+                    (0..3).for_each(|d| by_samples[place][d] += *weight * own[d]);
+                    let (e, lambda) = self.samples.at(place);
+                    for (a, node) in topology.tet(e).iter().enumerate() {
+                        for d in 0..3 {
+                            by_positions[node.index()][d] += 2.0 * lambda[a] * by_point[d].re;
+                        }
+                    }
+                }
             }
-            let own = q.map(|c| lambda * c);
-            patch.add_derivatives((own, &values), (solution, model, mesh), (by_potentials, by_positions));
+        }
+        self.add_derivatives_of_samples(&by_samples, (by_potentials, by_positions));
+    }
+
+    /// Adds the same of what the field is at the samples, moving with their elements.
+    fn add_derivatives_of_samples(
+        &self,
+        q: &[Complex3],
+        (by_potentials, by_positions): (&mut [c64], &mut [Point]),
+    ) {
+        let (solution, model, mesh) = self.state;
+        let space = model.space();
+        for (place, q) in q.iter().enumerate() {
+            let (e, lambda) = self.samples.at(place);
+            scatter_flux((model, mesh), (e, lambda), *q, by_potentials);
+            let field = solution.element(model, e);
+            let changes = space.elements().flux_change(&space.cell(mesh, e), lambda, field.values(), *q);
+            for (a, node) in model.topology().tet(e).iter().enumerate() {
+                (0..3).for_each(|d| by_positions[node.index()][d] += 2.0 * changes[a][d].re);
+            }
         }
     }
 }
 
-impl Patch {
-    /// `B` [T] at the samples.
-    fn values(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
-        self.samples.iter().map(|(e, lambda)| solution.at(model, mesh, *e, lambda).flux_density).collect()
+impl Samples {
+    /// The element and the barycentric coordinates of a sample.
+    fn at(&self, place: usize) -> (ElementId, &'static [f64; 4]) {
+        let count = self.rule.len();
+        (self.elements[place / count], &self.rule[place % count].0)
     }
 
+    /// The samples of a patch.
+    fn places_of<'p>(&'p self, patch: &'p Patch) -> impl Iterator<Item = usize> + 'p {
+        let count = self.rule.len();
+        let first =
+            move |e: &ElementId| self.elements.binary_search(e).expect("elements of all patches") * count;
+        patch.elements.iter().flat_map(move |e| first(e)..first(e) + count)
+    }
+
+    /// `B` [T] at them.
+    fn of(&self, patch: &Patch) -> Vec<Complex3> {
+        self.places_of(patch).map(|place| self.values[place]).collect()
+    }
+}
+
+impl Patch {
     /// `B` [T] at the place, of the values at the samples.
     fn blend(&self, values: &[Complex3]) -> Complex3 {
         std::array::from_fn(|d| values.iter().zip(&self.weights).map(|(b, w)| *w * b[d]).sum())
-    }
-
-    fn add_derivatives(
-        &self,
-        (q, values): (Complex3, &[Complex3]),
-        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
-        (by_potentials, by_positions): (&mut [c64], &mut [Point]),
-    ) {
-        let (space, topology) = (model.space(), model.topology());
-        let along: Vec<c64> = values.iter().map(|b| dot3(q, *b)).collect();
-        let by_points = self.fit.value_by_points(&self.weights, &along);
-        for (((e, lambda), weight), by_point) in self.samples.iter().zip(&self.weights).zip(by_points) {
-            let own = q.map(|c| *weight * c);
-            scatter_flux((model, mesh), (*e, lambda), own, by_potentials);
-            let field = solution.element(model, *e);
-            let changes = space.elements().flux_change(&space.cell(mesh, *e), lambda, field.values(), own);
-            for (a, node) in topology.tet(*e).iter().enumerate() {
-                for d in 0..3 {
-                    by_positions[node.index()][d] += 2.0 * (changes[a][d] + lambda[a] * by_point[d]).re;
-                }
-            }
-        }
     }
 }
