@@ -196,6 +196,23 @@ fn a_run_cut_anywhere_makes_its_refinements_again() {
     }
 }
 
+/// The mesh is not refined for a search that has no evaluations left: the best design would not be among its own.
+#[test]
+fn no_limit_loses_the_best_design_between_two_meshes() {
+    let mut least = 1.0_f64;
+    for evaluations in 1..=8 {
+        let mut device = refined();
+        device.0.optimizer.max_evaluations = evaluations;
+        let result =
+            run(&SimulatedDisk::default().shared(), &device).unwrap_or_else(|e| panic!("{evaluations}: {e}"));
+        let ratio = result.objective.expect("an objective").ratio;
+        println!("{evaluations} evaluations: {ratio:.4}");
+        assert!(ratio < 1.0 || least == 1.0, "{evaluations} evaluations end at {ratio}, fewer at {least}");
+        least = least.min(ratio);
+    }
+    assert!(least < 0.99, "nothing was to be lost: {least}");
+}
+
 #[test]
 fn refinements_that_are_not_those_of_the_run_are_refused() {
     let (files, _) = whole_run(&refined());

@@ -239,7 +239,7 @@ fn place_of_current(
     is_wanted: impl Fn(ElementId) -> bool,
 ) -> Option<(ElementId, Point)> {
     let mut wanted = mesh.topology().elements().filter(|&e| is_wanted(e));
-    wanted.find_map(|e| winding.place_in(mesh.vertices(e)).map(|place| (e, place)))
+    wanted.find_map(|e| winding.wound_place(mesh.vertices(e)).map(|place| (e, place)))
 }
 
 /// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.

@@ -26,6 +26,36 @@ use crate::error::Error;
 use crate::files::{OutputError, RefinementStep, Refinements, relative_bar};
 use crate::show::RunObserver;
 
+/// Evaluations with which a search on a finer mesh begins: of the initial design, and of the best one before it.
+const TAKEN_UP: usize = 2;
+
+/// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
+struct TimeLimit {
+    most: Option<f64>,
+    since: Instant,
+}
+
+impl TimeLimit {
+    /// So many seconds from now.
+    fn starting_now(most: Option<f64>) -> Self {
+        Self { most, since: Instant::now() }
+    }
+
+    /// All of it from now.
+    fn restart(&mut self) {
+        self.since = Instant::now();
+    }
+
+    /// What is left [s]; `None` without a limit.
+    fn left(&self) -> Option<f64> {
+        self.most.map(|most| (most - self.since.elapsed().as_secs_f64()).max(0.0))
+    }
+
+    fn is_over(&self) -> bool {
+        self.left().is_some_and(|left| left <= 0.0)
+    }
+}
+
 /// The mesh of a run with a tolerance.
 pub(super) struct Levels {
     mesh: RefinedMesh,
@@ -110,17 +140,18 @@ impl Session<'_> {
         }
         // Of second order the set-up has said it.
         levels = levels.filter(|_| !is_shared_out && self.config.analysis.order == ElementOrder::Linear);
-        let clock = Instant::now();
-        let time_left = || settings.max_time.map(|time| (time - clock.elapsed().as_secs_f64()).max(0.0));
+        let mut limit = TimeLimit::starting_now(settings.max_time);
         if let Some(levels) = &mut levels {
-            let is_over = || time_left() == Some(0.0);
-            self.refine_before_search(levels, (recorder.is_replaying(), &is_over), observer)?;
+            self.refine_before_search(levels, recorder.is_replaying(), &mut limit, observer)?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
         loop {
+            if recorder.is_replaying() {
+                limit.restart();
+            }
             let first = self.setup.problem.moved(self.initial_design())?;
-            let settings = Settings { max_time: time_left(), ..settings.clone() };
+            let settings = Settings { max_time: limit.left(), ..settings.clone() };
             let optimised = driver::optimise_from(
                 &start,
                 &mut self.setup.problem,
@@ -131,7 +162,7 @@ impl Session<'_> {
             )?;
             let optimised = sum(before.take(), optimised);
             let (is_refined, at_best) = match &mut levels {
-                Some(levels) => self.refine_after_search(levels, &optimised, observer)?,
+                Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
                 None => (false, None),
             };
             if !is_refined {
@@ -152,7 +183,8 @@ impl Session<'_> {
     fn refine_before_search(
         &mut self,
         levels: &mut Levels,
-        (has_begun, is_over): (bool, &dyn Fn() -> bool),
+        has_begun: bool,
+        limit: &mut TimeLimit,
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         loop {
@@ -160,15 +192,16 @@ impl Session<'_> {
                 .map_err(|_| OptimizerError::InterruptedRun)?;
             if let Some(step) = levels.next_kept(0) {
                 self.refine_again(levels, &step)?;
+                limit.restart();
                 continue;
             }
             if has_begun {
                 return Ok(());
             }
-            if is_over() {
+            if limit.is_over() {
                 observer.warning(
                     "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
-                     evaluated on the mesh as it is",
+                     evaluated on the mesh as it is, from which a resumed run goes on",
                 );
                 return Ok(());
             }
@@ -181,7 +214,7 @@ impl Session<'_> {
                 return Ok(());
             };
             let scale = analysis.objective.map_or(f64::NAN, f64::abs);
-            if !self.refine(levels, 0, (&analysis, &estimate, scale), observer)? {
+            if !self.refine(levels, (0, limit), (&analysis, &estimate, scale), observer)? {
                 return Ok(());
             }
         }
@@ -193,6 +226,7 @@ impl Session<'_> {
         &mut self,
         levels: &mut Levels,
         optimised: &Optimised,
+        limit: &TimeLimit,
         observer: &mut dyn RunObserver,
     ) -> Result<(bool, Option<ErrorEstimate>), Error> {
         let reason = optimised.stop_reason;
@@ -214,7 +248,7 @@ impl Session<'_> {
         let Some(estimate) = self.estimator().estimate(analysis, observer) else { return Ok((false, None)) };
         let scale = optimised.initial.abs().max(optimised.best.objective.abs());
         let of_best = (analysis, &estimate, scale);
-        let is_refined = self.refine(levels, optimised.evaluations, of_best, observer)?;
+        let is_refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;
         Ok((is_refined, Some(estimate).filter(|_| !is_refined)))
     }
 
@@ -222,7 +256,7 @@ impl Session<'_> {
     fn refine(
         &mut self,
         levels: &mut Levels,
-        evaluations: usize,
+        (evaluations, limit): (usize, &TimeLimit),
         (analysis, estimate, scale): (&Analysis, &ErrorEstimate, f64),
         observer: &mut dyn RunObserver,
     ) -> Result<bool, Error> {
@@ -236,6 +270,13 @@ impl Session<'_> {
         };
         let said = levels.compared(what, bar);
         if levels.is_over(bar, &said, observer) {
+            return Ok(false);
+        }
+        let is_used_up = evaluations > 0 && evaluations + TAKEN_UP > self.config.optimizer.max_evaluations;
+        if is_used_up || limit.is_over() {
+            observer.warning(&format!(
+                "{said}, and the limits of the run leave no evaluations on a finer mesh: the tolerance is not kept"
+            ));
             return Ok(false);
         }
         observer.phase("refining the mesh");

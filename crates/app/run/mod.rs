@@ -130,6 +130,8 @@ struct Session<'a> {
     config: &'a Config,
     source: &'a SourceMap,
     setup: Setup,
+    /// What the set-up of the mesh of the configuration has warned of.
+    warnings: Vec<String>,
     /// Of the mesh before it was refined.
     facets: Option<CurvedFacets>,
     directory: RunDirectory,
@@ -160,7 +162,7 @@ impl Session<'_> {
             directory: Some(directory.path()),
             fields: config.output.fields,
         });
-        for warning in &setup.warnings {
+        for warning in &self.warnings {
             observer.warning(warning);
         }
     }

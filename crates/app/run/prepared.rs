@@ -77,6 +77,7 @@ impl<'a> Prepared<'a> {
             command,
             config,
             source,
+            warnings: setup.warnings.clone(),
             setup,
             facets,
             directory,

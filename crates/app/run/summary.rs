@@ -53,7 +53,7 @@ impl Session<'_> {
         let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
         let more = reservations(self.config, &self.setup, analysis);
         more.iter().for_each(|warning| observer.warning(warning));
-        let warnings = self.setup.warnings.iter().cloned().chain(more).collect();
+        let warnings = self.warnings.iter().cloned().chain(more).collect();
         Ok(RunResult {
             schema_version: 1,
             command: self.command.to_owned(),

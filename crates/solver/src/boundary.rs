@@ -2,15 +2,18 @@
 
 use std::collections::HashMap;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, cross, norm, sub};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
 
-/// Share of an applied field's largest circulation along an edge that may be left where another condition says
-/// otherwise: rounding.
+/// Share of an applied field's largest `|A|` that may be left where another condition says otherwise: rounding.
 pub(crate) const CONFLICT: f64 = 1e-6;
+
+/// The same along a face of edge elements. A face of a fine mesh with coordinates of six digits has a direction of its own: the error
+/// of what is left is of this size, too.
+pub(crate) const CONFLICT_ALONG_FACES: f64 = 1e-3;
 
 /// A condition on a named surface, plane or curved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +71,7 @@ pub(crate) fn centre(
 }
 
 /// Refuses applied fields that contradict each other where their surfaces meet, or a perfect conductor, by name and surface, that
-/// touches one: along an edge `A` has one circulation, and on a perfect conductor none.
+/// touches one: there is one `A`, and along a perfect conductor none, whether or not along the edge where they meet.
 ///
 /// # Errors
 /// [`SolverError::TwoFields`], [`SolverError::FieldOnConductor`].
@@ -77,34 +80,33 @@ pub(crate) fn check_applied<'a>(
     boundaries: &[(String, Boundary)],
     perfect: impl Iterator<Item = (&'a str, &'a [[NodeId; 3]])>,
 ) -> Result<(), SolverError> {
-    let mut applied: HashMap<[NodeId; 2], (f64, &str)> = HashMap::new();
+    let mut applied: HashMap<[NodeId; 2], (Point, &str)> = HashMap::new();
     let (mut largest, mut apart) = (0.0_f64, Vec::new());
     for (surface, boundary) in boundaries {
         let Boundary::UniformField(field) = boundary else { continue };
         let centre = centre(mesh, boundaries, field)?;
         for edge in mesh.topology().surface(surface)?.iter().flat_map(edges) {
-            let [from, to] = edge.map(|n| mesh.point(n));
-            let circulation = dot(field.vector_potential(centre, middle(mesh, edge)), sub(to, from));
-            largest = largest.max(circulation.abs());
-            let (first, other) = *applied.entry(edge).or_insert((circulation, surface));
+            let potential = field.vector_potential(centre, middle(mesh, edge));
+            largest = largest.max(norm(potential));
+            let (first, other) = *applied.entry(edge).or_insert((potential, surface));
             if other != surface {
-                apart.push((edge, (first - circulation).abs(), [other, surface.as_str()]));
+                apart.push((edge, norm(sub(first, potential)), [other, surface.as_str()]));
             }
         }
     }
-    let least = CONFLICT * largest;
-    if let Some((edge, _, surfaces)) = apart.into_iter().find(|(_, difference, _)| *difference > least) {
+    let differs = |(_, difference, _): &([NodeId; 2], f64, _)| *difference > CONFLICT * largest;
+    if let Some((edge, _, surfaces)) = apart.into_iter().find(differs) {
         let surfaces = surfaces.map(str::to_owned);
         return Err(SolverError::TwoFields { surfaces, place: middle(mesh, edge) });
     }
     for (name, triangles) in perfect {
-        for edge in triangles.iter().flat_map(edges) {
-            if let Some((_, surface)) =
-                applied.get(&edge).filter(|(circulation, _)| circulation.abs() > least)
-            {
+        for (triangle, edge) in triangles.iter().flat_map(|t| edges(t).map(|edge| (t, edge))) {
+            let Some(&(potential, surface)) = applied.get(&edge) else { continue };
+            let area = area_vector(triangle.map(|n| mesh.point(n)));
+            if norm(cross(potential, area)) > CONFLICT_ALONG_FACES * largest * norm(area) {
                 return Err(SolverError::FieldOnConductor {
                     conductor: name.to_owned(),
-                    surface: (*surface).to_owned(),
+                    surface: surface.to_owned(),
                     place: middle(mesh, edge),
                 });
             }

@@ -9,7 +9,8 @@
 //! up to the product of what both approximations lack, so that few iterations do: the dual-weighted residual (Becker and
 //! Rannacher, Acta Numerica 10 (2001) 1) with both errors taken from one order more. `∂F/∂u` is taken half way, where it is
 //! exact for a quadratic `F`. Since `r` vanishes on the first-order space, `2 Re zᵀr` comes from the functions that only the
-//! second order has, and `Σ_i 2 Re z_i r_i` over those of an element's carriers says where the error is made.
+//! second order has, and `Σ_i 2 Re z_i r_i` over those of an element's carriers says where the error is made. A functional of a
+//! recovered field is another function of `u` in second order: `F(u)` is that of first order, `F(u + e)` and `∂F/∂u` that of second.
 //!
 //! With B–H curves `e` comes from Newton's method with its line search, until the residual is a thousandth of the load; `K` is
 //! the tangent at `u + e`, and what is weighed is the residual that is left there.

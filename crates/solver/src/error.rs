@@ -33,8 +33,8 @@ pub enum SolverError {
     /// An applied field and another condition contradict each other.
     #[error(
         "at {} the applied field contradicts another condition: a flux-parallel plane must be parallel \
-         to the field and hold the field's center (of two opposite ones, let the field be applied to one), a flux-normal one at \
-         right angles to it",
+         to the field and hold the field's center, a flux-normal one at right angles to it; of two opposite flux-parallel planes, \
+         apply the field to one instead",
         millimetres(*place)
     )]
     Conflict {

@@ -107,6 +107,22 @@ fn a_field_beside_flux_parallel_planes_has_its_centre_on_them_or_is_refused() {
     }
 }
 
+/// Along a plane across no axis, with coordinates of five digits: its faces have directions of their own.
+#[test]
+fn an_oblique_flux_parallel_plane_is_one_in_rounded_coordinates() {
+    let turned = |[x, y, z]: [f64; 3]| [0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y, z];
+    let mesh = cube(|x| turned(x.map(|c| 1.01 * c)).map(|c| (c * 1e6).round() * 1e-6));
+    let flux_density = turned([0.1, 0.0, 0.0]);
+    let field = Boundary::UniformField(UniformField { flux_density, centre: Some([0.0; 3]) });
+    let mut setup = setup(Order::Linear, &["z_min", "z_max", "y_max"], field);
+    setup.boundaries.push(("y_min".to_owned(), Boundary::FluxParallel));
+    let sides = ["x_min", "x_max"].map(|name| (name.to_owned(), Boundary::FluxNormal));
+    setup.boundaries.extend(sides);
+    let error = error(&mesh, setup, flux_density);
+    // Of the directions of the faces.
+    assert!(error < 1e-3, "{error:e}");
+}
+
 #[test]
 fn two_applied_fields_that_share_an_edge_agree_on_it_or_are_refused() {
     let mesh = leaning();
@@ -142,5 +158,28 @@ fn a_perfect_conductor_on_a_surface_with_an_applied_field_is_refused() {
             matches!(&error, SolverError::FieldOnConductor { conductor, .. } if conductor == "block"),
             "{error}"
         );
+    }
+}
+
+/// Along its face, not along the edges at which it meets the surface of the field: half of the flux would be missing.
+#[test]
+fn a_field_along_the_face_of_a_perfect_conductor_has_its_centre_there_or_is_refused() {
+    let (mesh, surface) = cube(|x| x).without_region(RegionId(1)).expect("what is left");
+    let in_wall = |triangle: &[fluxmorph_geometry::NodeId; 3]| {
+        triangle.iter().all(|&n| (mesh.point(n)[1] - 0.01).abs() < 1e-9)
+    };
+    let surface: Vec<_> = surface.into_iter().filter(in_wall).collect();
+    let block = Conductor { name: "block".to_owned(), surface, law: SurfaceLaw::Perfect };
+    for (centre, is_sound) in [(0.01, true), (0.015, false)] {
+        let field = UniformField { flux_density: [0.0, 0.0, 0.1], centre: Some([0.0, centre, 0.0]) };
+        let mut setup = setup(Order::Linear, &["x_min"], Boundary::UniformField(field));
+        setup.conductors = vec![block.clone()];
+        match FieldModel::new(&mesh, setup) {
+            Ok(_) => assert!(is_sound, "{centre}"),
+            Err(error) => assert!(
+                !is_sound && matches!(error, SolverError::FieldOnConductor { .. }),
+                "{centre}: {error}"
+            ),
+        }
     }
 }

@@ -15,9 +15,9 @@ table! {
     /// there, twice the estimate, is within the tolerance; then comes the search; and where the error bar at the best design is
     /// not, the mesh is refined for that design, and the search goes on from it. Nodes are put in the middle of edges: bodies,
     /// facets and design variables stay what they are, `design.filter_radius` and `design.grid` too. All evaluations have one
-    /// history, in which `level` counts the refinements, and `optimizer.max_evaluations` and `max_time` limit them together, the
-    /// latter with the refinements. Of the initial design every mesh has its own value, to which the ratios belong. Where the memory or `max_refinements` do
-    /// not suffice, the run goes on with the mesh that it has, and says so.
+    /// history, in which `level` counts the refinements, and `optimizer.max_evaluations` limits them together, as `max_time` does,
+    /// in which the refinements count. Of the initial design every mesh has its own value, to which the ratios belong. Where the
+    /// memory or `max_refinements` do not suffice, the run goes on with the mesh that it has, and says so.
     ///
     /// ```toml
     /// [accuracy]

@@ -6,7 +6,7 @@ use super::definitions::{Definitions, Keywords, bounds, list_of};
 use super::entry::Entry;
 use super::kind::{Kind, Single, Value};
 use super::limits::LONGEST_LENGTH;
-use super::range::Range;
+use super::range::{Range, written};
 use crate::config::text::dimension::Dimension;
 use crate::config::text::quantity::parse_quantity;
 use crate::config::text::tree::Content;
@@ -89,14 +89,6 @@ fn in_range(entry: &Entry<'_>, value: f64, kind: &Number) -> Option<f64> {
     };
     entry.wrong(message, &format!("must be {}", kind.range.describe(unit.trim_start())), None);
     None
-}
-
-/// All digits of a number, by a power of ten where they would be a line of zeros.
-fn written(value: f64) -> String {
-    match value.abs() {
-        0.0 | 1e-9..1e16 => format!("{value}"),
-        _ => format!("{value:e}"),
-    }
 }
 
 fn number(range: Range) -> Keywords {

@@ -70,13 +70,13 @@ impl Range {
     pub(crate) fn describe(&self, unit: &str) -> String {
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let lower = match self.lower {
-            End::Open(bound) => Some(format!("greater than {bound}{unit}")),
-            End::Closed(bound) => Some(format!("at least {bound}{unit}")),
+            End::Open(bound) => Some(format!("greater than {}{unit}", written(bound))),
+            End::Closed(bound) => Some(format!("at least {}{unit}", written(bound))),
             End::None => None,
         };
         let upper = match self.upper {
-            End::Open(bound) => Some(format!("less than {bound}{unit}")),
-            End::Closed(bound) => Some(format!("at most {bound}{unit}")),
+            End::Open(bound) => Some(format!("less than {}{unit}", written(bound))),
+            End::Closed(bound) => Some(format!("at most {}{unit}", written(bound))),
             End::None => None,
         };
         match (lower, upper) {
@@ -84,6 +84,14 @@ impl Range {
             (Some(one), None) | (None, Some(one)) => one,
             (None, None) => "a finite number".to_owned(),
         }
+    }
+}
+
+/// All digits of a number, by a power of ten where they would be a line of zeros.
+pub(super) fn written(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-6..1e16 => format!("{value}"),
+        _ => format!("{value:e}"),
     }
 }
 

@@ -98,7 +98,7 @@ fn results(data: &RunData) -> Markup {
 }
 
 fn mesh(data: &RunData) -> Markup {
-    let skin = of_outline(data, |_, outline| Ok(tables::skin(outline)));
+    let skin = of_outline(data, |_, outline| Ok(tables::skin(outline, data.result.as_ref())));
     html! {
         div class="pair" {
             div { (facts::mesh(data)) }

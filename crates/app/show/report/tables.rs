@@ -295,7 +295,7 @@ fn rows_of(state: &State<'_>, probe: &ProbeResult, initial: Option<&ProbeResult>
 }
 
 /// The skin-depth audit.
-pub(super) fn skin(outline: &Outline) -> Markup {
+pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
     if outline.audits.is_empty() {
         return html! { p { "No region conducts at a frequency above zero: there are no skin depths to resolve." } };
     }
@@ -323,9 +323,12 @@ pub(super) fn skin(outline: &Outline) -> Markup {
     let rows: Vec<Vec<String>> = outline.audits.iter().map(row).collect();
     let head =
         ["conductor", "model", "skin depth [mm]", "elements per skin depth", "thickness 2V/S [skin depths]"];
-    let is_sound = outline.audits.iter().all(|audited| audited.warning().is_none());
+    let warnings: Vec<String> = outline.audits.iter().filter_map(|a| a.warning()).collect();
+    // What a result warns of stands above.
+    let said = |warning: &String| result.is_some_and(|result| result.warnings.contains(warning));
     html! {
         (table(&head, &rows, None))
-        @if is_sound { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
+        @if warnings.is_empty() { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
+        @for warning in warnings.iter().filter(|warning| !said(warning)) { p class="warning" { (warning) } }
     }
 }

@@ -39,6 +39,8 @@ pub(super) struct Run<'a> {
     pub(super) evaluations: usize,
     pub(super) iterations: usize,
     pub(super) initial: Option<Initial>,
+    /// Whether the design of a coarser mesh is evaluated.
+    pub(super) is_taking_up: bool,
     pub(super) last: Vec<f64>,
     /// What the method has seen of the design before.
     pub(super) latest: Option<Sample>,
@@ -88,6 +90,7 @@ impl<'a> Run<'a> {
             evaluations: 0,
             iterations: 0,
             initial: None,
+            is_taking_up: false,
             last,
             latest: None,
             repeated: 0,
@@ -181,8 +184,8 @@ impl<'a> Run<'a> {
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
         // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end.
-        let is_over =
-            self.initial.is_some() && self.settings.max_time.is_some_and(over) && !self.is_replaying();
+        let must_go_on = self.initial.is_none() || self.is_taking_up;
+        let is_over = !must_go_on && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
     }
 

@@ -31,8 +31,12 @@ impl Run<'_> {
         if let Some(reason) = self.evaluated(&initial)? {
             return Ok(Some(reason));
         }
-        if let Some(reason) = self.evaluated(design)? {
-            return Ok(Some(reason));
+        // On this mesh the best design is known only then: no time ends the run between the two.
+        self.is_taking_up = true;
+        let reason = self.evaluated(design)?;
+        self.is_taking_up = false;
+        if reason.is_some() {
+            return Ok(reason);
         }
         let has_gained = self.best_evaluation().is_some_and(|best| best > self.first_evaluation);
         if !has_gained && design != initial {

@@ -18,8 +18,8 @@ pub struct ErrorEstimate {
     pub objective: f64,
     /// Of each constraint on a functional of the field, with its number.
     pub constraints: Vec<(usize, f64)>,
-    /// Where the objective's error is made: what each element adds to it, shape `(n_tets,)`; of a worst case to that of the term which
-    /// is the worst without the errors.
+    /// Where the objective's error is made: what each element adds to it, shape `(n_tets,)`, but for what the recovery of a field at
+    /// places is off by itself; of a worst case to that of the term which is the worst without the errors.
     pub by_element: Vec<f64>,
     /// Iterations of all corrections.
     pub iterations: usize,

@@ -63,8 +63,8 @@ impl SkinAudit {
         if self.coarse_share > TOLERATED_SHARE {
             return Some(format!(
                 "region `{}`: the first element layer is too thick for the skin depth ({delta:.3} mm) on {:.0} % of the \
-                 surface (median {:.2} elements per skin depth): the field behind it will be wrong, and by more than an \
-                 estimate of the error says. Refine the skin, or {instead}",
+                 surface (median {:.2} elements per skin depth): the field behind it will be wrong, and the error \
+                 estimate is too small. Refine the skin, or {instead}",
                 self.region,
                 self.coarse_share * 100.0,
                 self.median_elements_per_skin_depth,
@@ -116,13 +116,14 @@ impl SkinAudit {
     }
 }
 
-/// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced, the region is empty or nothing of it
-/// but faces towards `joined`: regions of one conductor with it, whose common faces have no skin.
+/// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced or the region is empty.
 ///
-/// A quadratic element counts as two: it follows the decay over twice the thickness.
+/// Regions of `alike`, of the same material and model, that are joined with it by faces are one conductor: its surface is theirs
+/// together, and so are its volume and extent. The first layer is that under the region's own part of the surface; of a region without
+/// one, as of a core, that under all of it. A quadratic element counts as two: it follows the decay over twice the thickness.
 pub fn skin_audit(
     mesh: &Mesh,
-    (region, joined): (RegionId, &[RegionId]),
+    (region, alike): (RegionId, &[RegionId]),
     material: &Material,
     frequency: f64,
     order: Order,
@@ -130,30 +131,35 @@ pub fn skin_audit(
     let skin_depth = material.skin_depth(2.0 * std::f64::consts::PI * frequency)?;
     let topology = mesh.topology();
     let region_at = |e: ElementId| topology.region_of()[e.index()];
-    let elements: Vec<[Point; 4]> =
-        topology.elements_of(region).into_iter().map(|e| mesh.vertices(e)).collect();
-    let volume_sum: f64 = elements.iter().map(|&vertices| volume(vertices)).sum();
+    let own: Vec<[Point; 4]> = topology.elements_of(region).into_iter().map(|e| mesh.vertices(e)).collect();
+    let own_volume: f64 = own.iter().map(|&vertices| volume(vertices)).sum();
+    let squares: f64 = own.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
+    let conductor = joined(mesh, region, alike);
+    let elements = conductor.iter().flat_map(|&part| topology.elements_of(part));
+    let elements: Vec<[Point; 4]> = elements.map(|e| mesh.vertices(e)).collect();
     let around = AxisBox::around(elements.as_flattened());
-    let squares: f64 = elements.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
+    let all_volume: f64 = elements.iter().map(|&vertices| volume(vertices)).sum();
 
     // (elements per skin depth, area) of every face of the conductor; symmetry planes are none.
-    let (mut layers, mut faces) = (Vec::new(), Vec::new());
+    let (mut layers, mut faces) = ([Vec::new(), Vec::new()], Vec::new());
+    let mut surface = 0.0;
     for facet in topology.facets() {
         let Some(outside) = facet.outside else { continue };
-        let (element, other) = match (region_at(facet.inside) == region, region_at(outside) == region) {
-            (true, false) => (facet.inside, region_at(outside)),
-            (false, true) => (outside, region_at(facet.inside)),
-            _ => continue,
-        };
-        if joined.contains(&other) {
+        let [is_inside, is_outside] = [facet.inside, outside].map(|e| conductor.contains(&region_at(e)));
+        if is_inside == is_outside {
             continue;
         }
+        let element = if is_inside { facet.inside } else { outside };
         let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
         let height = 3.0 * volume(mesh.vertices(element)) / area;
-        layers.push((order.degree() as f64 * skin_depth / height, area));
+        let is_own = region_at(element) == region;
+        layers[usize::from(!is_own)].push((order.degree() as f64 * skin_depth / height, area));
         faces.push(facet.nodes);
+        surface += area;
     }
-    let surface: f64 = layers.iter().map(|l| l.1).sum();
+    let [own_layers, others] = layers;
+    let mut layers = if own_layers.is_empty() { others } else { own_layers };
+    let looked_at: f64 = layers.iter().map(|l| l.1).sum();
     layers.sort_by(|a, b| a.0.total_cmp(&b.0));
     let least = layers.first()?.0;
     let mut below = 0.0;
@@ -161,7 +167,7 @@ pub fn skin_audit(
         .iter()
         .find(|l| {
             below += l.1;
-            below >= 0.5 * surface
+            below >= 0.5 * looked_at
         })?
         .0;
     let coarse: f64 = layers.iter().filter(|l| l.0 < 1.0).map(|l| l.1).sum();
@@ -170,17 +176,89 @@ pub fn skin_audit(
         skin_depth,
         median_elements_per_skin_depth: median,
         least_elements_per_skin_depth: least,
-        coarse_share: coarse / surface,
+        coarse_share: coarse / looked_at,
         coarse_layers: layers::coarse_layers(mesh, region, &faces, skin_depth, order),
-        thickness_in_skin_depths: 2.0 * volume_sum / surface / skin_depth,
+        thickness_in_skin_depths: 2.0 * all_volume / surface / skin_depth,
         extent: norm(sub(around.upper, around.lower)),
-        edge_length: (squares / volume_sum).sqrt(),
+        edge_length: (squares / own_volume).sqrt(),
         relative_permeability: material.relative_permeability,
     })
+}
+
+/// A region with those of some others that faces join with it, one through the other.
+fn joined(mesh: &Mesh, region: RegionId, others: &[RegionId]) -> Vec<RegionId> {
+    let mut found = vec![region];
+    let mut k = 0;
+    while let Some(&part) = found.get(k) {
+        let touches = |other: &RegionId| !mesh.topology().interface(part, *other).is_empty();
+        let new: Vec<RegionId> =
+            others.iter().copied().filter(|other| !found.contains(other) && touches(other)).collect();
+        found.extend(new);
+        k += 1;
+    }
+    found
 }
 
 /// Mean square of the lengths of an element's edges [m²].
 fn mean_square_edge(vertices: [Point; 4]) -> f64 {
     let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
     pairs.into_iter().map(|(a, b)| norm(sub(vertices[a], vertices[b])).powi(2)).sum::<f64>() / 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fluxmorph_geometry::generate::Grid;
+
+    use super::*;
+
+    const COPPER: Material = Material { relative_permeability: 1.0, conductivity: 5.8e7 };
+
+    /// A plate of 20 × 20 × 8 mm in air; the number of the region at a point of it.
+    fn plate(lines_of_height: &[f64], part: impl Fn(Point) -> u32) -> Mesh {
+        let across = || (-1..=9).map(|i| 0.0025 * f64::from(i)).collect::<Vec<_>>();
+        let mut height = vec![-0.01];
+        height.extend(lines_of_height);
+        height.push(0.018);
+        let grid = Grid::new("grid", [across(), across(), height]).expect("a grid");
+        let is_air = |x: Point| {
+            !(0.0..0.02).contains(&x[0]) || !(0.0..0.02).contains(&x[1]) || !(0.0..0.008).contains(&x[2])
+        };
+        let region = |x: Point| RegionId(if is_air(x) { 0 } else { part(x) });
+        let topology = grid.topology(&["air", "first", "second"], region).expect("regions");
+        Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+    }
+
+    fn audit(mesh: &Mesh, region: u32, alike: &[u32]) -> SkinAudit {
+        let alike: Vec<RegionId> = alike.iter().map(|&k| RegionId(k)).collect();
+        skin_audit(mesh, (RegionId(region), &alike), &COPPER, 2000.0, Order::Linear).expect("it conducts")
+    }
+
+    #[test]
+    fn regions_of_one_conductor_have_one_surface() {
+        let lines = [0.0, 0.002, 0.004, 0.006, 0.008];
+        let whole = audit(&plate(&lines, |_| 1), 1, &[1]);
+        let halves = plate(&lines, |x| if x[0] < 0.01 { 1 } else { 2 });
+        for part in [1, 2] {
+            let own = audit(&halves, part, &[1, 2]);
+            assert!((own.thickness_in_skin_depths / whole.thickness_in_skin_depths - 1.0).abs() < 1e-12);
+            assert!((own.coarse_share - whole.coarse_share).abs() < 1e-12 && own.extent == whole.extent);
+            let alone = audit(&halves, part, &[]);
+            assert!(alone.thickness_in_skin_depths < 0.9 * own.thickness_in_skin_depths, "{alone:?}");
+        }
+    }
+
+    /// A core that begins half a skin depth down, of one element: it has no surface, and does not follow the decay.
+    #[test]
+    fn a_coarse_core_under_a_fine_skin_is_found() {
+        let depth = COPPER.skin_depth(std::f64::consts::TAU * 2000.0).expect("it conducts");
+        let lines = [0.0, 0.5 * depth, 0.008 - 0.5 * depth, 0.008];
+        let is_skin = |x: Point| x[2] < 0.5 * depth || x[2] > 0.008 - 0.5 * depth;
+        let mesh = plate(&lines, |x| if is_skin(x) { 1 } else { 2 });
+        let core = audit(&mesh, 2, &[1, 2]);
+        let layers = core.coarse_layers.expect("an element through the core");
+        assert!(layers.share > 0.1 && layers.thickness > 2.0, "{core:?}");
+        assert!(core.volume_warning().is_some(), "{core:?}");
+    }
 }

@@ -19,7 +19,7 @@ const CORNER_LEVELS: usize = 2;
 /// Halvings where an arc on which `T` has a kink crosses a piece.
 const KINK_LEVELS: usize = 4;
 
-/// Share of an element from which a winding is in it, above rounding and the facets of arcs.
+/// Share of an element, or of a winding's passage through it, from which the winding is in it: above rounding and the facets of arcs.
 const LEAST_SHARE: f64 = 1e-3;
 
 /// Distance to a kink, relative to the smaller of the winding's width and height, below which a vertex is on it.
@@ -40,30 +40,34 @@ impl Racetrack {
         let local = vertices.map(|x| self.frame.local(x));
         let integral = Integral { coil: self, origin: local[0], gradients: Tet4::new(local).gradients };
         let mut weights = [0.0; 4];
-        self.for_each_piece(local, &mut |piece| integral.add(piece, &mut weights));
+        self.for_each_part(local, &mut |piece| integral.add(piece, &mut weights));
         weights.map(|w| self.axis().map(|e| w * e))
     }
 
-    /// The middle of what the winding takes of a tetrahedron, cut as for [`Self::moment`]; `None` where that is next to nothing, as
-    /// where a face lies along the winding's.
-    pub fn place_in(&self, vertices: [Point; 4]) -> Option<Point> {
+    /// The middle of the largest piece that the winding takes of a tetrahedron, cut as for [`Self::moment`]; `None` where all of them
+    /// are next to nothing, as where a face lies along the winding's.
+    pub fn wound_place(&self, vertices: [Point; 4]) -> Option<Point> {
         let local = vertices.map(|x| self.frame.local(x));
-        let (mut wound, mut moment) = (0.0, [0.0; 3]);
-        self.for_each_piece(local, &mut |piece| {
+        let (mut wound, mut largest) = (0.0, (0.0, [0.0; 3]));
+        self.for_each_part(local, &mut |piece| {
             let c = centroid(piece);
             if (0.0..self.width).contains(&self.distance(c)) {
                 let volume = volume(piece).abs();
                 wound += volume;
-                (0..3).for_each(|d| moment[d] += volume * c[d]);
+                if volume > largest.0 {
+                    largest = (volume, c);
+                }
             }
         });
-        let place = || add(self.frame.centre(), self.frame.vector(moment.map(|m| m / wound)));
-        (wound > LEAST_SHARE * volume(vertices).abs()).then(place)
+        let whole = volume(vertices).abs();
+        // A winding far thinner than the element has no share of it, but one of what it would take passing through.
+        let passing = whole.min(self.width * self.height * whole.cbrt());
+        (wound > LEAST_SHARE * passing).then(|| add(self.frame.centre(), self.frame.vector(largest.1)))
     }
 
     /// Calls `visit` for the pieces of a tetrahedron, in local coordinates, that lie between the ends of the coil and not far from
     /// its winding: cut at the kinks of `T`, and divided where it is curved.
-    fn for_each_piece(&self, local: [Point; 4], visit: &mut impl FnMut([Point; 4])) {
+    fn for_each_part(&self, local: [Point; 4], visit: &mut impl FnMut([Point; 4])) {
         let extent = self.extent();
         let misses =
             |d: usize| local.iter().all(|x| x[d] >= extent[d]) || local.iter().all(|x| x[d] <= -extent[d]);
@@ -257,11 +261,13 @@ mod tests {
             // It passes between the corners and the middle.
             let crossed = tet([0.016, -0.006, -0.004]);
             assert!(crossed.iter().chain([&centroid(crossed)]).all(|x| coil.current_density(*x) == [0.0; 3]));
-            let place = coil.place_in(crossed).expect("a place");
+            let place = coil.wound_place(crossed).expect("a place");
             assert!(coil.current_density(place) != [0.0; 3], "{corner:?}: {place:?}");
-            assert_eq!(coil.place_in(tet([0.021, -0.006, -0.004])), None, "beside it");
-            assert_eq!(coil.place_in(tet([0.016, -0.006, 0.0005])), None, "above it");
-            assert_eq!(coil.place_in(tet([-0.006, -0.006, -0.006])), None, "in its window");
+            assert_eq!(coil.wound_place(tet([0.021, -0.006, -0.004])), None, "beside it");
+            assert_eq!(coil.wound_place(tet([0.016, -0.006, 0.0005])), None, "above it");
+            let thread = Racetrack::new([0.0; 3], 2, [0.02, 0.02], 1e-5, 1e-5, corner).unwrap();
+            assert!(thread.wound_place(crossed).is_some(), "a winding of no share of the element");
+            assert_eq!(coil.wound_place(tet([-0.006, -0.006, -0.006])), None, "in its window");
         }
     }
 

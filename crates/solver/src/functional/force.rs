@@ -185,7 +185,7 @@ impl Force {
 /// Whether the current of a coil flows in an element.
 fn carries_current(model: &FieldModel, mesh: &Mesh, e: ElementId) -> bool {
     model.coils().iter().any(|coil| match &coil.shape {
-        CoilShape::Racetrack(racetrack) => racetrack.place_in(mesh.vertices(e)).is_some(),
+        CoilShape::Racetrack(racetrack) => racetrack.wound_place(mesh.vertices(e)).is_some(),
         // What flows in a solid conductor above 0 Hz moves with it, as eddy currents do.
         CoilShape::Solid(_) if model.angular_frequency() > 0.0 => false,
         shape => shape

@@ -9,7 +9,7 @@ use std::borrow::Cow;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{holders, locate};
-use fluxmorph_geometry::tet4::{Point, centroid};
+use fluxmorph_geometry::tet4::{Point, centroid, norm, sub};
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::{Follow, FunctionalValue};
@@ -52,7 +52,7 @@ pub struct Multipoles {
 #[derive(Clone, Debug)]
 enum Places {
     /// In elements that do not move, which hold each; recovered for elements of an order.
-    Held(Vec<(Point, ElementId)>, Order, Vec<RecoveredPoint>),
+    Held { places: Vec<(Point, ElementId)>, order: Order, points: Vec<RecoveredPoint> },
     /// In whatever elements are there.
     InSpace(FixedPlaces),
 }
@@ -69,10 +69,10 @@ type State<'a> = (&'a FieldSolution, &'a FieldModel, &'a Mesh);
 impl Places {
     fn at<'a>(&'a self, (solution, model, mesh): State<'a>) -> Result<At<'a>, SolverError> {
         Ok(match self {
-            Self::Held(_, order, points) if *order == model.space().order() => {
+            Self::Held { order, points, .. } if *order == model.space().order() => {
                 At::Held(Cow::Borrowed(points))
             }
-            Self::Held(places, ..) => At::Held(Cow::Owned(recovered(places, model, mesh))),
+            Self::Held { places, .. } => At::Held(Cow::Owned(recovered(places, model, mesh))),
             Self::InSpace(places) => At::InSpace(Box::new(places.field((solution, model, mesh))?)),
         })
     }
@@ -166,7 +166,7 @@ impl Multipoles {
             Follow::Space => Places::InSpace(FixedPlaces::new(mesh, places)),
             Follow::Held | Follow::Mesh => {
                 let points = recovered(&places, model, mesh);
-                Places::Held(places, model.space().order(), points)
+                Places::Held { places, order: model.space().order(), points }
             }
         };
         Ok(Self { places, terms, domain: expansion.domain })
@@ -207,7 +207,10 @@ impl Multipoles {
         let inside = || {
             let elements = mesh.topology().elements();
             let mut met = elements.filter(|&e| domain.is_ball() && domain.meets(mesh.vertices(e)));
-            met.find_map(|e| matter_at(e, centroid(mesh.vertices(e))))
+            met.find_map(|e| {
+                let middle = centroid(mesh.vertices(e));
+                matter_at(e, middle).or_else(|| wound_place(states, domain, mesh.vertices(e)))
+            })
         };
         at_points().or_else(inside)
     }
@@ -215,7 +218,7 @@ impl Multipoles {
     /// Elements that must not move.
     pub fn elements(&self) -> impl Iterator<Item = ElementId> + '_ {
         let held = match &self.places {
-            Places::Held(_, _, points) => points.as_slice(),
+            Places::Held { points, .. } => points.as_slice(),
             Places::InSpace(_) => &[],
         };
         held.iter().flat_map(RecoveredPoint::elements)
@@ -265,12 +268,33 @@ fn images(x: Point, planes: &[MirrorPlane]) -> Vec<(Point, Point)> {
     combinations.collect()
 }
 
-/// What there is at a point of an element but air.
-fn matter_at(state: &FieldModel, domain: &Domain, element: ElementId, x: Point) -> Option<&'static str> {
-    let is_fed = |(k, coil): &(usize, &Coil)| {
+/// The coils that a current flows in, with their numbers.
+fn fed(state: &FieldModel) -> impl Iterator<Item = (usize, &Coil)> {
+    state.coils().iter().enumerate().filter(|(k, coil)| {
         let winding = state.setup().windings.get(*k).and_then(Option::as_ref);
         coil.ampere_turns != c64::default() || winding.is_some_and(|winding| winding.voltage.is_some())
-    };
+    })
+}
+
+const WOUND: &str = "a winding with a current";
+
+/// A place of a ball in an element at which the current of an analytic coil flows, however thin its winding.
+fn wound_place(
+    states: &[FieldModel],
+    domain: &Domain,
+    vertices: [Point; 4],
+) -> Option<(Point, &'static str)> {
+    let coils = states.iter().flat_map(fed);
+    let mut places = coils.filter_map(|(_, coil)| match &coil.shape {
+        CoilShape::Racetrack(shape) => shape.wound_place(vertices),
+        CoilShape::Region(_) | CoilShape::Solid(_) => None,
+    });
+    let place = places.find(|&x| norm(sub(x, domain.centre())) < domain.radius())?;
+    Some((place, WOUND))
+}
+
+/// What there is at a point of an element but air.
+fn matter_at(state: &FieldModel, domain: &Domain, element: ElementId, x: Point) -> Option<&'static str> {
     let is_wound = |(k, coil): (usize, &Coil)| match &coil.shape {
         CoilShape::Racetrack(shape) => shape.current_density(x) != [0.0; 3],
         CoilShape::Region(_) | CoilShape::Solid(_) => state.coil_at(element) == Some(k),
@@ -279,8 +303,8 @@ fn matter_at(state: &FieldModel, domain: &Domain, element: ElementId, x: Point) 
     // Of eddy currents the field is off by the square of the radius in skin depths.
     let depth = material.skin_depth(state.angular_frequency()).filter(|_| state.has_eddy_currents(element));
     let is_shielded = |depth: f64| (domain.radius() / depth).powi(2) > LIKE_AIR;
-    if state.coils().iter().enumerate().filter(is_fed).any(is_wound) {
-        Some("a winding with a current")
+    if fed(state).any(is_wound) {
+        Some(WOUND)
     } else if state.remanence_of(element) != [0.0; 3] {
         Some("a magnet")
     } else if state.curve_of(element).is_some() || (material.relative_permeability - 1.0).abs() > LIKE_AIR {
@@ -327,7 +351,7 @@ impl MultipoleFunctional {
     pub(super) fn check_places(&self, model: &FieldModel, mesh: &Mesh) -> Result<(), SolverError> {
         match &self.multipoles.places {
             Places::InSpace(places) => places.locate(model, mesh).map(|_| ()),
-            Places::Held(..) => Ok(()),
+            Places::Held { .. } => Ok(()),
         }
     }
 

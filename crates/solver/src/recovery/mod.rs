@@ -159,19 +159,19 @@ fn around(
 }
 
 /// Points of an element of an order at which `B` is of one order better: the centroid, or the four of the rule of degree 2.
-fn super_convergent(order: Order) -> &'static [Node] {
+fn superconvergent(order: Order) -> &'static [Node] {
     match order {
         Order::Linear => Rule::Centroid.nodes(),
         Order::Quadratic => Rule::Degree2.nodes(),
     }
 }
 
-/// Those of some elements.
+/// The superconvergent points of some elements.
 fn samples_in<'e>(
     order: Order,
     elements: impl IntoIterator<Item = &'e ElementId>,
 ) -> Vec<(ElementId, &'static [f64; 4])> {
-    let rule = super_convergent(order);
+    let rule = superconvergent(order);
     elements.into_iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda))).collect()
 }
 

@@ -16,7 +16,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use super::fit::Fit;
-use super::{LAYERS_LIMIT, around, has_the_material_of, samples_in, scatter_flux, super_convergent};
+use super::{LAYERS_LIMIT, around, has_the_material_of, samples_in, scatter_flux, superconvergent};
 use crate::element::quadrature::Node;
 use crate::element::{Complex3, dot3};
 use crate::error::SolverError;
@@ -105,7 +105,7 @@ impl FixedPlaces {
         let mut elements: Vec<ElementId> = patches.flat_map(|patch| patch.elements.iter().copied()).collect();
         elements.sort_unstable();
         elements.dedup();
-        let rule = super_convergent(model.space().order());
+        let rule = superconvergent(model.space().order());
         let of_element = |&e: &ElementId| {
             rule.iter().map(move |(lambda, _)| solution.at(model, mesh, e, lambda).flux_density)
         };
@@ -220,7 +220,7 @@ impl BlendedField<'_> {
         self.add_derivatives_of_samples(&by_samples, (by_potentials, by_positions));
     }
 
-    /// Adds the same of what the field is at the samples, moving with their elements.
+    /// Adds the derivatives of `Σ_k q_k·B_k` over the samples, which move with their elements.
     fn add_derivatives_of_samples(
         &self,
         q: &[Complex3],
