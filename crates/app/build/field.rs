@@ -1,5 +1,6 @@
 //! The field problems of a configuration.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
@@ -76,7 +77,7 @@ fn exposed_surface(
 ) -> Result<Vec<[fluxmorph_geometry::NodeId; 3]>, Error> {
     let region = full.topology().region(name)?;
     let key = |p: [f64; 3]| p.map(f64::to_bits);
-    let faces: std::collections::HashSet<_> = full
+    let faces: HashSet<_> = full
         .topology()
         .facets()
         .iter()

@@ -168,6 +168,7 @@ pub(super) fn warnings(
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
     warnings.extend(cut_force_warnings(config, mesh));
+    warnings.extend(applied_on_conductors(config, mesh));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -328,7 +329,11 @@ pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &M
                 .push(source.diagnostic(&format!("boundaries.flux_normal[{k}]"), message).expected(expected));
         }
     }
-    let regions = (0..topology.region_names().len()).map(RegionId::new);
+    // What is replaced by its surface has no field.
+    let names = topology.region_names().iter().enumerate();
+    let has_field =
+        |name: &String| config.regions.get(name).is_none_or(|region| region.model == RegionModel::Volume);
+    let regions = names.filter(|(_, name)| has_field(name)).map(|(k, _)| RegionId::new(k));
     let outer = regions.flat_map(|region| topology.outer_faces(region)).map(face_key);
     let conditions = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
     let mut open = outer.filter(|face| !conditions.contains(face));
@@ -341,6 +346,33 @@ pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &M
         faults.push(source.diagnostic("boundaries.uniform_field", message).expected(expected));
     }
     faults
+}
+
+/// What to say of conductors at the surfaces of an applied field: the given A is an electric field along them, whose part without a
+/// curl is that of no device.
+fn applied_on_conductors(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let Some(field) = config.boundaries.uniform_field.as_ref().filter(|_| config.alternates()) else {
+        return Vec::new();
+    };
+    let topology = mesh.topology();
+    let conducts = |name: &&String| {
+        config.regions[*name].model != RegionModel::Perfect && material(config, name).conductivity > 0.0
+    };
+    let warning = |name: &String| {
+        let region = topology.region(name).ok()?;
+        let nodes: HashSet<NodeId> =
+            topology.elements_of(region).into_iter().flat_map(|e| topology.tet(e)).collect();
+        let touches = |surface: &&String| {
+            let faces = faces_of(topology, [surface.as_str()]);
+            faces.iter().any(|face| face.iter().filter(|node| nodes.contains(node)).count() >= 2)
+        };
+        let surface = field.surfaces.iter().find(touches)?;
+        Some(format!(
+            "the conductor `{name}` reaches `{surface}`, where the applied field is given: its eddy currents depend on \
+             boundaries.uniform_field.center there. Let the field be given farther out, with air between"
+        ))
+    };
+    config.regions.keys().filter(conducts).filter_map(warning).collect()
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.

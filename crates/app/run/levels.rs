@@ -26,6 +26,14 @@ use crate::error::Error;
 use crate::files::{OutputError, RefinementStep, Refinements, relative_bar};
 use crate::show::RunObserver;
 
+/// What came of the wish for a finer mesh.
+enum Refined {
+    Yes,
+    No,
+    /// There is nothing left to use it with: what ends the run, and a warning.
+    OutOf(StopReason, String),
+}
+
 /// Evaluations with which a search on a finer mesh begins: of the initial design, and of the best one before it.
 const TAKEN_UP: usize = 2;
 
@@ -160,11 +168,17 @@ impl Session<'_> {
                 recorder,
                 self.interrupted,
             )?;
-            let optimised = sum(before.take(), optimised);
-            let (is_refined, at_best) = match &mut levels {
+            let mut optimised = sum(before.take(), optimised);
+            let (refined, at_best) = match &mut levels {
                 Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
-                None => (false, None),
+                None => (Refined::No, None),
             };
+            let is_refined = matches!(refined, Refined::Yes);
+            if let Refined::OutOf(reason, warning) = refined {
+                observer.warning(&warning);
+                optimised.warnings.push(warning);
+                optimised.stop_reason = reason;
+            }
             if !is_refined {
                 let refinements = levels.map(|levels| levels.kept);
                 return Ok(Searched { optimised, first, at_best, refinements });
@@ -214,8 +228,14 @@ impl Session<'_> {
                 return Ok(());
             };
             let scale = analysis.objective.map_or(f64::NAN, f64::abs);
-            if !self.refine(levels, (0, limit), (&analysis, &estimate, scale), observer)? {
-                return Ok(());
+            let of_initial = (&analysis, &estimate, scale);
+            match self.refine(levels, (0, limit), of_initial, observer)? {
+                Refined::Yes => {}
+                Refined::No => return Ok(()),
+                Refined::OutOf(_, warning) => {
+                    observer.warning(&warning);
+                    return Ok(());
+                }
             }
         }
     }
@@ -228,7 +248,7 @@ impl Session<'_> {
         optimised: &Optimised,
         limit: &TimeLimit,
         observer: &mut dyn RunObserver,
-    ) -> Result<(bool, Option<ErrorEstimate>), Error> {
+    ) -> Result<(Refined, Option<ErrorEstimate>), Error> {
         let reason = optimised.stop_reason;
         let is_over = matches!(
             reason,
@@ -238,18 +258,21 @@ impl Session<'_> {
                 | StopReason::NumericalFailure
         );
         if is_over || (self.interrupted)() {
-            return Ok((false, None));
+            return Ok((Refined::No, None));
         }
         if let Some(step) = levels.next_kept(optimised.evaluations) {
             self.refine_again(levels, &step)?;
-            return Ok((true, None));
+            return Ok((Refined::Yes, None));
         }
         let analysis = &optimised.best.analysis;
-        let Some(estimate) = self.estimator().estimate(analysis, observer) else { return Ok((false, None)) };
+        let Some(estimate) = self.estimator().estimate(analysis, observer) else {
+            return Ok((Refined::No, None));
+        };
         let scale = optimised.initial.abs().max(optimised.best.objective.abs());
         let of_best = (analysis, &estimate, scale);
-        let is_refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;
-        Ok((is_refined, Some(estimate).filter(|_| !is_refined)))
+        let refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;
+        let estimate = Some(estimate).filter(|_| !matches!(refined, Refined::Yes));
+        Ok((refined, estimate))
     }
 
     /// Refines the mesh where a design needs it, for an error relative to `scale`; whether it was refined. Why not is reported.
@@ -259,25 +282,26 @@ impl Session<'_> {
         (evaluations, limit): (usize, &TimeLimit),
         (analysis, estimate, scale): (&Analysis, &ErrorEstimate, f64),
         observer: &mut dyn RunObserver,
-    ) -> Result<bool, Error> {
+    ) -> Result<Refined, Error> {
         let objective = analysis.objective.unwrap_or(f64::NAN);
         let what = if evaluations == 0 { "initial" } else { "best" };
         let Some(bar) = relative_bar(estimate.objective, scale) else {
             observer.warning(&format!(
                 "the objective of the {what} design is zero: accuracy.tolerance means nothing"
             ));
-            return Ok(false);
+            return Ok(Refined::No);
         };
         let said = levels.compared(what, bar);
         if levels.is_over(bar, &said, observer) {
-            return Ok(false);
+            return Ok(Refined::No);
         }
         let is_used_up = evaluations > 0 && evaluations + TAKEN_UP > self.config.optimizer.max_evaluations;
-        if is_used_up || limit.is_over() {
-            observer.warning(&format!(
-                "{said}, and the limits of the run leave no evaluations on a finer mesh: the tolerance is not kept"
-            ));
-            return Ok(false);
+        let over = [(is_used_up, StopReason::MaxEvaluations), (limit.is_over(), StopReason::MaxTime)];
+        if let Some((_, reason)) = over.into_iter().find(|(is_over, _)| *is_over) {
+            let left =
+                if reason == StopReason::MaxTime { "there is no time" } else { "too few evaluations are" };
+            let warning = format!("{said}, and {left} left for a finer mesh: the tolerance is not kept");
+            return Ok(Refined::OutOf(reason, warning));
         }
         observer.phase("refining the mesh");
         let full = levels.mesh.mesh().topology();
@@ -286,7 +310,7 @@ impl Session<'_> {
             estimate.marked(1.0 - levels.tolerance / bar).into_iter().map(|e| in_full[e.index()]).collect();
         if marked.is_empty() {
             observer.warning(&format!("{said}, and no element has a share in it: the tolerance is not kept"));
-            return Ok(false);
+            return Ok(Refined::No);
         }
         let tets = full.tets().len();
         match self.refined(&levels.mesh, &marked) {
@@ -297,7 +321,7 @@ impl Session<'_> {
                 observer.warning(&format!(
                     "{said}, and the mesh cannot be refined further: {cause}; the tolerance is not kept"
                 ));
-                return Ok(false);
+                return Ok(Refined::No);
             }
         }
         levels.made += 1;
@@ -316,7 +340,7 @@ impl Session<'_> {
             levels.made,
             levels.mesh.mesh().topology().tets().len()
         ));
-        Ok(true)
+        Ok(Refined::Yes)
     }
 
     /// Makes a refinement of before the interruption again.

@@ -1,19 +1,19 @@
 //! Conditions on named surfaces, and the potential of an applied field.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
 use crate::fixed_directions::axis_of;
 
-/// Share of an applied field's largest `|A|` that may be left where another condition says otherwise: rounding.
-pub(crate) const CONFLICT: f64 = 1e-6;
+/// Share of an applied field's largest `|A|` that may be left where another condition says otherwise. A face of a fine mesh with
+/// coordinates of six digits has a direction of its own; the error of what is left is of this size, too.
+pub(crate) const CONFLICT: f64 = 1e-3;
 
-/// The same along a face of edge elements. A face of a fine mesh with coordinates of six digits has a direction of its own: the error
-/// of what is left is of this size, too.
-pub(crate) const CONFLICT_ALONG_FACES: f64 = 1e-3;
+/// What the normal of a plane must have beside those of others [1] to be another plane, and not a face of the same.
+const INDEPENDENT: f64 = 1e-2;
 
 /// A condition on a named surface, plane or curved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,14 +57,39 @@ pub(crate) fn centre(
     if let Some(centre) = field.centre {
         return Ok(centre);
     }
-    let mut centre = [0.0; 3];
+    let mut given: HashSet<NodeId> = HashSet::new();
+    for (name, _) in boundaries.iter().filter(|(_, b)| matches!(b, Boundary::UniformField(_))) {
+        given.extend(mesh.topology().surface(name)?.iter().flatten());
+    }
+    let mut planes = Vec::new();
     for (name, _) in boundaries.iter().filter(|(_, b)| *b == Boundary::FluxParallel) {
-        for triangle in mesh.topology().surface(name)? {
+        let touch =
+            |triangle: &&[NodeId; 3]| triangle.iter().filter(|node| given.contains(node)).count() >= 2;
+        for triangle in mesh.topology().surface(name)?.iter().filter(touch) {
             let vertices = triangle.map(|n| mesh.point(n));
             let area = area_vector(vertices);
-            if let Some(axis) = axis_of(area.map(|c| c / norm(area))) {
-                centre[axis] = vertices[0][axis];
-            }
+            planes.push((vertices[0], area.map(|c| c / norm(area))));
+        }
+    }
+    let (mut centre, mut directions): (Point, Vec<Point>) = ([0.0; 3], Vec::new());
+    for &(place, normal) in &planes {
+        if let Some(axis) = axis_of(normal) {
+            centre[axis] = place[axis];
+            directions.push(std::array::from_fn(|d| f64::from(u8::from(d == axis))));
+        }
+    }
+    // Onto the others along what their normals have beside those before.
+    for (place, normal) in planes.into_iter().filter(|(_, normal)| axis_of(*normal).is_none()) {
+        let mut rest = normal;
+        for direction in &directions {
+            let along = dot(rest, *direction);
+            (0..3).for_each(|d| rest[d] -= along * direction[d]);
+        }
+        let length = norm(rest);
+        if length > INDEPENDENT {
+            let way = dot(normal, sub(place, centre)) / (length * length);
+            (0..3).for_each(|d| centre[d] += way * rest[d]);
+            directions.push(rest.map(|c| c / length));
         }
     }
     Ok(centre)
@@ -103,7 +128,7 @@ pub(crate) fn check_applied<'a>(
         for (triangle, edge) in triangles.iter().flat_map(|t| edges(t).map(|edge| (t, edge))) {
             let Some(&(potential, surface)) = applied.get(&edge) else { continue };
             let area = area_vector(triangle.map(|n| mesh.point(n)));
-            if norm(cross(potential, area)) > CONFLICT_ALONG_FACES * largest * norm(area) {
+            if norm(cross(potential, area)) > CONFLICT * largest * norm(area) {
                 return Err(SolverError::FieldOnConductor {
                     conductor: name.to_owned(),
                     surface: surface.to_owned(),

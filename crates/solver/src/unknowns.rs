@@ -27,7 +27,7 @@ use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
-use crate::boundary::{self, Boundary, CONFLICT, CONFLICT_ALONG_FACES};
+use crate::boundary::{self, Boundary, CONFLICT};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
 use crate::elements::ElementFamily;
 use crate::error::SolverError;
@@ -204,7 +204,7 @@ impl Unknowns {
             of_edges.filter_map(|(&carrier, at)| Some((carrier, at, at.potential?)))
         };
         let largest = applied().map(|(_, _, potential)| norm(potential)).fold(0.0, f64::max);
-        let tolerance = CONFLICT_ALONG_FACES * largest;
+        let tolerance = CONFLICT * largest;
         for (carrier, at, potential) in applied() {
             // Along the plane in all directions, whether or not of the edge: beside a plane without A all flux must be in that of the
             // surface.

@@ -16,8 +16,8 @@ table! {
     /// the ends of the coil, the mesh may move.
     ///
     /// Where the outside of the mesh cuts a coil, it must cut straight sides at right angles, on a flux-parallel surface; a
-    /// flux-normal plane may halve a coil's height, but no current may cross it. Anything else is an error that says where and
-    /// why.
+    /// flux-normal plane may cut a coil's height, but no current may cross it: what is meshed of the winding is mirrored, so that the
+    /// plane halves the coil in its middle, and makes another one of it elsewhere. Anything else is an error that says where and why.
     ///
     /// A `region` without `terminals` closes on itself: `center` and `axis` give any line through its hole, and positive
     /// current runs counter-clockwise about it. The current has the direction of conduction and the same magnitude everywhere,

@@ -24,6 +24,7 @@ use crate::element::edge::functions::WHITNEY;
 use crate::elements::ElementFamily;
 use crate::error::SolverError;
 use crate::family::{Local, MOST};
+use crate::material::Material;
 use crate::space::Space;
 use crate::unknowns::{Conductors, PSI};
 
@@ -198,27 +199,35 @@ fn check_applied(
     Ok(())
 }
 
-/// Refuses solid conductors whose terminals another conductor touches, since its current would have none of its own, and those
-/// on a surface with an applied field.
+/// Refuses solid conductors that another conductor touches, whose driving field ends where the current would go on, and those on a
+/// surface with an applied field. At rest, where no conductor has unknowns, what conducts follows from `materials`.
 ///
 /// # Errors
 /// [`SolverError::CoilRegion`], [`SolverError::SourceOnBoundary`].
 pub(crate) fn check(
     mesh: &Mesh,
     coils: &[Coil],
-    conductors: &Conductors,
+    (conductors, materials): (&Conductors, &[Material]),
     boundaries: &[(String, Boundary)],
 ) -> Result<(), SolverError> {
-    let mut shared = vec![false; mesh.topology().node_count()];
+    let topology = mesh.topology();
+    let mut shared = vec![false; topology.node_count()];
     for (coil, conductor) in self::conductors(coils) {
         let is_own = |e: &ElementId| conductor.potential().binary_search_by_key(e, |(e, _)| *e).is_ok();
+        let is_stranded = |e: &ElementId| {
+            let currents = coils.iter().filter(|coil| !matches!(coil.shape, CoilShape::Solid(_)));
+            let mut currents = currents.filter_map(|coil| coil.shape.region_current());
+            currents.any(|current| current.current_density().binary_search_by_key(e, |(e, _)| *e).is_ok())
+        };
+        let conducts = |e: &ElementId| materials[topology.region_of()[e.index()].index()].conductivity > 0.0;
+        let at_rest = topology.elements().filter(|e| conducts(e) && !is_stranded(e));
+        let others = conductors.elements.iter().copied().chain(at_rest).filter(|e| !is_own(e));
         shared.fill(false);
-        let others = conductors.elements.iter().filter(|e| !is_own(e)).flat_map(|&e| mesh.topology().tet(e));
         let surfaces = conductors.surface.iter().chain(&conductors.grounded).copied().flatten();
-        others.chain(surfaces).for_each(|node| shared[node.index()] = true);
-        let mut nodes = conductor.direct_current().terminals().iter().flat_map(|face| face.nodes);
+        others.flat_map(|e| topology.tet(e)).chain(surfaces).for_each(|node| shared[node.index()] = true);
+        let mut nodes = conductor.potential().iter().flat_map(|(e, _)| topology.tet(*e));
         if let Some(node) = nodes.find(|node| shared[node.index()]) {
-            let fault = RegionFault::TerminalShared { place: mesh.point(node) };
+            let fault = RegionFault::Touched { place: mesh.point(node) };
             return Err(SolverError::CoilRegion { coil: coils[coil].name.clone(), fault });
         }
         check_applied(mesh, &coils[coil].name, conductor, boundaries)?;

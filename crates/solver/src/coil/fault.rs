@@ -12,7 +12,7 @@ use fluxmorph_geometry::tet4::Point;
 pub enum PlaneFault {
     /// Current crosses a flux-parallel surface at a slant.
     #[error(
-        "the current runs there at {angle:.1}° to the surface's normal, but it must cross a flux-parallel surface at \
+        "the current runs there at {angle:.2}° to the surface's normal, but it must cross a flux-parallel surface at \
          right angles, for the mirrored coil to carry it on; let the surface cut straight sides squarely, or move the \
          coil away"
     )]
@@ -22,7 +22,7 @@ pub enum PlaneFault {
     },
     /// Current crosses a surface with H × n = 0.
     #[error(
-        "the current crosses it at {angle:.1}° to its normal, but no current may cross a surface at which H is normal: \
+        "the current crosses it at {angle:.2}° to its normal, but no current may cross a surface at which H is normal: \
          the mirrored coil would carry it back; make the surface flux-parallel, or move the coil away"
     )]
     Crossing {
@@ -85,13 +85,13 @@ pub enum RegionFault {
         /// A node of one of the walls [m].
         place: Point,
     },
-    /// A terminal of a solid conductor that another conductor touches.
+    /// A solid conductor that another conductor touches.
     #[error(
-        "another conductor touches its terminal at {}, and current would pass between them there; leave a \
-         gap, or make both one region",
+        "another conductor touches it at {}, and current would pass between them there; leave a gap, or make both one \
+         region",
         millimetres(*place)
     )]
-    TerminalShared {
+    Touched {
         /// A node of both [m].
         place: Point,
     },

@@ -46,8 +46,9 @@ pub struct ConditionedSurface<'a> {
     pub triangles: &'a [[NodeId; 3]],
 }
 
-/// Sine of an angle up to which two directions count as one: rounding of the mesh's nodes.
-const ROUNDING: f64 = 1e-6;
+/// Sine of an angle up to which two directions count as one: faces of a fine mesh with coordinates of six digits have directions of
+/// their own.
+const ROUNDING: f64 = 1e-3;
 
 /// `T` over that of the window up to which it counts as zero.
 const NO_POTENTIAL: f64 = 1e-5;

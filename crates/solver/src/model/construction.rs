@@ -51,7 +51,7 @@ impl FieldModel {
         let windings = Windings::new(mesh, &setup.coils, &of_coils, (&fine.space, &fine.unknowns, &solids))?;
         setup::check_coils(mesh, &setup)?;
         let conductors = weak_form.conductors();
-        solids::check(mesh, &setup.coils, &conductors, &setup.boundaries)?;
+        solids::check(mesh, &setup.coils, (&conductors, &setup.materials), &setup.boundaries)?;
         // The net current of a solid conductor is given: no other returns through it.
         let conductors = conductors.without(&solids::elements(&setup.coils));
         let mut joined = conductors.joined(mesh, &setup.boundaries)?;

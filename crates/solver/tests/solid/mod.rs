@@ -368,7 +368,8 @@ fn solid_conductors_that_cannot_be_are_refused() {
     saturated.bh = vec![None, None, Some(Arc::new(curve)), None];
     for (setup, expected) in [
         (nowhere_to_return, "nothing connects"),
-        (cladding, "another conductor touches its terminal"),
+        (cladding.clone(), "another conductor touches it"),
+        (FieldModelSetup { frequency: 0.0, ..cladding }, "another conductor touches it"),
         (insulator, "one material that conducts"),
         (saturated, "linear materials"),
     ] {
