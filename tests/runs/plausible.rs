@@ -243,6 +243,53 @@ remanence = [0, 0, "1.2 T"]
 surfaces = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
 "#;
 
+/// A slab across the lower part of a box, in a field along it.
+const SLAB: &str = r#"
+[mesh]
+generator = "boxes"
+
+[mesh.boxes]
+box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "30 mm", "30 mm"]]
+
+[[mesh.boxes.regions]]
+name = "slab"
+box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "30 mm", "10 mm"]]
+cells = [2, 2, 2]
+
+[analysis]
+elements = "edge"
+order = 1
+frequency = "50 Hz"
+
+[materials.copper]
+conductivity = "5.8e7 S/m"
+
+[regions.slab]
+material = "copper"
+
+[boundaries]
+flux_parallel = ["z_min"]
+uniform_field = { surfaces = ["x_min", "x_max", "y_min", "y_max", "z_max"], b = [1e-3, 0, 0] }
+"#;
+
+/// Eddy currents that reach the surfaces of an applied field depend on its center; a region without a field has no outer faces.
+#[test]
+fn conductors_at_the_surfaces_of_an_applied_field_are_asked_about() {
+    let home = folder();
+    let path = home.path().join("slab.toml");
+    std::fs::write(&path, SLAB).expect("written");
+    let with = |sets: &[&str]| {
+        let checked = finish(command(&[&"check", &path, &"--json"]).args(set(sets))).exits_with(0);
+        texts(&checked.json()["warnings"])
+    };
+    let asked = "the conductor `slab` reaches `x_min`, where the applied field is given";
+    assert!(with(&[]).contains(asked), "{}", with(&[]));
+    assert!(!with(&["analysis.frequency=0"]).contains(asked));
+    let in_its_face = "boundaries.uniform_field.center=[0, 0, \"10 mm\"]";
+    let perfect = ["regions.slab.model=perfect", "boundaries.flux_parallel=[]", in_its_face];
+    assert!(!with(&perfect).contains(asked));
+}
+
 #[test]
 fn a_current_along_a_wall_that_mirrors_it_reversed_is_asked_about() {
     let with = |walls: &str| {
