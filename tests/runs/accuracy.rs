@@ -6,6 +6,9 @@ use crate::support::device::{BLOCK, shipped, written};
 use crate::support::folder::{RunFolder, count, number, read_json, scalars};
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 
+/// The block on edge elements.
+const EDGES: (&str, &str) = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
+
 fn pole(sets: &[&str], out: &Path) -> Finished {
     let device = sets.iter().fold(shipped("pole", &[]), |device, set| device.with(set));
     finish(&mut device.command("run", out))
@@ -122,9 +125,8 @@ fn a_mesh_from_a_file_is_checked_on_finer_elements() {
 fn a_tolerance_that_the_refinements_do_not_reach_is_said_to_be_missed() {
     let home = folder();
     let out = home.path().join("out");
-    let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
     let tight = ("[analysis]", "[accuracy]\ntolerance = \"0.1 %\"\nmax_refinements = 1\n\n[analysis]");
-    let device = written("block", home.path(), &[edges, tight]);
+    let device = written("block", home.path(), &[EDGES, tight]);
     finish(&mut device.command("run", &out))
         .says(&["all 1 refinements are used", "allow more accuracy.max_refinements"]);
     let result = read_json(&out.join("result.json"));
@@ -139,9 +141,8 @@ fn a_tolerance_that_the_refinements_do_not_reach_is_said_to_be_missed() {
 fn no_mesh_is_refined_when_the_time_is_over() {
     let home = folder();
     let out = home.path().join("out");
-    let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
     let tight = ("[analysis]", "[accuracy]\ntolerance = \"0.1 %\"\n\n[analysis]");
-    let device = written("block", home.path(), &[edges, tight]);
+    let device = written("block", home.path(), &[EDGES, tight]);
     finish(device.command("run", &out).args(["--max-time", "1e-9 s"]))
         .says(&["optimizer.max_time is over before"]);
     let result = read_json(&out.join("result.json"));

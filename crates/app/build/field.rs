@@ -64,8 +64,7 @@ pub(crate) fn remaining_nodes(config: &Config, full: &Topology) -> Vec<NodeId> {
 
 /// The elements that are left without those regions, ascending.
 pub(crate) fn remaining_elements(config: &Config, full: &Topology) -> Vec<ElementId> {
-    let is_meshed = |name: &String| config.regions.get(name).is_none_or(|r| r.model == RegionModel::Volume);
-    let meshed: Vec<bool> = full.region_names().iter().map(is_meshed).collect();
+    let meshed: Vec<bool> = full.region_names().iter().map(|name| config.is_meshed(name)).collect();
     full.elements().filter(|e| meshed[full.region_of()[e.index()].index()]).collect()
 }
 
@@ -399,7 +398,7 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
     for (i, coil) in config.coils.iter().enumerate() {
         let config::CoilShape::Region(region) = &coil.shape else { continue };
         let (path, name) = (format!("coils[{i}].region"), &region.region);
-        if config.regions.get(name).is_some_and(|r| r.model != RegionModel::Volume) {
+        if !config.is_meshed(name) {
             let fault = source.diagnostic(&path, format!("`{name}` is replaced by its surface"));
             faults.push(fault.expected("a region that is meshed"));
         } else if coil.is_solid() {

@@ -101,7 +101,7 @@ fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     }
     for (k, force) in config.forces.iter().enumerate() {
         for (i, name) in force.regions.iter().enumerate() {
-            if config.regions.get(name).is_some_and(|region| region.model != RegionModel::Volume) {
+            if !config.is_meshed(name) {
                 let path = format!("forces[{k}].regions[{i}]");
                 let message = format!("`{name}` is replaced by its surface, so there is no body to displace");
                 faults.push(source.diagnostic(&path, message).expected("a region that is meshed"));

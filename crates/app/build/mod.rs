@@ -2,8 +2,9 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `loads` what excites them, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `probes` where nothing is measured, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `applied` that of applied fields, `probes` where nothing is measured, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
+mod applied;
 mod curves;
 mod design;
 mod divided_mesh;
@@ -178,6 +179,7 @@ fn problem_on(
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);
         sink.take(source.check(faults).map_err(Error::from))?;
         warnings.extend(plausible::warnings(config, &full_mesh, coils, &open_patches));
+        warnings.extend(applied::on_conductors(config, &full_mesh));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());
@@ -207,7 +209,7 @@ fn problem_on(
     };
     sink.check()?;
     if !motion_alone {
-        source.check(plausible::applied_field_faults(config, source, &full_mesh))?;
+        source.check(applied::faults(config, source, &full_mesh))?;
     }
     let states = states.expect("without faults there are coils and states");
     warnings.extend(field::coil_notices(&states[0]));

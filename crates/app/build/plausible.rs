@@ -51,7 +51,7 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 const LARGEST_PART_OF_A_WAVE: f64 = 0.1;
 
 /// Part of a unit vector along a plane, or across it, that is more than rounding.
-const INCLINED: f64 = 1e-3;
+pub(super) const INCLINED: f64 = 1e-3;
 
 /// Coils of the configuration that are no source of a field in this mesh, or no physical one.
 pub(super) fn coil_faults(
@@ -168,7 +168,6 @@ pub(super) fn warnings(
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
     warnings.extend(cut_force_warnings(config, mesh));
-    warnings.extend(applied_on_conductors(config, mesh));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -297,82 +296,14 @@ fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point
 }
 
 /// What a unit vector with this part across a surface has along it.
-fn beside(across: f64) -> f64 {
+pub(super) fn beside(across: f64) -> f64 {
     (1.0 - across * across).max(0.0).sqrt()
 }
 
 /// The unit normal of a face.
-fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
+pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
     let area = area_vector(face.map(|node| mesh.points()[node.index()]));
     area.map(|component| component / norm(area))
-}
-
-/// Faults of an applied field that lies along a surface which it can only cross at right angles, beside one where it is given: nothing
-/// of it would enter.
-pub(super) fn applied_field_faults(config: &Config, source: &SourceMap, mesh: &Mesh) -> Vec<Diagnostic> {
-    let Some(field) = &config.boundaries.uniform_field else { return Vec::new() };
-    let topology = mesh.topology();
-    let applied = faces_of(topology, field.surfaces.iter().map(String::as_str));
-    let applied: HashSet<NodeId> = applied.into_iter().flatten().collect();
-    let size = norm(field.b);
-    let contradicts = |face: &[NodeId; 3]| {
-        face.iter().filter(|node| applied.contains(node)).count() >= 2
-            && beside(dot(normal(mesh, *face), field.b).abs() / size) > INCLINED
-    };
-    let expected = "flux_parallel, or the applied field there too";
-    let mut faults = Vec::new();
-    for (k, name) in config.boundaries.flux_normal.iter().enumerate() {
-        if faces_of(topology, [name.as_str()]).iter().any(contradicts) {
-            let message =
-                format!("the applied field does not cross `{name}` at right angles, as flux_normal asks");
-            faults
-                .push(source.diagnostic(&format!("boundaries.flux_normal[{k}]"), message).expected(expected));
-        }
-    }
-    // What is replaced by its surface has no field.
-    let names = topology.region_names().iter().enumerate();
-    let has_field =
-        |name: &String| config.regions.get(name).is_none_or(|region| region.model == RegionModel::Volume);
-    let regions = names.filter(|(_, name)| has_field(name)).map(|(k, _)| RegionId::new(k));
-    let outer = regions.flat_map(|region| topology.outer_faces(region)).map(face_key);
-    let conditions = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
-    let mut open = outer.filter(|face| !conditions.contains(face));
-    if let Some(face) = open.find(contradicts) {
-        let middle = centroid(face.map(|node| mesh.points()[node.index()]));
-        let message = format!(
-            "the applied field lies along the outer face at {}, which has no condition: flux crosses such faces at right angles",
-            millimetres(middle)
-        );
-        faults.push(source.diagnostic("boundaries.uniform_field", message).expected(expected));
-    }
-    faults
-}
-
-/// What to say of conductors at the surfaces of an applied field: the given A is an electric field along them, whose part without a
-/// curl is that of no device.
-fn applied_on_conductors(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let Some(field) = config.boundaries.uniform_field.as_ref().filter(|_| config.alternates()) else {
-        return Vec::new();
-    };
-    let topology = mesh.topology();
-    let conducts = |name: &&String| {
-        config.regions[*name].model != RegionModel::Perfect && material(config, name).conductivity > 0.0
-    };
-    let warning = |name: &String| {
-        let region = topology.region(name).ok()?;
-        let nodes: HashSet<NodeId> =
-            topology.elements_of(region).into_iter().flat_map(|e| topology.tet(e)).collect();
-        let touches = |surface: &&String| {
-            let faces = faces_of(topology, [surface.as_str()]);
-            faces.iter().any(|face| face.iter().filter(|node| nodes.contains(node)).count() >= 2)
-        };
-        let surface = field.surfaces.iter().find(touches)?;
-        Some(format!(
-            "the conductor `{name}` reaches `{surface}`, where the applied field is given: its eddy currents depend on \
-             boundaries.uniform_field.center there. Let the field be given farther out, with air between"
-        ))
-    };
-    config.regions.keys().filter(conducts).filter_map(warning).collect()
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.

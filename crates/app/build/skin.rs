@@ -3,7 +3,7 @@
 use fluxmorph_geometry::tet4::{Point, add};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::problem::{Problem, Shape};
-use fluxmorph_solver::audit::{SkinAudit, skin_audit};
+use fluxmorph_solver::audit::{SkinAudit, conductor_of, skin_audit};
 
 use super::entries::material;
 use super::field;
@@ -44,24 +44,26 @@ impl Audited {
 
 /// Audits of all conductors that a mesh holds, at all frequencies.
 pub(super) fn audits(config: &Config, mesh: &Mesh) -> Vec<Audited> {
+    let frequencies = config.frequencies();
     let of = |(name, region): (&String, &config::Region)| {
         let id = mesh.topology().region(name).ok()?;
         let material = material(config, name);
-        let joined = regions_of_one_conductor(config, mesh, region);
+        let conductor = conductor_of(mesh, id, &alike(config, mesh, region));
         let at = |&frequency: &f64| {
-            let audit = skin_audit(mesh, (id, &joined), &material, frequency, field::order(config))?;
+            let audit = skin_audit(mesh, (id, &conductor), &material, frequency, field::order(config))?;
             Some(Audited { audit, model: region.model })
         };
-        Some(config.frequencies().iter().filter_map(at).collect::<Vec<_>>())
+        Some(frequencies.iter().filter_map(at).collect::<Vec<_>>())
     };
     let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
 }
 
-/// Regions of the same material and model: where they touch, they are one conductor.
-fn regions_of_one_conductor(config: &Config, mesh: &Mesh, region: &config::Region) -> Vec<RegionId> {
-    let alike = |other: &config::Region| (&other.material, other.model) == (&region.material, region.model);
-    let others = config.regions.iter().filter(|(_, other)| alike(other));
+/// Regions of the same material and model.
+fn alike(config: &Config, mesh: &Mesh, region: &config::Region) -> Vec<RegionId> {
+    let is_alike =
+        |other: &config::Region| (&other.material, other.model) == (&region.material, region.model);
+    let others = config.regions.iter().filter(|(_, other)| is_alike(other));
     others.filter_map(|(name, _)| mesh.topology().region(name).ok()).collect()
 }
 

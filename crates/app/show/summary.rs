@@ -6,7 +6,7 @@ use fluxmorph_optimizer::body::BodyForce;
 
 use super::styles::{Styles, styled};
 use super::{Started, probes};
-use crate::config::{Constraint, Limit, Objective, ValueBound};
+use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, MultipoleResult, ObjectiveResult,
     RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateResult, Verdict, VerificationMesh,
@@ -247,12 +247,8 @@ fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
 
 /// The frequencies of an analysis, and what was measured.
 fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
-    let mut frequencies: Vec<String> = Vec::new();
-    for frequency in result.frequencies_hz.iter().map(|f| format!("{f} Hz")) {
-        if !frequencies.contains(&frequency) {
-            frequencies.push(frequency);
-        }
-    }
+    let frequencies = each_once(result.frequencies_hz.iter().copied());
+    let frequencies: Vec<String> = frequencies.iter().map(|f| format!("{f} Hz")).collect();
     let mut rows = vec![("analysed at", frequencies.join(", "))];
     if !result.loads.is_empty() {
         rows.push(("loads", printable(&result.loads.join(", ")).into_owned()));

@@ -45,18 +45,12 @@ impl UniformField {
     }
 }
 
-/// The point `c` of a uniform field among other conditions.
+/// The point `c` of uniform fields that give none: on the flux-parallel planes that touch their surfaces, and at 0 in the directions
+/// without one.
 ///
 /// # Errors
 /// [`MeshError::UnknownSurface`].
-pub(crate) fn centre(
-    mesh: &Mesh,
-    boundaries: &[(String, Boundary)],
-    field: &UniformField,
-) -> Result<Point, MeshError> {
-    if let Some(centre) = field.centre {
-        return Ok(centre);
-    }
+pub(crate) fn default_centre(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<Point, MeshError> {
     let mut given: HashSet<NodeId> = HashSet::new();
     for (name, _) in boundaries.iter().filter(|(_, b)| matches!(b, Boundary::UniformField(_))) {
         given.extend(mesh.topology().surface(name)?.iter().flatten());
@@ -75,7 +69,10 @@ pub(crate) fn centre(
     for &(place, normal) in &planes {
         if let Some(axis) = axis_of(normal) {
             centre[axis] = place[axis];
-            directions.push(std::array::from_fn(|d| f64::from(u8::from(d == axis))));
+            let direction = std::array::from_fn(|d| f64::from(u8::from(d == axis)));
+            if !directions.contains(&direction) {
+                directions.push(direction);
+            }
         }
     }
     // Onto the others along what their normals have beside those before.
@@ -105,11 +102,12 @@ pub(crate) fn check_applied<'a>(
     boundaries: &[(String, Boundary)],
     perfect: impl Iterator<Item = (&'a str, &'a [[NodeId; 3]])>,
 ) -> Result<(), SolverError> {
+    let default = default_centre(mesh, boundaries)?;
     let mut applied: HashMap<[NodeId; 2], (Point, &str)> = HashMap::new();
     let (mut largest, mut apart) = (0.0_f64, Vec::new());
     for (surface, boundary) in boundaries {
         let Boundary::UniformField(field) = boundary else { continue };
-        let centre = centre(mesh, boundaries, field)?;
+        let centre = field.centre.unwrap_or(default);
         for edge in mesh.topology().surface(surface)?.iter().flat_map(edges) {
             let potential = field.vector_potential(centre, middle(mesh, edge));
             largest = largest.max(norm(potential));

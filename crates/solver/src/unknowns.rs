@@ -349,11 +349,12 @@ fn conditions(
     boundaries: &[(String, Boundary)],
     covered: &HashSet<[NodeId; 3]>,
 ) -> Result<BTreeMap<CarrierId, AtNode>, SolverError> {
+    let default = boundary::default_centre(mesh, boundaries)?;
     let mut at_nodes: BTreeMap<CarrierId, AtNode> = BTreeMap::new();
     let mut condition_of: HashMap<[NodeId; 3], (&str, &Boundary)> = HashMap::new();
     for (surface, boundary) in boundaries {
         let applied = match boundary {
-            Boundary::UniformField(field) => Some((field, boundary::centre(mesh, boundaries, field)?)),
+            Boundary::UniformField(field) => Some((field, field.centre.unwrap_or(default))),
             _ => None,
         };
         let fix = if *boundary == Boundary::FluxNormal { Fix::Normal } else { Fix::Tangential };

@@ -14,8 +14,8 @@ fn seen_and_expected(prism: &Prism, order: Order) -> (f64, f64, NodalErrors, f64
     let mesh = boxed(prism, Cells::COARSE);
     let block = &prism.parts[0];
     let region = mesh.topology().region(block.name).expect("a part is a region");
-    let audit =
-        skin_audit(&mesh, (region, &[]), &block.kind.material(), FREQUENCY, order).expect("it conducts");
+    let audit = skin_audit(&mesh, (region, &[region]), &block.kind.material(), FREQUENCY, order)
+        .expect("it conducts");
     let nodal = ALL[usize::from(order == Order::Quadratic)];
     let seen = solve(prism, &mesh, nodal, 1.0).errors(prism);
     let expected = audit.nodal_errors(order);

@@ -1,8 +1,16 @@
 //! The field problems of a configuration: its load cases, or its frequencies.
 
+use std::collections::HashSet;
+
 use super::config::Config;
 use super::load::LoadCase;
 use crate::config::section::Section;
+
+/// Every number once, in the order in which they come first; zero has no sign.
+pub(crate) fn each_once(numbers: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut seen = HashSet::new();
+    numbers.into_iter().filter(|number| seen.insert((number + 0.0).to_bits())).collect()
+}
 
 impl Config {
     /// The field problems in their order, at least one.
@@ -18,18 +26,12 @@ impl Config {
 
     /// The frequencies of the field problems [Hz], each once, in their order.
     pub fn frequencies(&self) -> Vec<f64> {
-        let mut frequencies: Vec<f64> = Vec::new();
-        for case in self.load_cases() {
-            if !frequencies.contains(&case.frequency) {
-                frequencies.push(case.frequency);
-            }
-        }
-        frequencies
+        each_once(self.load_cases().iter().map(|case| case.frequency))
     }
 
     /// Whether a field alternates: one of the frequencies is above zero.
     pub fn alternates(&self) -> bool {
-        self.frequencies().iter().any(|&f| f > 0.0)
+        self.load_cases().iter().any(|case| case.frequency > 0.0)
     }
 
     /// What the loads ask of each other and of the analysis.

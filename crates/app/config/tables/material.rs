@@ -237,6 +237,11 @@ pub(super) fn check_regions(
 }
 
 impl Config {
+    /// Whether a region is meshed, and not replaced by its surface.
+    pub fn is_meshed(&self, region: &str) -> bool {
+        self.regions.get(region).is_none_or(|own| own.model == RegionModel::Volume)
+    }
+
     /// The first region whose material has a B–H curve.
     pub fn saturating_region(&self) -> Option<&String> {
         let saturates =

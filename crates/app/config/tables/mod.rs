@@ -44,6 +44,7 @@ pub use functional::{Compared, Follow, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};
 pub use load::{Feed, Load, LoadCase};
+pub(crate) use load_cases::each_once;
 pub use material::{KneeWord, Material, Region, RegionModel, Steel, WrittenCurve};
 pub use mesh::{
     BlockMesh, BoxOfRegion, BoxesMesh, Generator, LengthUnit, MeshConfig, Patch, ShieldMesh, SizeAlong,

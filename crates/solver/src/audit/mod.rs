@@ -118,12 +118,12 @@ impl SkinAudit {
 
 /// Audits one region of a mesh in which it is still meshed; `None` where nothing is induced or the region is empty.
 ///
-/// Regions of `alike`, of the same material and model, that are joined with it by faces are one conductor: its surface is theirs
-/// together, and so are its volume and extent. The first layer is that under the region's own part of the surface; of a region without
-/// one, as of a core, that under all of it. A quadratic element counts as two: it follows the decay over twice the thickness.
+/// The regions of `conductor` (see [`conductor_of`]), the audited one among them, have one surface, volume and extent. The first layer
+/// is that under the region's own part of the surface; of a region without one, as of a core, that under all of it. A quadratic element
+/// counts as two: it follows the decay over twice the thickness.
 pub fn skin_audit(
     mesh: &Mesh,
-    (region, alike): (RegionId, &[RegionId]),
+    (region, conductor): (RegionId, &[RegionId]),
     material: &Material,
     frequency: f64,
     order: Order,
@@ -134,7 +134,6 @@ pub fn skin_audit(
     let own: Vec<[Point; 4]> = topology.elements_of(region).into_iter().map(|e| mesh.vertices(e)).collect();
     let own_volume: f64 = own.iter().map(|&vertices| volume(vertices)).sum();
     let squares: f64 = own.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
-    let conductor = joined(mesh, region, alike);
     let elements = conductor.iter().flat_map(|&part| topology.elements_of(part));
     let elements: Vec<[Point; 4]> = elements.map(|e| mesh.vertices(e)).collect();
     let around = AxisBox::around(elements.as_flattened());
@@ -185,8 +184,9 @@ pub fn skin_audit(
     })
 }
 
-/// A region with those of some others that faces join with it, one through the other.
-fn joined(mesh: &Mesh, region: RegionId, others: &[RegionId]) -> Vec<RegionId> {
+/// The conductor that a region is a part of: with it those of others, alike in material and model, that faces join with it, one
+/// through the other.
+pub fn conductor_of(mesh: &Mesh, region: RegionId, others: &[RegionId]) -> Vec<RegionId> {
     let mut found = vec![region];
     let mut k = 0;
     while let Some(&part) = found.get(k) {
@@ -232,7 +232,8 @@ mod tests {
 
     fn audit(mesh: &Mesh, region: u32, alike: &[u32]) -> SkinAudit {
         let alike: Vec<RegionId> = alike.iter().map(|&k| RegionId(k)).collect();
-        skin_audit(mesh, (RegionId(region), &alike), &COPPER, 2000.0, Order::Linear).expect("it conducts")
+        let conductor = conductor_of(mesh, RegionId(region), &alike);
+        skin_audit(mesh, (RegionId(region), &conductor), &COPPER, 2000.0, Order::Linear).expect("it conducts")
     }
 
     #[test]

@@ -210,21 +210,28 @@ pub(crate) fn check(
     (conductors, materials): (&Conductors, &[Material]),
     boundaries: &[(String, Boundary)],
 ) -> Result<(), SolverError> {
+    let solids: Vec<_> = self::conductors(coils).collect();
+    if solids.is_empty() {
+        return Ok(());
+    }
     let topology = mesh.topology();
+    let is_stranded = |e: &ElementId| {
+        let currents = coils.iter().filter(|coil| !matches!(coil.shape, CoilShape::Solid(_)));
+        let mut currents = currents.filter_map(|coil| coil.shape.region_current());
+        currents.any(|current| current.current_density().binary_search_by_key(e, |(e, _)| *e).is_ok())
+    };
+    let conducts = |e: &ElementId| materials[topology.region_of()[e.index()].index()].conductivity > 0.0;
+    let conducting = match &conductors.elements[..] {
+        [] => topology.elements().filter(|e| conducts(e) && !is_stranded(e)).collect(),
+        elements => elements.to_vec(),
+    };
     let mut shared = vec![false; topology.node_count()];
-    for (coil, conductor) in self::conductors(coils) {
+    for (coil, conductor) in solids {
         let is_own = |e: &ElementId| conductor.potential().binary_search_by_key(e, |(e, _)| *e).is_ok();
-        let is_stranded = |e: &ElementId| {
-            let currents = coils.iter().filter(|coil| !matches!(coil.shape, CoilShape::Solid(_)));
-            let mut currents = currents.filter_map(|coil| coil.shape.region_current());
-            currents.any(|current| current.current_density().binary_search_by_key(e, |(e, _)| *e).is_ok())
-        };
-        let conducts = |e: &ElementId| materials[topology.region_of()[e.index()].index()].conductivity > 0.0;
-        let at_rest = topology.elements().filter(|e| conducts(e) && !is_stranded(e));
-        let others = conductors.elements.iter().copied().chain(at_rest).filter(|e| !is_own(e));
+        let others = conducting.iter().filter(|e| !is_own(e));
         shared.fill(false);
         let surfaces = conductors.surface.iter().chain(&conductors.grounded).copied().flatten();
-        others.flat_map(|e| topology.tet(e)).chain(surfaces).for_each(|node| shared[node.index()] = true);
+        others.flat_map(|&e| topology.tet(e)).chain(surfaces).for_each(|node| shared[node.index()] = true);
         let mut nodes = conductor.potential().iter().flat_map(|(e, _)| topology.tet(*e));
         if let Some(node) = nodes.find(|node| shared[node.index()]) {
             let fault = RegionFault::Touched { place: mesh.point(node) };
